@@ -1,0 +1,3 @@
+//! The command `elbowroom`.
+
+fn main() {}

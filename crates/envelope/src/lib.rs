@@ -1,0 +1,1 @@
+//! Elbowroom: which deviations a plan survives.

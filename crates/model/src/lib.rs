@@ -1,0 +1,1 @@
+//! Elbowroom: what a planning problem means, and the judge.

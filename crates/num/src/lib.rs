@@ -1,0 +1,29 @@
+//! Exact numbers: rationals, bounds with infinities, intervals.
+//!
+//! Everything that decides whether a plan is sound is computed with [`Rational`], so that a
+//! guarantee never hangs on a rounding error. Small numbers (numerator and denominator in an
+//! `i64`) take a fast path without allocation; anything larger is kept exactly as well.
+//!
+//! - [`Rational`]: an exact fraction.
+//! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
+//! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
+//!
+//! No planning word occurs in this crate.
+//!
+//! ```
+//! use elbowroom_num::Rational;
+//!
+//! let third: Rational = "1/3".parse()?;
+//! let sum = &third + &third + &third;
+//! assert_eq!(sum, Rational::ONE);
+//! assert_eq!("53.8888".parse::<Rational>()?.to_string(), "67361/1250");
+//! # Ok::<(), elbowroom_num::ParseRationalError>(())
+//! ```
+
+mod delta;
+mod interval;
+mod rational;
+
+pub use delta::Delta;
+pub use interval::{End, Interval};
+pub use rational::{ParseRationalError, Rational};

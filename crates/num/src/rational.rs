@@ -1,0 +1,638 @@
+//! The exact fraction, with a fast path for small numbers.
+
+use std::cmp::Ordering;
+use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::iter::Sum;
+use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
+use std::str::FromStr;
+
+use dashu_int::{IBig, UBig};
+use dashu_ratio::RBig;
+
+/// An exact fraction in lowest terms, with a positive denominator.
+///
+/// A number whose numerator and denominator fit an `i64` is always stored that way, so equal
+/// numbers have equal representations.
+#[derive(Clone)]
+pub struct Rational(Repr);
+
+#[derive(Clone)]
+enum Repr {
+    /// Lowest terms, `denominator > 0`, `numerator != i64::MIN`.
+    Small { numerator: i64, denominator: i64 },
+    /// Only what does not fit `Small`.
+    Big(Box<RBig>),
+}
+
+use Repr::{Big, Small};
+
+impl Rational {
+    /// The number 0.
+    pub const ZERO: Self = Self::integer(0);
+    /// The number 1.
+    pub const ONE: Self = Self::integer(1);
+
+    const fn integer(numerator: i64) -> Self {
+        Self(Small {
+            numerator,
+            denominator: 1,
+        })
+    }
+
+    /// The fraction `numerator / denominator`.
+    ///
+    /// # Panics
+    /// If `denominator` is zero.
+    pub fn new(numerator: i64, denominator: i64) -> Self {
+        assert!(
+            denominator != 0,
+            "a fraction's denominator must not be zero"
+        );
+        Self::reduced(i128::from(numerator), i128::from(denominator))
+    }
+
+    /// Brings `numerator / denominator` (not zero) to lowest terms.
+    fn reduced(numerator: i128, denominator: i128) -> Self {
+        debug_assert!(denominator != 0);
+        let divisor = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
+        // `divisor` is at most the smaller magnitude; it exceeds i128 only for i128::MIN twice.
+        let divisor = i128::try_from(divisor).unwrap_or(1);
+        let (mut n, mut d) = (numerator / divisor, denominator / divisor);
+        if d < 0 {
+            (n, d) = (-n, -d);
+        }
+        match (i64::try_from(n), i64::try_from(d)) {
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
+                numerator,
+                denominator,
+            }),
+            _ => Self::from_big(RBig::from_parts(
+                IBig::from(n),
+                UBig::try_from(d).expect("the denominator was made positive"),
+            )),
+        }
+    }
+
+    fn from_big(big: RBig) -> Self {
+        let (numerator, denominator) = (big.numerator(), big.denominator());
+        match (i64::try_from(numerator), i64::try_from(denominator)) {
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
+                numerator,
+                denominator,
+            }),
+            _ => Self(Big(Box::new(big))),
+        }
+    }
+
+    fn to_big(&self) -> RBig {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => RBig::from_parts(
+                IBig::from(*numerator),
+                UBig::try_from(*denominator).expect("denominators are positive"),
+            ),
+            Big(big) => (**big).clone(),
+        }
+    }
+
+    /// Whether this is 0.
+    pub fn is_zero(&self) -> bool {
+        matches!(self.0, Small { numerator: 0, .. })
+    }
+
+    /// Whether this is below 0.
+    pub fn is_negative(&self) -> bool {
+        self.signum() < 0
+    }
+
+    /// Whether this is above 0.
+    pub fn is_positive(&self) -> bool {
+        self.signum() > 0
+    }
+
+    /// Whether this is a whole number.
+    pub fn is_integer(&self) -> bool {
+        match &self.0 {
+            Small { denominator, .. } => *denominator == 1,
+            Big(big) => big.is_int(),
+        }
+    }
+
+    /// -1, 0 or 1, as this is below, at or above 0.
+    pub fn signum(&self) -> i32 {
+        match &self.0 {
+            Small { numerator, .. } => match numerator.cmp(&0) {
+                Ordering::Less => -1,
+                Ordering::Equal => 0,
+                Ordering::Greater => 1,
+            },
+            Big(big) => {
+                if big.numerator() < &IBig::ZERO {
+                    -1
+                } else {
+                    1
+                }
+            }
+        }
+    }
+
+    /// The distance to 0.
+    #[must_use]
+    pub fn abs(&self) -> Self {
+        if self.is_negative() {
+            -self
+        } else {
+            self.clone()
+        }
+    }
+
+    /// `1 / self`, or `None` for 0.
+    pub fn reciprocal(&self) -> Option<Self> {
+        self.checked_div_into(&Self::ONE)
+    }
+
+    /// `self / divisor`, or `None` when `divisor` is 0.
+    pub fn checked_div(&self, divisor: &Self) -> Option<Self> {
+        divisor.checked_div_into(self)
+    }
+
+    fn checked_div_into(&self, dividend: &Self) -> Option<Self> {
+        if self.is_zero() {
+            None
+        } else {
+            Some(dividend / self)
+        }
+    }
+
+    /// The largest whole number not above this.
+    #[must_use]
+    pub fn floor(&self) -> Self {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => Self::from(numerator.div_euclid(*denominator)),
+            Big(big) => Self::from_big(RBig::from(big.floor())),
+        }
+    }
+
+    /// The smallest whole number not below this.
+    #[must_use]
+    pub fn ceil(&self) -> Self {
+        -((-self).floor())
+    }
+
+    /// The nearest floating-point number; for display and heuristics only.
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "that is what this function is for"
+    )]
+    pub fn to_f64(&self) -> f64 {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => *numerator as f64 / *denominator as f64,
+            Big(big) => big.to_f64().value(),
+        }
+    }
+
+    /// Numerator and denominator, when both fit an `i64`.
+    pub fn as_small(&self) -> Option<(i64, i64)> {
+        match self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => Some((numerator, denominator)),
+            Big(_) => None,
+        }
+    }
+
+    /// The denominator of the fraction in lowest terms, when it fits an `i64`.
+    pub fn denominator(&self) -> Option<i64> {
+        match &self.0 {
+            Small { denominator, .. } => Some(*denominator),
+            Big(big) => i64::try_from(big.denominator()).ok(),
+        }
+    }
+
+    /// The number in decimal notation with at most `digits` digits after the point, rounded
+    /// half away from zero, without trailing zeros: `1/3` with 3 digits is `0.333`.
+    pub fn to_decimal(&self, digits: u32) -> String {
+        let scale = IBig::from(10).pow(digits as usize);
+        let magnitude = self.abs().to_big();
+        let doubled = RBig::from(scale.clone() * IBig::from(2)) * magnitude + RBig::ONE;
+        let rounded = (doubled / RBig::from(2)).floor();
+        let whole = (&rounded / &scale).to_string();
+        let part = (&rounded % &scale).to_string();
+        let mut text = String::new();
+        if self.is_negative() && rounded != IBig::ZERO {
+            text.push('-');
+        }
+        text.push_str(&whole);
+        let padded = format!("{part:0>width$}", width = digits as usize);
+        let trimmed = padded.trim_end_matches('0');
+        if digits > 0 && !trimmed.is_empty() {
+            text.push('.');
+            text.push_str(trimmed);
+        }
+        text
+    }
+}
+
+/// The greatest common divisor; `gcd(0, b) = b`.
+fn gcd(a: u128, b: u128) -> u128 {
+    // Nearly all operands fit 64 bits, where a division is several times cheaper.
+    if let (Ok(a), Ok(b)) = (u64::try_from(a), u64::try_from(b)) {
+        return u128::from(gcd_u64(a, b));
+    }
+    let (mut a, mut b) = (a, b);
+    while b != 0 {
+        if let (Ok(small_a), Ok(small_b)) = (u64::try_from(a), u64::try_from(b)) {
+            return u128::from(gcd_u64(small_a, small_b));
+        }
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+/// The binary algorithm: shifts and subtractions instead of divisions.
+fn gcd_u64(mut a: u64, mut b: u64) -> u64 {
+    if a == 0 || b == 0 {
+        return a | b;
+    }
+    let shift = (a | b).trailing_zeros();
+    a >>= a.trailing_zeros();
+    loop {
+        b >>= b.trailing_zeros();
+        if a > b {
+            std::mem::swap(&mut a, &mut b);
+        }
+        b -= a;
+        if b == 0 {
+            return a << shift;
+        }
+    }
+}
+
+impl From<i64> for Rational {
+    fn from(value: i64) -> Self {
+        if value == i64::MIN {
+            Self::reduced(i128::from(value), 1)
+        } else {
+            Self::integer(value)
+        }
+    }
+}
+
+impl From<i32> for Rational {
+    fn from(value: i32) -> Self {
+        Self::integer(i64::from(value))
+    }
+}
+
+impl From<u32> for Rational {
+    fn from(value: u32) -> Self {
+        Self::integer(i64::from(value))
+    }
+}
+
+impl Default for Rational {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl PartialEq for Rational {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (
+                Small {
+                    numerator: a,
+                    denominator: b,
+                },
+                Small {
+                    numerator: c,
+                    denominator: d,
+                },
+            ) => a == c && b == d,
+            (Big(a), Big(b)) => a == b,
+            _ => false,
+        }
+    }
+}
+
+impl Eq for Rational {}
+
+impl Hash for Rational {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => (numerator, denominator).hash(state),
+            Big(big) => (big.numerator(), big.denominator()).hash(state),
+        }
+    }
+}
+
+impl PartialOrd for Rational {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Rational {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (&self.0, &other.0) {
+            (
+                Small {
+                    numerator: a,
+                    denominator: b,
+                },
+                Small {
+                    numerator: c,
+                    denominator: d,
+                },
+            ) => {
+                if b == d {
+                    a.cmp(c)
+                } else {
+                    (i128::from(*a) * i128::from(*d)).cmp(&(i128::from(*c) * i128::from(*b)))
+                }
+            }
+            _ => self.to_big().cmp(&other.to_big()),
+        }
+    }
+}
+
+impl<'a> Add<&'a Rational> for &Rational {
+    type Output = Rational;
+    fn add(self, other: &'a Rational) -> Rational {
+        sum(self, other, false)
+    }
+}
+
+impl<'a> Sub<&'a Rational> for &Rational {
+    type Output = Rational;
+    fn sub(self, other: &'a Rational) -> Rational {
+        sum(self, other, true)
+    }
+}
+
+/// `a + b`, or `a - b` when `subtract`.
+fn sum(left: &Rational, right: &Rational, subtract: bool) -> Rational {
+    if let (
+        Small {
+            numerator: a,
+            denominator: b,
+        },
+        Small {
+            numerator: c,
+            denominator: d,
+        },
+    ) = (&left.0, &right.0)
+    {
+        let c = if subtract { -c } else { *c };
+        if b == d {
+            if *b == 1
+                && let Some(whole) = a.checked_add(c)
+                && whole != i64::MIN
+            {
+                return Rational::integer(whole);
+            }
+            return Rational::reduced(i128::from(*a) + i128::from(c), i128::from(*b));
+        }
+        let (a, b, c, d) = (
+            i128::from(*a),
+            i128::from(*b),
+            i128::from(c),
+            i128::from(*d),
+        );
+        return Rational::reduced(a * d + c * b, b * d);
+    }
+    let (a, b) = (left.to_big(), right.to_big());
+    Rational::from_big(if subtract { a - b } else { a + b })
+}
+
+impl<'a> Mul<&'a Rational> for &Rational {
+    type Output = Rational;
+    fn mul(self, other: &'a Rational) -> Rational {
+        match (&self.0, &other.0) {
+            (
+                Small {
+                    numerator: a,
+                    denominator: b,
+                },
+                Small {
+                    numerator: c,
+                    denominator: d,
+                },
+            ) => Rational::reduced(
+                i128::from(*a) * i128::from(*c),
+                i128::from(*b) * i128::from(*d),
+            ),
+            _ => Rational::from_big(self.to_big() * other.to_big()),
+        }
+    }
+}
+
+/// # Panics
+/// When dividing by zero; see [`Rational::checked_div`].
+impl<'a> Div<&'a Rational> for &Rational {
+    type Output = Rational;
+    fn div(self, other: &'a Rational) -> Rational {
+        assert!(!other.is_zero(), "division of a rational by zero");
+        match (&self.0, &other.0) {
+            (
+                Small {
+                    numerator: a,
+                    denominator: b,
+                },
+                Small {
+                    numerator: c,
+                    denominator: d,
+                },
+            ) => Rational::reduced(
+                i128::from(*a) * i128::from(*d),
+                i128::from(*b) * i128::from(*c),
+            ),
+            _ => Rational::from_big(self.to_big() / other.to_big()),
+        }
+    }
+}
+
+impl Neg for &Rational {
+    type Output = Rational;
+    fn neg(self) -> Rational {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator,
+            } => Rational(Small {
+                numerator: -numerator,
+                denominator: *denominator,
+            }),
+            Big(big) => Rational::from_big(-(**big).clone()),
+        }
+    }
+}
+
+impl Neg for Rational {
+    type Output = Rational;
+    fn neg(self) -> Rational {
+        -&self
+    }
+}
+
+/// The by-value forms of the binary operators, all by way of the by-reference form.
+macro_rules! by_value {
+    ($($operator:ident $method:ident),*) => {$(
+        impl $operator<Rational> for Rational {
+            type Output = Rational;
+            fn $method(self, other: Rational) -> Rational {
+                (&self).$method(&other)
+            }
+        }
+        impl<'a> $operator<&'a Rational> for Rational {
+            type Output = Rational;
+            fn $method(self, other: &'a Rational) -> Rational {
+                (&self).$method(other)
+            }
+        }
+        impl $operator<Rational> for &Rational {
+            type Output = Rational;
+            fn $method(self, other: Rational) -> Rational {
+                self.$method(&other)
+            }
+        }
+    )*};
+}
+by_value!(Add add, Sub sub, Mul mul, Div div);
+
+/// The assigning operators, all by way of the by-reference form.
+macro_rules! assigning {
+    ($($operator:ident $method:ident $plain:ident),*) => {$(
+        impl $operator<Rational> for Rational {
+            fn $method(&mut self, other: Rational) {
+                *self = (&*self).$plain(&other);
+            }
+        }
+        impl<'a> $operator<&'a Rational> for Rational {
+            fn $method(&mut self, other: &'a Rational) {
+                *self = (&*self).$plain(other);
+            }
+        }
+    )*};
+}
+assigning!(AddAssign add_assign add, SubAssign sub_assign sub, MulAssign mul_assign mul);
+
+impl Sum for Rational {
+    fn sum<I: Iterator<Item = Self>>(terms: I) -> Self {
+        terms.fold(Self::ZERO, |total, term| total + term)
+    }
+}
+
+impl<'a> Sum<&'a Rational> for Rational {
+    fn sum<I: Iterator<Item = &'a Self>>(terms: I) -> Self {
+        terms.fold(Self::ZERO, |total, term| total + term)
+    }
+}
+
+/// A whole number, or `p/q` in lowest terms: exactly what [`FromStr`] reads back.
+impl fmt::Display for Rational {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Small {
+                numerator,
+                denominator: 1,
+            } => f.pad(&numerator.to_string()),
+            Small {
+                numerator,
+                denominator,
+            } => f.pad(&format!("{numerator}/{denominator}")),
+            Big(big) => f.pad(&big.to_string()),
+        }
+    }
+}
+
+impl fmt::Debug for Rational {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// A text is not a number in decimal notation or a fraction.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not a number: write a decimal such as 12.5 or a fraction such as 25/2")]
+pub struct ParseRationalError {
+    text: String,
+}
+
+/// Longest numeral accepted; more digits than any measurement has, few enough to stay fast.
+const LONGEST_NUMERAL: usize = 400;
+/// Largest decimal exponent accepted, for the same reason.
+const LARGEST_EXPONENT: i32 = 400;
+
+/// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.
+impl FromStr for Rational {
+    type Err = ParseRationalError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let parsed = match text.split_once('/') {
+            Some((numerator, denominator)) => match (decimal(numerator), decimal(denominator)) {
+                (Some(numerator), Some(denominator)) => numerator.checked_div(&denominator),
+                _ => None,
+            },
+            None => decimal(text),
+        };
+        parsed.ok_or_else(|| ParseRationalError {
+            text: text.chars().take(60).collect(),
+        })
+    }
+}
+
+/// Reads `[+-] digits [. digits] [e [+-] digits]`.
+fn decimal(text: &str) -> Option<Rational> {
+    if text.len() > LONGEST_NUMERAL {
+        return None;
+    }
+    let (negative, text) = match text.as_bytes().first()? {
+        b'-' => (true, &text[1..]),
+        b'+' => (false, &text[1..]),
+        _ => (false, text),
+    };
+    let (mantissa, exponent) = match text.find(['e', 'E']) {
+        Some(at) => (&text[..at], text[at + 1..].parse::<i32>().ok()?),
+        None => (text, 0),
+    };
+    let (whole, part) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits = format!("{whole}{part}");
+    if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    if exponent.abs() > LARGEST_EXPONENT {
+        return None;
+    }
+    let shift = i32::try_from(part.len()).ok()? - exponent;
+    let power = shift.unsigned_abs();
+    let value = match (digits.parse::<i64>(), 10_i64.checked_pow(power)) {
+        (Ok(digits), Some(scale)) if shift >= 0 => Rational::new(digits, scale),
+        _ => {
+            let digits = IBig::from_str(&digits).ok()?;
+            let scale = UBig::from(10_u8).pow(power as usize);
+            Rational::from_big(if shift >= 0 {
+                RBig::from_parts(digits, scale)
+            } else {
+                RBig::from(digits * IBig::from(scale))
+            })
+        }
+    };
+    Some(if negative { -value } else { value })
+}
+
+#[cfg(test)]
+mod tests;

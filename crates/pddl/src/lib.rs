@@ -1,0 +1,1 @@
+//! Elbowroom: PDDL and plan text to the model and back.

@@ -1,0 +1,1 @@
+//! Elbowroom: plans that leave room.
