@@ -1,1 +1,30 @@
-//! Elbowroom: what a planning problem means, and the judge.
+//! What a planning problem means: problems, ground actions, states, time-triggered plans, and
+//! the judge.
+//!
+//! In: a [`Problem`] as `elbowroom-pddl` lowers it from text (or as a program builds it).
+//! Out: ground actions, states, and verdicts.
+//!
+//! The way through the crate:
+//!
+//! 1. [`problem`]: the lifted problem, names resolved to ids, types, schemas, timed initials.
+//! 2. [`ground`]: conditions, expressions, effects and actions without variables.
+//! 3. [`Task`]: a problem with its table of ground facts and fluents; instantiates schemas on
+//!    demand ([`Task::instantiate`]).
+//! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
+//! 5. `validate`: the judge. PDDL 2.1 semantics alone; it shares no code with
+//!    networks, encodings or solvers, because every other claim is attacked with it.
+//!
+//! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
+//! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
+
+pub mod ground;
+mod instantiate;
+mod interference;
+mod plan;
+pub mod problem;
+mod task;
+
+pub use interference::Footprint;
+pub use plan::{Step, TimeTriggeredPlan};
+pub use problem::Problem;
+pub use task::{GroundRule, InstantiateError, State, Task, TimedHappening};

@@ -1,0 +1,437 @@
+//! Conditions, expressions, effects and actions without variables.
+//!
+//! Facts and fluents are numbers here; [`Task`](crate::Task) knows their names.
+
+use elbowroom_num::Rational;
+
+use crate::problem::{Comparison, ObjectId, SchemaId, Unknown, UpdateOperator};
+
+/// A ground atom, as a position in its task's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FactId(pub u32);
+
+/// A ground numeric fluent, as a position in its task's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FluentId(pub u32);
+
+impl FactId {
+    /// The position in the table.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl FluentId {
+    /// The position in the table.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A ground condition. The empty conjunction is true, the empty disjunction false.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Condition {
+    /// The fact is true.
+    Fact(FactId),
+    /// A comparison of numbers.
+    Compare(Comparison, Expression, Expression),
+    /// Not.
+    Not(Box<Condition>),
+    /// All of them.
+    And(Vec<Condition>),
+    /// At least one of them.
+    Or(Vec<Condition>),
+}
+
+impl Condition {
+    /// The condition that always holds.
+    pub const TRUE: Self = Self::And(Vec::new());
+    /// The condition that never holds.
+    pub const FALSE: Self = Self::Or(Vec::new());
+
+    /// Whether this is the empty conjunction.
+    pub fn is_trivial(&self) -> bool {
+        matches!(self, Self::And(parts) if parts.is_empty())
+    }
+
+    /// The conjuncts, with nested conjunctions flattened: what one checks, and blames, one by one.
+    pub fn conjuncts(&self) -> Vec<&Self> {
+        match self {
+            Self::And(parts) => parts.iter().flat_map(Self::conjuncts).collect(),
+            other => vec![other],
+        }
+    }
+
+    /// Calls `visit` for each fact read (derived facts as themselves).
+    pub fn visit_facts(&self, visit: &mut impl FnMut(FactId)) {
+        match self {
+            Self::Fact(fact) => visit(*fact),
+            Self::Compare(..) => {}
+            Self::Not(part) => part.visit_facts(visit),
+            Self::And(parts) | Self::Or(parts) => {
+                for part in parts {
+                    part.visit_facts(visit);
+                }
+            }
+        }
+    }
+
+    /// Calls `visit` for each expression on either side of a comparison.
+    pub fn visit_expressions(&self, visit: &mut impl FnMut(&Expression)) {
+        match self {
+            Self::Fact(_) => {}
+            Self::Compare(_, left, right) => {
+                visit(left);
+                visit(right);
+            }
+            Self::Not(part) => part.visit_expressions(visit),
+            Self::And(parts) | Self::Or(parts) => {
+                for part in parts {
+                    part.visit_expressions(visit);
+                }
+            }
+        }
+    }
+
+    /// Calls `visit` for each fluent read.
+    pub fn visit_fluents(&self, visit: &mut impl FnMut(FluentId)) {
+        self.visit_expressions(&mut |expression| expression.visit_fluents(visit));
+    }
+
+    /// The same condition with `replace` applied to every leaf of its expressions.
+    #[must_use]
+    pub fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
+        match self {
+            Self::Fact(fact) => Self::Fact(*fact),
+            Self::Compare(comparison, left, right) => Self::Compare(
+                *comparison,
+                left.map_leaves(replace),
+                right.map_leaves(replace),
+            ),
+            Self::Not(part) => Self::Not(Box::new(part.map_leaves(replace))),
+            Self::And(parts) => Self::And(parts.iter().map(|p| p.map_leaves(replace)).collect()),
+            Self::Or(parts) => Self::Or(parts.iter().map(|p| p.map_leaves(replace)).collect()),
+        }
+    }
+}
+
+/// A ground numeric expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expression {
+    /// A number.
+    Constant(Rational),
+    /// The current value of a fluent.
+    Fluent(FluentId),
+    /// The duration of the action it belongs to.
+    Duration,
+    /// The makespan; metrics only.
+    TotalTime,
+    /// A number left open.
+    Unknown(Unknown),
+    /// Sum of the operands.
+    Add(Vec<Expression>),
+    /// First minus second.
+    Subtract(Box<Expression>, Box<Expression>),
+    /// Product of the operands.
+    Multiply(Vec<Expression>),
+    /// First divided by second.
+    Divide(Box<Expression>, Box<Expression>),
+    /// Minus the operand.
+    Negate(Box<Expression>),
+}
+
+impl Expression {
+    /// Calls `visit` for each fluent read.
+    pub fn visit_fluents(&self, visit: &mut impl FnMut(FluentId)) {
+        self.visit_leaves(&mut |leaf| {
+            if let Self::Fluent(fluent) = leaf {
+                visit(*fluent);
+            }
+        });
+    }
+
+    /// Calls `visit` for each leaf: constants, fluents, `?duration`, unknowns.
+    pub fn visit_leaves(&self, visit: &mut impl FnMut(&Self)) {
+        match self {
+            Self::Constant(_)
+            | Self::Fluent(_)
+            | Self::Duration
+            | Self::TotalTime
+            | Self::Unknown(_) => visit(self),
+            Self::Add(parts) | Self::Multiply(parts) => {
+                for part in parts {
+                    part.visit_leaves(visit);
+                }
+            }
+            Self::Subtract(left, right) | Self::Divide(left, right) => {
+                left.visit_leaves(visit);
+                right.visit_leaves(visit);
+            }
+            Self::Negate(part) => part.visit_leaves(visit),
+        }
+    }
+
+    /// The same expression with each leaf for which `replace` gives something replaced by it.
+    #[must_use]
+    pub fn map_leaves(&self, replace: &mut impl FnMut(&Self) -> Option<Self>) -> Self {
+        match self {
+            Self::Constant(_)
+            | Self::Fluent(_)
+            | Self::Duration
+            | Self::TotalTime
+            | Self::Unknown(_) => replace(self).unwrap_or_else(|| self.clone()),
+            Self::Add(parts) => Self::Add(parts.iter().map(|p| p.map_leaves(replace)).collect()),
+            Self::Multiply(parts) => {
+                Self::Multiply(parts.iter().map(|p| p.map_leaves(replace)).collect())
+            }
+            Self::Subtract(left, right) => Self::Subtract(
+                Box::new(left.map_leaves(replace)),
+                Box::new(right.map_leaves(replace)),
+            ),
+            Self::Divide(left, right) => Self::Divide(
+                Box::new(left.map_leaves(replace)),
+                Box::new(right.map_leaves(replace)),
+            ),
+            Self::Negate(part) => Self::Negate(Box::new(part.map_leaves(replace))),
+        }
+    }
+
+    /// The value, or `None` where a leaf has none or a division is by zero.
+    pub fn evaluate(&self, leaf: &mut impl FnMut(&Self) -> Option<Rational>) -> Option<Rational> {
+        Some(match self {
+            Self::Constant(value) => value.clone(),
+            Self::Fluent(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => leaf(self)?,
+            Self::Add(parts) => {
+                let mut total = Rational::ZERO;
+                for part in parts {
+                    total += part.evaluate(leaf)?;
+                }
+                total
+            }
+            Self::Multiply(parts) => {
+                let mut product = Rational::ONE;
+                for part in parts {
+                    product *= part.evaluate(leaf)?;
+                }
+                product
+            }
+            Self::Subtract(left, right) => left.evaluate(leaf)? - right.evaluate(leaf)?,
+            Self::Divide(left, right) => {
+                left.evaluate(leaf)?.checked_div(&right.evaluate(leaf)?)?
+            }
+            Self::Negate(part) => -part.evaluate(leaf)?,
+        })
+    }
+}
+
+/// A ground effect with the condition it depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// When it happens at all.
+    pub guard: Guard,
+    /// What happens.
+    pub change: Change,
+}
+
+/// See [`problem::Guard`](crate::problem::Guard).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Guard {
+    /// Read on arrival at the action's start, remembered until the end. End effects only.
+    pub at_start: Condition,
+    /// Must hold throughout the action. End effects only.
+    pub over_all: Condition,
+    /// Read on arrival at the effect's own moment.
+    pub now: Condition,
+}
+
+impl Guard {
+    /// The guard of an unconditional effect.
+    pub const ALWAYS: Self = Self {
+        at_start: Condition::TRUE,
+        over_all: Condition::TRUE,
+        now: Condition::TRUE,
+    };
+
+    /// Whether the effect is unconditional.
+    pub fn is_trivial(&self) -> bool {
+        self.at_start.is_trivial() && self.over_all.is_trivial() && self.now.is_trivial()
+    }
+}
+
+/// What a ground effect does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// The fact becomes true. Wins over a deletion by the same happening.
+    Add(FactId),
+    /// The fact becomes false.
+    Delete(FactId),
+    /// The fluent changes.
+    Update {
+        /// How.
+        operator: UpdateOperator,
+        /// Which fluent.
+        fluent: FluentId,
+        /// By or to how much; reads the state on arrival.
+        value: Expression,
+    },
+}
+
+/// What happens at one moment: a start, an end, an instantaneous action.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SnapAction {
+    /// Needed on arrival.
+    pub condition: Condition,
+    /// Done then.
+    pub effects: Vec<Effect>,
+}
+
+/// A ground action: a schema with its arguments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Action {
+    /// Where it comes from.
+    pub schema: SchemaId,
+    /// With which arguments.
+    pub arguments: Vec<ObjectId>,
+    /// `(name arg …)`.
+    pub name: String,
+    /// What it needs and does.
+    pub body: Body,
+}
+
+/// The part of an action that depends on whether it takes time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Body {
+    /// `:action`
+    Instantaneous(SnapAction),
+    /// `:durative-action`
+    Durative(DurativeBody),
+}
+
+/// What a durative action needs and does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DurativeBody {
+    /// All must hold; none means that any duration `>= 0` will do.
+    pub duration: Vec<DurationConstraint>,
+    /// Its start.
+    pub start: SnapAction,
+    /// Needed at every moment of the open interval between start and end.
+    pub over_all: Condition,
+    /// Its end.
+    pub end: SnapAction,
+    /// Change while it runs.
+    pub continuous: Vec<ContinuousEffect>,
+}
+
+/// `?duration comparison bound`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DurationConstraint {
+    /// How they compare.
+    pub comparison: Comparison,
+    /// The bound.
+    pub bound: Expression,
+    /// Whether the bound reads the state on arrival at the end rather than the start.
+    pub at_end: bool,
+}
+
+/// While the action runs, `d fluent / dt` has the term `rate`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContinuousEffect {
+    /// When it happens at all.
+    pub guard: Guard,
+    /// Which fluent.
+    pub fluent: FluentId,
+    /// Change per unit of time, sign included.
+    pub rate: Expression,
+}
+
+impl Action {
+    /// The durative part, if it takes time.
+    pub fn durative(&self) -> Option<&DurativeBody> {
+        match &self.body {
+            Body::Durative(body) => Some(body),
+            Body::Instantaneous(_) => None,
+        }
+    }
+
+    /// The same action with each leaf for which `replace` gives something replaced by it, in
+    /// every expression: conditions, guards, effects, rates and duration constraints.
+    #[must_use]
+    pub fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
+        let body = match &self.body {
+            Body::Instantaneous(snap) => Body::Instantaneous(snap.map_leaves(replace)),
+            Body::Durative(body) => Body::Durative(DurativeBody {
+                duration: body
+                    .duration
+                    .iter()
+                    .map(|constraint| DurationConstraint {
+                        comparison: constraint.comparison,
+                        bound: constraint.bound.map_leaves(replace),
+                        at_end: constraint.at_end,
+                    })
+                    .collect(),
+                start: body.start.map_leaves(replace),
+                over_all: body.over_all.map_leaves(replace),
+                end: body.end.map_leaves(replace),
+                continuous: body
+                    .continuous
+                    .iter()
+                    .map(|effect| ContinuousEffect {
+                        guard: effect.guard.map_leaves(replace),
+                        fluent: effect.fluent,
+                        rate: effect.rate.map_leaves(replace),
+                    })
+                    .collect(),
+            }),
+        };
+        Self {
+            schema: self.schema,
+            arguments: self.arguments.clone(),
+            name: self.name.clone(),
+            body,
+        }
+    }
+}
+
+impl SnapAction {
+    fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
+        Self {
+            condition: self.condition.map_leaves(replace),
+            effects: self
+                .effects
+                .iter()
+                .map(|effect| effect.map_leaves(replace))
+                .collect(),
+        }
+    }
+}
+
+impl Effect {
+    fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
+        let change = match &self.change {
+            Change::Update {
+                operator,
+                fluent,
+                value,
+            } => Change::Update {
+                operator: *operator,
+                fluent: *fluent,
+                value: value.map_leaves(replace),
+            },
+            other => other.clone(),
+        };
+        Self {
+            guard: self.guard.map_leaves(replace),
+            change,
+        }
+    }
+}
+
+impl Guard {
+    fn map_leaves(&self, replace: &mut impl FnMut(&Expression) -> Option<Expression>) -> Self {
+        Self {
+            at_start: self.at_start.map_leaves(replace),
+            over_all: self.over_all.map_leaves(replace),
+            now: self.now.map_leaves(replace),
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! From lifted to ground: variables replaced by objects, quantifiers expanded.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use crate::ground::{self, FactId, FluentId};
+use crate::problem::{
+    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, Term, TimedChange,
+    UpdateOperator, Variable,
+};
+use crate::task::{GroundRule, InstantiateError, Task, TimedHappening};
+
+impl Task {
+    /// The ground action of a schema with these arguments.
+    ///
+    /// Nothing is simplified away, so that a diagnosis can name each condition as written.
+    ///
+    /// # Errors
+    /// When number or types of the arguments do not fit the schema.
+    pub fn instantiate(
+        &mut self,
+        schema: SchemaId,
+        arguments: &[ObjectId],
+    ) -> Result<ground::Action, InstantiateError> {
+        self.check_arguments(schema, arguments)?;
+        let problem = self.problem.clone();
+        let mut binding = arguments.to_vec();
+        let binding = &mut binding;
+        let body = match &problem.schemas[schema.index()].body {
+            Body::Instantaneous { condition, effects } => {
+                ground::Body::Instantaneous(self.ground_snap(condition, effects, binding))
+            }
+            Body::Durative {
+                duration,
+                at_start,
+                over_all,
+                at_end,
+                start_effects,
+                end_effects,
+                continuous,
+            } => ground::Body::Durative(ground::DurativeBody {
+                duration: duration
+                    .iter()
+                    .map(|constraint| ground::DurationConstraint {
+                        comparison: constraint.comparison,
+                        bound: self.ground_expression(&constraint.bound, binding),
+                        at_end: constraint.at_end,
+                    })
+                    .collect(),
+                start: self.ground_snap(at_start, start_effects, binding),
+                over_all: self.ground_condition(over_all, binding),
+                end: self.ground_snap(at_end, end_effects, binding),
+                continuous: self.ground_continuous(continuous, binding),
+            }),
+        };
+        let name = self.action_name(schema, arguments);
+        Ok(ground::Action {
+            schema,
+            arguments: arguments.to_vec(),
+            name,
+            body,
+        })
+    }
+
+    fn check_arguments(
+        &self,
+        schema: SchemaId,
+        arguments: &[ObjectId],
+    ) -> Result<(), InstantiateError> {
+        let schema = &self.problem.schemas[schema.index()];
+        if schema.parameters.len() != arguments.len() {
+            return Err(InstantiateError::ArgumentCount {
+                action: schema.name.clone(),
+                expected: schema.parameters.len(),
+                found: arguments.len(),
+            });
+        }
+        for (variable, &object) in schema.parameters.iter().zip(arguments) {
+            if !self.problem.has_type(object, &variable.types) {
+                let names: Vec<_> = variable
+                    .types
+                    .iter()
+                    .map(|id| self.problem.types[id.index()].name.as_str())
+                    .collect();
+                return Err(InstantiateError::ArgumentType {
+                    action: schema.name.clone(),
+                    variable: variable.name.clone(),
+                    object: self.problem.objects[object.index()].name.clone(),
+                    expected: names.join(" or "),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn ground_snap(
+        &mut self,
+        condition: &Condition,
+        effects: &[problem::Effect],
+        binding: &mut Vec<ObjectId>,
+    ) -> ground::SnapAction {
+        let condition = self.ground_condition(condition, binding);
+        let mut ground_effects = Vec::with_capacity(effects.len());
+        for effect in effects {
+            self.for_all(&effect.variables, binding, &mut |task, binding| {
+                let guard = task.ground_guard(&effect.guard, binding);
+                let change = task.ground_change(&effect.change, binding);
+                ground_effects.push(ground::Effect { guard, change });
+            });
+        }
+        ground::SnapAction {
+            condition,
+            effects: ground_effects,
+        }
+    }
+
+    fn ground_continuous(
+        &mut self,
+        effects: &[problem::ContinuousEffect],
+        binding: &mut Vec<ObjectId>,
+    ) -> Vec<ground::ContinuousEffect> {
+        let mut ground_effects = Vec::with_capacity(effects.len());
+        for effect in effects {
+            self.for_all(&effect.variables, binding, &mut |task, binding| {
+                ground_effects.push(ground::ContinuousEffect {
+                    guard: task.ground_guard(&effect.guard, binding),
+                    fluent: task.ground_fluent(&effect.fluent, binding),
+                    rate: task.ground_expression(&effect.rate, binding),
+                });
+            });
+        }
+        ground_effects
+    }
+
+    fn ground_guard(
+        &mut self,
+        guard: &problem::Guard,
+        binding: &mut Vec<ObjectId>,
+    ) -> ground::Guard {
+        ground::Guard {
+            at_start: self.ground_condition(&guard.at_start, binding),
+            over_all: self.ground_condition(&guard.over_all, binding),
+            now: self.ground_condition(&guard.now, binding),
+        }
+    }
+
+    fn ground_change(&mut self, change: &problem::Change, binding: &[ObjectId]) -> ground::Change {
+        match change {
+            problem::Change::Add(atom) => ground::Change::Add(self.ground_atom(atom, binding)),
+            problem::Change::Delete(atom) => {
+                ground::Change::Delete(self.ground_atom(atom, binding))
+            }
+            problem::Change::Update {
+                operator,
+                fluent,
+                value,
+            } => ground::Change::Update {
+                operator: *operator,
+                fluent: self.ground_fluent(fluent, binding),
+                value: self.ground_expression(value, binding),
+            },
+        }
+    }
+
+    /// The ground form of a condition, with variables bound to `binding` by position.
+    pub(crate) fn ground_condition(
+        &mut self,
+        condition: &Condition,
+        binding: &mut Vec<ObjectId>,
+    ) -> ground::Condition {
+        match condition {
+            Condition::Atom(atom) => ground::Condition::Fact(self.ground_atom(atom, binding)),
+            Condition::Equal(left, right) => {
+                if resolve(*left, binding) == resolve(*right, binding) {
+                    ground::Condition::TRUE
+                } else {
+                    ground::Condition::FALSE
+                }
+            }
+            Condition::Compare(comparison, left, right) => ground::Condition::Compare(
+                *comparison,
+                self.ground_expression(left, binding),
+                self.ground_expression(right, binding),
+            ),
+            Condition::Not(part) => {
+                ground::Condition::Not(Box::new(self.ground_condition(part, binding)))
+            }
+            Condition::And(parts) => ground::Condition::And(
+                parts
+                    .iter()
+                    .map(|part| self.ground_condition(part, binding))
+                    .collect(),
+            ),
+            Condition::Or(parts) => ground::Condition::Or(
+                parts
+                    .iter()
+                    .map(|part| self.ground_condition(part, binding))
+                    .collect(),
+            ),
+            Condition::Forall(variables, part) => {
+                ground::Condition::And(self.ground_each(variables, part, binding))
+            }
+            Condition::Exists(variables, part) => {
+                ground::Condition::Or(self.ground_each(variables, part, binding))
+            }
+        }
+    }
+
+    fn ground_each(
+        &mut self,
+        variables: &[Variable],
+        part: &Condition,
+        binding: &mut Vec<ObjectId>,
+    ) -> Vec<ground::Condition> {
+        let mut parts = Vec::new();
+        self.for_all(variables, binding, &mut |task, binding| {
+            parts.push(task.ground_condition(part, binding));
+        });
+        parts
+    }
+
+    pub(crate) fn ground_expression(
+        &mut self,
+        expression: &Expression,
+        binding: &[ObjectId],
+    ) -> ground::Expression {
+        let each = |task: &mut Self, parts: &[Expression]| {
+            parts
+                .iter()
+                .map(|part| task.ground_expression(part, binding))
+                .collect()
+        };
+        match expression {
+            Expression::Constant(value) => ground::Expression::Constant(value.clone()),
+            Expression::Fluent(fluent) => {
+                ground::Expression::Fluent(self.ground_fluent(fluent, binding))
+            }
+            Expression::Duration => ground::Expression::Duration,
+            Expression::TotalTime => ground::Expression::TotalTime,
+            Expression::Unknown(unknown) => ground::Expression::Unknown(*unknown),
+            Expression::Add(parts) => ground::Expression::Add(each(self, parts)),
+            Expression::Multiply(parts) => ground::Expression::Multiply(each(self, parts)),
+            Expression::Subtract(left, right) => ground::Expression::Subtract(
+                Box::new(self.ground_expression(left, binding)),
+                Box::new(self.ground_expression(right, binding)),
+            ),
+            Expression::Divide(left, right) => ground::Expression::Divide(
+                Box::new(self.ground_expression(left, binding)),
+                Box::new(self.ground_expression(right, binding)),
+            ),
+            Expression::Negate(part) => {
+                ground::Expression::Negate(Box::new(self.ground_expression(part, binding)))
+            }
+        }
+    }
+
+    fn ground_atom(&mut self, atom: &Atom, binding: &[ObjectId]) -> FactId {
+        let arguments = atom
+            .arguments
+            .iter()
+            .map(|&term| resolve(term, binding))
+            .collect();
+        self.fact(atom.predicate, arguments)
+    }
+
+    fn ground_fluent(&mut self, fluent: &Fluent, binding: &[ObjectId]) -> FluentId {
+        let arguments = fluent
+            .arguments
+            .iter()
+            .map(|&term| resolve(term, binding))
+            .collect();
+        self.fluent(fluent.function, arguments)
+    }
+
+    /// Calls `action` once for each way to append objects for `variables` to the binding.
+    fn for_all(
+        &mut self,
+        variables: &[Variable],
+        binding: &mut Vec<ObjectId>,
+        action: &mut dyn FnMut(&mut Self, &mut Vec<ObjectId>),
+    ) {
+        let Some((first, rest)) = variables.split_first() else {
+            action(self, binding);
+            return;
+        };
+        let problem = self.problem.clone();
+        for object in problem.objects_of(&first.types) {
+            binding.push(object);
+            self.for_all(rest, binding, action);
+            binding.pop();
+        }
+    }
+
+    /// Adds the rules whose head is `fact`, and, through their bodies, all they depend on.
+    pub(crate) fn ground_rules(&mut self, fact: FactId) {
+        if !self.derived.insert(fact) {
+            return;
+        }
+        let (predicate, arguments) = self
+            .facts
+            .get_index(fact.index())
+            .cloned()
+            .expect("a fact of this task");
+        let problem = self.problem.clone();
+        for rule in problem
+            .rules
+            .iter()
+            .filter(|rule| rule.predicate == predicate)
+        {
+            let fits = rule
+                .parameters
+                .iter()
+                .zip(&arguments)
+                .all(|(variable, &object)| problem.has_type(object, &variable.types));
+            if fits {
+                let body = self.ground_condition(&rule.body, &mut arguments.clone());
+                self.rules.push(GroundRule { head: fact, body });
+            }
+        }
+    }
+
+    /// The timed initials by time, those of one time together in the order of the file.
+    pub(crate) fn ground_timed(&mut self) -> Vec<TimedHappening> {
+        let problem = self.problem.clone();
+        let mut by_time: BTreeMap<Rational, Vec<ground::Change>> = BTreeMap::new();
+        for timed in &problem.timed {
+            let change = match &timed.change {
+                TimedChange::Add(predicate, arguments) => {
+                    ground::Change::Add(self.fact(*predicate, arguments.clone()))
+                }
+                TimedChange::Delete(predicate, arguments) => {
+                    ground::Change::Delete(self.fact(*predicate, arguments.clone()))
+                }
+                TimedChange::Assign(function, arguments, value) => ground::Change::Update {
+                    operator: UpdateOperator::Assign,
+                    fluent: self.fluent(*function, arguments.clone()),
+                    value: ground::Expression::Constant(value.clone()),
+                },
+            };
+            by_time.entry(timed.time.clone()).or_default().push(change);
+        }
+        by_time
+            .into_iter()
+            .map(|(time, changes)| TimedHappening { time, changes })
+            .collect()
+    }
+}
+
+fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
+    match term {
+        Term::Variable(position) => binding[position],
+        Term::Object(object) => object,
+    }
+}

@@ -1,0 +1,207 @@
+//! Which happenings interfere: the no-moving-targets rule.
+
+use std::collections::BTreeSet;
+
+use crate::ground::{Action, Body, Change, Condition, Expression, FactId, FluentId, SnapAction};
+use crate::task::{Task, TimedHappening};
+
+/// What a happening reads and writes.
+///
+/// Two happenings [interfere](Footprint::interferes_with) when it matters which comes first, or
+/// when PDDL 2.1 says that it might (Fox & Long 2003, definition 12). Conditions of conditional
+/// effects count as read and their effects as written whether or not they come about. Over-all
+/// conditions are not part of any happening and do not count.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Footprint {
+    /// Facts in conditions, positive or negative; a derived fact counts as all basic facts that
+    /// its rules mention.
+    pub reads: BTreeSet<FactId>,
+    /// Facts made true.
+    pub adds: BTreeSet<FactId>,
+    /// Facts made false.
+    pub deletes: BTreeSet<FactId>,
+    /// Fluents in conditions, duration bounds, rates and right-hand sides.
+    pub reads_fluents: BTreeSet<FluentId>,
+    /// Fluents increased or decreased, at once or continuously.
+    pub shifts: BTreeSet<FluentId>,
+    /// Fluents changed in any other way.
+    pub assigns: BTreeSet<FluentId>,
+}
+
+impl Footprint {
+    /// The footprint of an instantaneous action, or of a durative action's start.
+    pub fn of_start(task: &Task, action: &Action) -> Self {
+        let mut footprint = Self::default();
+        match &action.body {
+            Body::Instantaneous(snap) => footprint.include_snap(task, snap),
+            Body::Durative(body) => {
+                footprint.include_snap(task, &body.start);
+                for constraint in body.duration.iter().filter(|constraint| !constraint.at_end) {
+                    footprint.include_expression(&constraint.bound);
+                }
+                // What an end effect's guard says of the start is read at the start.
+                for effect in &body.end.effects {
+                    footprint.include_condition(task, &effect.guard.at_start);
+                }
+                for effect in &body.continuous {
+                    footprint.include_condition(task, &effect.guard.at_start);
+                    footprint.include_expression(&effect.rate);
+                    footprint.shifts.insert(effect.fluent);
+                }
+            }
+        }
+        footprint
+    }
+
+    /// The footprint of a durative action's end; empty for an instantaneous action.
+    pub fn of_end(task: &Task, action: &Action) -> Self {
+        let mut footprint = Self::default();
+        if let Body::Durative(body) = &action.body {
+            footprint.include_snap(task, &body.end);
+            for constraint in body.duration.iter().filter(|constraint| constraint.at_end) {
+                footprint.include_expression(&constraint.bound);
+            }
+            footprint
+                .shifts
+                .extend(body.continuous.iter().map(|effect| effect.fluent));
+        }
+        footprint
+    }
+
+    /// The footprint of timed initials.
+    pub fn of_timed(timed: &TimedHappening) -> Self {
+        let mut footprint = Self::default();
+        for change in &timed.changes {
+            footprint.include_change(change);
+        }
+        footprint
+    }
+
+    /// The footprint of a condition alone: what it reads.
+    pub fn of_condition(task: &Task, condition: &Condition) -> Self {
+        let mut footprint = Self::default();
+        footprint.include_condition(task, condition);
+        footprint
+    }
+
+    /// Whether the two must not happen at the same time.
+    pub fn interferes_with(&self, other: &Self) -> bool {
+        self.disturbs(other) || other.disturbs(self)
+    }
+
+    /// Whether this writes what `other` reads, or writes the opposite of what `other` writes.
+    fn disturbs(&self, other: &Self) -> bool {
+        let meet = |a: &BTreeSet<FactId>, b: &BTreeSet<FactId>| !a.is_disjoint(b);
+        let meet_fluents = |a: &BTreeSet<FluentId>, b: &BTreeSet<FluentId>| !a.is_disjoint(b);
+        meet(&self.adds, &other.reads)
+            || meet(&self.deletes, &other.reads)
+            || meet(&self.adds, &other.deletes)
+            || meet_fluents(&self.shifts, &other.reads_fluents)
+            || meet_fluents(&self.assigns, &other.reads_fluents)
+            || meet_fluents(&self.assigns, &other.assigns)
+            || meet_fluents(&self.assigns, &other.shifts)
+    }
+
+    /// Whether this writes anything that `other` reads.
+    pub fn writes_what_is_read_by(&self, other: &Self) -> bool {
+        let touches = |facts: &BTreeSet<FactId>| !facts.is_disjoint(&other.reads);
+        let moves = |fluents: &BTreeSet<FluentId>| !fluents.is_disjoint(&other.reads_fluents);
+        touches(&self.adds) || touches(&self.deletes) || moves(&self.shifts) || moves(&self.assigns)
+    }
+
+    fn include_snap(&mut self, task: &Task, snap: &SnapAction) {
+        self.include_condition(task, &snap.condition);
+        for effect in &snap.effects {
+            self.include_condition(task, &effect.guard.now);
+            self.include_change(&effect.change);
+        }
+    }
+
+    fn include_change(&mut self, change: &Change) {
+        match change {
+            Change::Add(fact) => {
+                self.adds.insert(*fact);
+            }
+            Change::Delete(fact) => {
+                self.deletes.insert(*fact);
+            }
+            Change::Update {
+                operator,
+                fluent,
+                value,
+            } => {
+                if operator.is_additive() {
+                    self.shifts.insert(*fluent);
+                } else {
+                    self.assigns.insert(*fluent);
+                }
+                self.include_expression(value);
+            }
+        }
+    }
+
+    fn include_condition(&mut self, task: &Task, condition: &Condition) {
+        condition.visit_facts(&mut |fact| {
+            task.for_each_basis(fact, &mut |basic| {
+                self.reads.insert(basic);
+            });
+        });
+        task.visit_fluents_of(condition, &mut |fluent| {
+            self.reads_fluents.insert(fluent);
+        });
+    }
+
+    fn include_expression(&mut self, expression: &Expression) {
+        expression.visit_fluents(&mut |fluent| {
+            self.reads_fluents.insert(fluent);
+        });
+    }
+}
+
+impl Task {
+    /// Calls `visit` for the fact itself, or, if it is derived, for each basic fact that its rules
+    /// mention, directly or through other derived facts.
+    pub fn for_each_basis(&self, fact: FactId, visit: &mut impl FnMut(FactId)) {
+        for fact in self.closure(fact) {
+            if !self.is_derived(fact) {
+                visit(fact);
+            }
+        }
+    }
+
+    /// Calls `visit` for each fluent that a condition reads, also through derived facts.
+    pub fn visit_fluents_of(&self, condition: &Condition, visit: &mut impl FnMut(FluentId)) {
+        condition.visit_fluents(visit);
+        condition.visit_facts(&mut |fact| {
+            if self.is_derived(fact) {
+                let closure = self.closure(fact);
+                for rule in self
+                    .rules()
+                    .iter()
+                    .filter(|rule| closure.contains(&rule.head))
+                {
+                    rule.body.visit_fluents(visit);
+                }
+            }
+        });
+    }
+
+    /// The fact and everything its rules mention, transitively.
+    fn closure(&self, fact: FactId) -> BTreeSet<FactId> {
+        let mut reached = BTreeSet::from([fact]);
+        let mut frontier = vec![fact];
+        while let Some(fact) = frontier.pop() {
+            if !self.is_derived(fact) {
+                continue;
+            }
+            for rule in self.rules().iter().filter(|rule| rule.head == fact) {
+                rule.body.visit_facts(&mut |mentioned| {
+                    if reached.insert(mentioned) {
+                        frontier.push(mentioned);
+                    }
+                });
+            }
+        }
+        reached
+    }
+}

@@ -1,0 +1,528 @@
+//! The lifted problem: what a domain and a problem file say, with names resolved to ids.
+//!
+//! Variables are numbered by position: an action's parameters come first, then the variables of
+//! each enclosing quantifier, outermost first. A [`Term::Variable`] is an index into that list.
+
+use elbowroom_num::Rational;
+
+/// Declares an index into one of [`Problem`]'s lists.
+macro_rules! id {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// The position in the list.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+
+        impl From<usize> for $name {
+            fn from(index: usize) -> Self {
+                Self(u32::try_from(index).expect("fewer than 2^32 entries"))
+            }
+        }
+    };
+}
+
+id! {
+    /// An entry of [`Problem::types`].
+    TypeId
+}
+id! {
+    /// An entry of [`Problem::objects`].
+    ObjectId
+}
+id! {
+    /// An entry of [`Problem::predicates`].
+    PredicateId
+}
+id! {
+    /// An entry of [`Problem::functions`].
+    FunctionId
+}
+id! {
+    /// An entry of [`Problem::schemas`].
+    SchemaId
+}
+
+impl TypeId {
+    /// The type of everything, `object`: always the first of [`Problem::types`].
+    pub const OBJECT: Self = Self(0);
+}
+
+/// A planning problem, domain included.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Problem {
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub name: String,
+    /// All types; the first is `object`.
+    pub types: Vec<Type>,
+    /// The domain's constants, then the problem's objects.
+    pub objects: Vec<Object>,
+    /// Basic and derived predicates. `=` is not among them, see [`Condition::Equal`].
+    pub predicates: Vec<Predicate>,
+    /// Numeric functions.
+    pub functions: Vec<Function>,
+    /// Instantaneous and durative actions.
+    pub schemas: Vec<Schema>,
+    /// The rules of derived predicates; several may share a head.
+    pub rules: Vec<Rule>,
+    /// `:synth-parameters` of the domain: one unknown each, for the whole domain.
+    pub unknowns: Vec<String>,
+    /// What is true at time 0.
+    pub initial_facts: Vec<(PredicateId, Vec<ObjectId>)>,
+    /// The numbers at time 0; a function value not listed is undefined.
+    pub initial_values: Vec<(FunctionId, Vec<ObjectId>, Rational)>,
+    /// Timed initial literals and fluents, as written (not sorted).
+    pub timed: Vec<TimedInitial>,
+    /// What must hold at the end.
+    pub goal: Condition,
+    /// What to optimize. Has no bearing on validity.
+    pub metric: Option<Metric>,
+}
+
+/// A type and its direct supertypes (none for `object`; several for `either`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Type {
+    /// The name, in lower case.
+    pub name: String,
+    /// Direct supertypes.
+    pub parents: Vec<TypeId>,
+}
+
+/// A constant or object. Names keep the case of their declaration; they compare without case.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// The name as declared.
+    pub name: String,
+    /// Its types; more than one for `either`.
+    pub types: Vec<TypeId>,
+}
+
+/// A variable with the types it ranges over (the union, for `either`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// The name with its question mark.
+    pub name: String,
+    /// The union of these types.
+    pub types: Vec<TypeId>,
+}
+
+/// A predicate.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Predicate {
+    /// The name, in lower case.
+    pub name: String,
+    /// Argument types.
+    pub parameters: Vec<Variable>,
+    /// Whether rules define it, so that no effect may.
+    pub is_derived: bool,
+}
+
+/// A numeric function.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Function {
+    /// The name, in lower case.
+    pub name: String,
+    /// Argument types.
+    pub parameters: Vec<Variable>,
+}
+
+/// A variable or an object where an argument stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Term {
+    /// See the module's documentation for the numbering.
+    Variable(usize),
+    /// A constant or object.
+    Object(ObjectId),
+}
+
+/// A predicate applied to terms.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Atom {
+    /// The predicate.
+    pub predicate: PredicateId,
+    /// As many as the predicate has parameters.
+    pub arguments: Vec<Term>,
+}
+
+/// A function applied to terms.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fluent {
+    /// The function.
+    pub function: FunctionId,
+    /// As many as the function has parameters.
+    pub arguments: Vec<Term>,
+}
+
+/// A condition on a state. The empty conjunction is true, the empty disjunction false.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Condition {
+    /// The fact is true.
+    Atom(Atom),
+    /// Both terms denote the same object.
+    Equal(Term, Term),
+    /// A comparison of numbers.
+    Compare(Comparison, Expression, Expression),
+    /// Not.
+    Not(Box<Condition>),
+    /// All of them.
+    And(Vec<Condition>),
+    /// At least one of them.
+    Or(Vec<Condition>),
+    /// For all objects of the variables' types.
+    Forall(Vec<Variable>, Box<Condition>),
+    /// For some objects of the variables' types.
+    Exists(Vec<Variable>, Box<Condition>),
+}
+
+impl Condition {
+    /// The condition that always holds.
+    pub const TRUE: Self = Self::And(Vec::new());
+
+    /// Whether this is the empty conjunction.
+    pub fn is_trivial(&self) -> bool {
+        matches!(self, Self::And(parts) if parts.is_empty())
+    }
+}
+
+impl Default for Condition {
+    fn default() -> Self {
+        Self::TRUE
+    }
+}
+
+/// How two numbers are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Comparison {
+    /// `<`
+    Less,
+    /// `<=`
+    AtMost,
+    /// `=`
+    Equal,
+    /// `>=`
+    AtLeast,
+    /// `>`
+    Greater,
+}
+
+impl Comparison {
+    /// Whether `left self right`.
+    pub fn holds(self, left: &Rational, right: &Rational) -> bool {
+        match self {
+            Self::Less => left < right,
+            Self::AtMost => left <= right,
+            Self::Equal => left == right,
+            Self::AtLeast => left >= right,
+            Self::Greater => left > right,
+        }
+    }
+
+    /// As PDDL writes it.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Less => "<",
+            Self::AtMost => "<=",
+            Self::Equal => "=",
+            Self::AtLeast => ">=",
+            Self::Greater => ">",
+        }
+    }
+}
+
+/// A numeric expression.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expression {
+    /// A number.
+    Constant(Rational),
+    /// The current value of a fluent.
+    Fluent(Fluent),
+    /// `?duration`
+    Duration,
+    /// `total-time`; metrics only.
+    TotalTime,
+    /// A `:synth-parameters` name: an unknown number.
+    Unknown(Unknown),
+    /// Sum of the operands.
+    Add(Vec<Expression>),
+    /// First minus second.
+    Subtract(Box<Expression>, Box<Expression>),
+    /// Product of the operands.
+    Multiply(Vec<Expression>),
+    /// First divided by second.
+    Divide(Box<Expression>, Box<Expression>),
+    /// Minus the operand.
+    Negate(Box<Expression>),
+}
+
+/// A number that the problem leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Unknown {
+    /// An entry of [`Problem::unknowns`]: one number for the whole domain.
+    Domain(u32),
+    /// An entry of [`Schema::unknowns`]: one number per action instance.
+    Action(u32),
+    /// A parameter that a parametrized plan put here, by its position in that plan's list.
+    Parameter(u32),
+}
+
+/// An action schema.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schema {
+    /// The name, in lower case.
+    pub name: String,
+    /// The parameters.
+    pub parameters: Vec<Variable>,
+    /// `:synth-parameters` of the action: one unknown per instance.
+    pub unknowns: Vec<String>,
+    /// What it needs and does.
+    pub body: Body,
+}
+
+/// The part of an action that depends on whether it takes time.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Body {
+    /// `:action`
+    Instantaneous {
+        /// Needed on arrival.
+        condition: Condition,
+        /// Done at once.
+        effects: Vec<Effect>,
+    },
+    /// `:durative-action`
+    Durative {
+        /// All must hold; none means that any duration `>= 0` will do.
+        duration: Vec<DurationConstraint>,
+        /// Needed on arrival at the start.
+        at_start: Condition,
+        /// Needed at every moment of the open interval between start and end.
+        over_all: Condition,
+        /// Needed on arrival at the end.
+        at_end: Condition,
+        /// Done at the start; each one's guard has only `now`.
+        start_effects: Vec<Effect>,
+        /// Done at the end.
+        end_effects: Vec<Effect>,
+        /// Change while the action runs.
+        continuous: Vec<ContinuousEffect>,
+    },
+}
+
+/// `?duration comparison bound`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DurationConstraint {
+    /// How they compare; `=`, `<=` or `>=`.
+    pub comparison: Comparison,
+    /// The bound; may depend on fluents.
+    pub bound: Expression,
+    /// Whether the bound reads the state on arrival at the end (`at end`) rather than the start.
+    pub at_end: bool,
+}
+
+/// One effect, with the quantifiers and conditions it stands under.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// Variables of the enclosing `forall`s: the effect happens for all of their objects.
+    pub variables: Vec<Variable>,
+    /// When it happens at all.
+    pub guard: Guard,
+    /// What happens.
+    pub change: Change,
+}
+
+/// The condition of a conditional effect (`when`), by the moment at which its parts are read.
+/// All three must hold; unconditional effects have three trivial parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Guard {
+    /// Read on arrival at the action's start, remembered until the end. End effects only.
+    pub at_start: Condition,
+    /// Must hold throughout the action. End effects only.
+    pub over_all: Condition,
+    /// Read on arrival at the effect's own moment.
+    pub now: Condition,
+}
+
+/// What an effect does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// The fact becomes true. Wins over a deletion by the same happening.
+    Add(Atom),
+    /// The fact becomes false.
+    Delete(Atom),
+    /// The fluent changes.
+    Update {
+        /// How.
+        operator: UpdateOperator,
+        /// Which fluent.
+        fluent: Fluent,
+        /// By or to how much.
+        value: Expression,
+    },
+}
+
+/// How a fluent changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum UpdateOperator {
+    /// `:= value`
+    Assign,
+    /// `+= value`
+    Increase,
+    /// `-= value`
+    Decrease,
+    /// `*= value`
+    ScaleUp,
+    /// `/= value`
+    ScaleDown,
+}
+
+impl UpdateOperator {
+    /// As PDDL writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Assign => "assign",
+            Self::Increase => "increase",
+            Self::Decrease => "decrease",
+            Self::ScaleUp => "scale-up",
+            Self::ScaleDown => "scale-down",
+        }
+    }
+
+    /// Whether two such updates of one fluent may happen at the same time: only increases and
+    /// decreases commute.
+    pub fn is_additive(self) -> bool {
+        matches!(self, Self::Increase | Self::Decrease)
+    }
+}
+
+/// While the action runs, `d fluent / dt` has the term `rate` (negated for a decrease).
+/// PDDL writes it `(increase fluent (* #t rate))`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContinuousEffect {
+    /// Variables of the enclosing `forall`s.
+    pub variables: Vec<Variable>,
+    /// When it happens at all; only `at_start` and `over_all` can be non-trivial.
+    pub guard: Guard,
+    /// Which fluent.
+    pub fluent: Fluent,
+    /// Change per unit of time, sign included.
+    pub rate: Expression,
+}
+
+/// `head` holds whenever `body` does; the head's arguments are the rule's variables 0, 1, ….
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// The derived predicate.
+    pub predicate: PredicateId,
+    /// The head's arguments.
+    pub parameters: Vec<Variable>,
+    /// When it holds.
+    pub body: Condition,
+}
+
+/// A timed initial literal or fluent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedInitial {
+    /// When it happens, `> 0`.
+    pub time: Rational,
+    /// What happens; ground, never an increase.
+    pub change: TimedChange,
+}
+
+/// What a timed initial does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TimedChange {
+    /// The fact becomes true.
+    Add(PredicateId, Vec<ObjectId>),
+    /// The fact becomes false.
+    Delete(PredicateId, Vec<ObjectId>),
+    /// The fluent gets a value.
+    Assign(FunctionId, Vec<ObjectId>, Rational),
+}
+
+/// The problem's metric.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metric {
+    /// Whether more is better.
+    pub maximize: bool,
+    /// What is measured; `None` if it depends on preferences, which we do not measure.
+    pub expression: Option<Expression>,
+}
+
+impl Problem {
+    /// Whether `sub` is `of` or one of its descendants.
+    pub fn is_subtype(&self, sub: TypeId, of: TypeId) -> bool {
+        // Type graphs are acyclic (the reader sees to it), so this ends.
+        sub == of
+            || of == TypeId::OBJECT
+            || self.types[sub.index()]
+                .parents
+                .iter()
+                .any(|&parent| self.is_subtype(parent, of))
+    }
+
+    /// Whether `object` may stand where one of `types` is asked for.
+    ///
+    /// An object declared `either a b` counts as both, as VAL has it.
+    pub fn has_type(&self, object: ObjectId, types: &[TypeId]) -> bool {
+        self.objects[object.index()]
+            .types
+            .iter()
+            .any(|&own| types.iter().any(|&asked| self.is_subtype(own, asked)))
+    }
+
+    /// The objects that a variable ranges over, in order of declaration.
+    pub fn objects_of<'a>(&'a self, types: &'a [TypeId]) -> impl Iterator<Item = ObjectId> + 'a {
+        (0..self.objects.len())
+            .map(ObjectId::from)
+            .filter(move |&o| self.has_type(o, types))
+    }
+
+    /// The object of that name, whatever its case.
+    pub fn object(&self, name: &str) -> Option<ObjectId> {
+        self.objects
+            .iter()
+            .position(|o| o.name.eq_ignore_ascii_case(name))
+            .map(ObjectId::from)
+    }
+
+    /// The schema of that name, whatever its case.
+    pub fn schema(&self, name: &str) -> Option<SchemaId> {
+        self.schemas
+            .iter()
+            .position(|s| s.name.eq_ignore_ascii_case(name))
+            .map(SchemaId::from)
+    }
+
+    /// The predicate of that name, whatever its case.
+    pub fn predicate(&self, name: &str) -> Option<PredicateId> {
+        self.predicates
+            .iter()
+            .position(|p| p.name.eq_ignore_ascii_case(name))
+            .map(PredicateId::from)
+    }
+
+    /// The function of that name, whatever its case.
+    pub fn function(&self, name: &str) -> Option<FunctionId> {
+        self.functions
+            .iter()
+            .position(|f| f.name.eq_ignore_ascii_case(name))
+            .map(FunctionId::from)
+    }
+
+    /// `(name arg …)` as PDDL writes it.
+    pub fn apply_name(&self, name: &str, arguments: &[ObjectId]) -> String {
+        let mut text = format!("({name}");
+        for argument in arguments {
+            text.push(' ');
+            text.push_str(&self.objects[argument.index()].name);
+        }
+        text.push(')');
+        text
+    }
+}

@@ -1,0 +1,213 @@
+//! A problem with its table of ground facts and fluents.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use elbowroom_num::Rational;
+use indexmap::IndexSet;
+
+use crate::ground::{Change, Condition, FactId, FluentId};
+use crate::problem::{FunctionId, ObjectId, PredicateId, Problem, SchemaId};
+
+/// A problem, and the ground facts and fluents met so far.
+///
+/// Facts and fluents enter the table when something mentions them, so that a plan can be judged
+/// without grounding the whole problem.
+#[derive(Clone, Debug)]
+pub struct Task {
+    pub(crate) problem: Arc<Problem>,
+    pub(crate) facts: IndexSet<(PredicateId, Vec<ObjectId>)>,
+    pub(crate) fluents: IndexSet<(FunctionId, Vec<ObjectId>)>,
+    pub(crate) initial: State,
+    pub(crate) timed: Vec<TimedHappening>,
+    pub(crate) goal: Condition,
+    pub(crate) rules: Vec<GroundRule>,
+    /// Derived facts whose rules are in `rules` already.
+    pub(crate) derived: BTreeSet<FactId>,
+}
+
+/// The truth of facts and the values of fluents at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// What is true, derived facts aside.
+    pub facts: BTreeSet<FactId>,
+    /// The defined fluents' values.
+    pub values: BTreeMap<FluentId, Rational>,
+}
+
+/// All timed initials of one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedHappening {
+    /// When they happen.
+    pub time: Rational,
+    /// What happens: additions, deletions and assignments of constants.
+    pub changes: Vec<Change>,
+}
+
+/// `head` holds whenever `body` does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundRule {
+    /// The derived fact.
+    pub head: FactId,
+    /// When it holds.
+    pub body: Condition,
+}
+
+/// An action cannot be instantiated as asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InstantiateError {
+    /// The number of arguments is wrong.
+    #[error("`{action}` takes {expected} arguments, not {found}")]
+    ArgumentCount {
+        /// The action's name.
+        action: String,
+        /// How many it takes.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// An argument is not of the parameter's type.
+    #[error("`{object}` cannot stand for {variable} of `{action}`: it is not of type {expected}")]
+    ArgumentType {
+        /// The action's name.
+        action: String,
+        /// The parameter.
+        variable: String,
+        /// The object given.
+        object: String,
+        /// The type asked for.
+        expected: String,
+    },
+}
+
+impl Task {
+    /// The task of a problem: its initial state, timed happenings and goal, made ground.
+    pub fn new(problem: impl Into<Arc<Problem>>) -> Self {
+        let problem = problem.into();
+        let mut task = Self {
+            problem: Arc::clone(&problem),
+            facts: IndexSet::new(),
+            fluents: IndexSet::new(),
+            initial: State::default(),
+            timed: Vec::new(),
+            goal: Condition::TRUE,
+            rules: Vec::new(),
+            derived: BTreeSet::new(),
+        };
+        for (predicate, arguments) in &problem.initial_facts {
+            let fact = task.fact(*predicate, arguments.clone());
+            task.initial.facts.insert(fact);
+        }
+        for (function, arguments, value) in &problem.initial_values {
+            let fluent = task.fluent(*function, arguments.clone());
+            task.initial.values.insert(fluent, value.clone());
+        }
+        task.timed = task.ground_timed();
+        task.goal = task.ground_condition(&problem.goal, &mut Vec::new());
+        task
+    }
+
+    /// The lifted problem.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// The state at time 0.
+    pub fn initial(&self) -> &State {
+        &self.initial
+    }
+
+    /// The timed initials, one entry per time, by time.
+    pub fn timed(&self) -> &[TimedHappening] {
+        &self.timed
+    }
+
+    /// What must hold at the end.
+    pub fn goal(&self) -> &Condition {
+        &self.goal
+    }
+
+    /// The rules of all derived facts in the table, closed under what their bodies mention.
+    pub fn rules(&self) -> &[GroundRule] {
+        &self.rules
+    }
+
+    /// Whether rules define the fact.
+    pub fn is_derived(&self, fact: FactId) -> bool {
+        let (predicate, _) = self
+            .facts
+            .get_index(fact.index())
+            .expect("a fact of this task");
+        self.problem.predicates[predicate.index()].is_derived
+    }
+
+    /// How many facts are in the table.
+    pub fn fact_count(&self) -> usize {
+        self.facts.len()
+    }
+
+    /// How many fluents are in the table.
+    pub fn fluent_count(&self) -> usize {
+        self.fluents.len()
+    }
+
+    /// `(predicate object …)`.
+    pub fn fact_name(&self, fact: FactId) -> String {
+        let (predicate, arguments) = self
+            .facts
+            .get_index(fact.index())
+            .expect("a fact of this task");
+        self.problem
+            .apply_name(&self.problem.predicates[predicate.index()].name, arguments)
+    }
+
+    /// `(function object …)`.
+    pub fn fluent_name(&self, fluent: FluentId) -> String {
+        let (function, arguments) = self
+            .fluents
+            .get_index(fluent.index())
+            .expect("a fluent of this task");
+        self.problem
+            .apply_name(&self.problem.functions[function.index()].name, arguments)
+    }
+
+    /// The fluent in the table, if something has mentioned it.
+    pub fn find_fluent(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<FluentId> {
+        let key = (function, arguments.to_vec());
+        self.fluents
+            .get_index_of(&key)
+            .map(|index| FluentId(narrow(index)))
+    }
+
+    /// The fact in the table, if something has mentioned it.
+    pub fn find_fact(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<FactId> {
+        let key = (predicate, arguments.to_vec());
+        self.facts
+            .get_index_of(&key)
+            .map(|index| FactId(narrow(index)))
+    }
+
+    /// `(name arg …)` of an action.
+    pub fn action_name(&self, schema: SchemaId, arguments: &[ObjectId]) -> String {
+        self.problem
+            .apply_name(&self.problem.schemas[schema.index()].name, arguments)
+    }
+
+    pub(crate) fn fact(&mut self, predicate: PredicateId, arguments: Vec<ObjectId>) -> FactId {
+        let (index, is_new) = self.facts.insert_full((predicate, arguments));
+        let fact = FactId(narrow(index));
+        if is_new && self.problem.predicates[predicate.index()].is_derived {
+            self.ground_rules(fact);
+        }
+        fact
+    }
+
+    pub(crate) fn fluent(&mut self, function: FunctionId, arguments: Vec<ObjectId>) -> FluentId {
+        let (index, _) = self.fluents.insert_full((function, arguments));
+        FluentId(narrow(index))
+    }
+}
+
+fn narrow(index: usize) -> u32 {
+    u32::try_from(index).expect("fewer than 2^32 facts and fluents")
+}
