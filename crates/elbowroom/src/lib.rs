@@ -1,1 +1,7 @@
 //! Elbowroom.
+pub use elbowroom_envelope as envelope;
+pub use elbowroom_model as model;
+pub use elbowroom_num as num;
+pub use elbowroom_pddl as pddl;
+pub use elbowroom_plan as plan;
+pub use elbowroom_stn as stn;
