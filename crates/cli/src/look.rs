@@ -31,8 +31,8 @@ impl Look {
         if !io::stdout().is_terminal() {
             return Self::PLAIN;
         }
-        let width = terminal_size::terminal_size()
-            .map_or(DEFAULT_WIDTH, |(width, _)| usize::from(width.0));
+        let width =
+            terminal_size::terminal_size().map_or(DEFAULT_WIDTH, |(width, _)| usize::from(width.0));
         Self {
             width: width.clamp(40, MAX_WIDTH),
             unicode: locale_is_utf8(),

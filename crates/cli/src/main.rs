@@ -4,6 +4,7 @@
 //! `docs/exit-codes.md`. All input and output of the workspace happens here; what is computed is
 //! computed in the library.
 
+mod limits;
 mod look;
 mod number;
 mod table;

@@ -1,4 +1,8 @@
 //! Elbowroom.
+
+mod box_text;
+
+pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
