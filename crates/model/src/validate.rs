@@ -222,3 +222,6 @@ fn condition_of(body: &Body, when: When) -> Option<&Condition> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests;
