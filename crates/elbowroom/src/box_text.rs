@@ -125,6 +125,9 @@ fn known(plan: &ParametrizedPlan) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use elbowroom_model::ground::Condition;
     use elbowroom_num::{Interval, Rational};
     use elbowroom_plan::{Parameter, ParameterKind, ParametrizedPlan, StnPlan};
 
@@ -139,8 +142,10 @@ mod tests {
             range: Interval::at_least(Rational::ZERO),
         };
         ParametrizedPlan {
+            plan: StnPlan::default(),
             parameters: vec![parameter("d0"), parameter("d1")],
-            ..ParametrizedPlan::closed(StnPlan::default())
+            initial: BTreeMap::new(),
+            goal: Condition::TRUE,
         }
     }
 

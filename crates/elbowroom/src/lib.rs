@@ -1,6 +1,7 @@
 //! Elbowroom.
 
 mod box_text;
+mod plan_file;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
@@ -9,3 +10,4 @@ pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
 pub use elbowroom_stn as stn;
+pub use plan_file::PlanKind;
