@@ -8,6 +8,9 @@
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
 
 mod decoupled;
+pub mod linear;
+pub mod obligations;
+pub mod soundness;
 mod parameter;
 mod stn_plan;
 
