@@ -1,0 +1,11 @@
+//! Each sentence of the definition of a valid plan, as a small plan.
+
+mod conditions;
+mod continuous;
+mod durations;
+mod effects;
+mod explanations;
+mod groups;
+mod pieces;
+mod polynomials;
+mod world;
