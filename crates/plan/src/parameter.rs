@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::FluentId;
+use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::{Interval, Rational};
 
 use crate::stn_plan::{InstanceId, StnPlan};
@@ -66,6 +66,8 @@ pub struct ParametrizedPlan {
     pub parameters: Vec<Parameter>,
     /// Initial values that are parameters.
     pub initial: BTreeMap<FluentId, ParameterId>,
+    /// What must hold at the end: the task's goal, with the domain's unknowns as parameters.
+    pub goal: Condition,
 }
 
 /// A value for each parameter, by position.
