@@ -10,8 +10,9 @@
 mod decoupled;
 pub mod linear;
 pub mod obligations;
-pub mod soundness;
 mod parameter;
+pub mod reduction;
+pub mod soundness;
 mod stn_plan;
 
 pub use decoupled::DecoupledEnvelope;

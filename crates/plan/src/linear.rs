@@ -36,12 +36,18 @@ pub struct Linear {
 impl Linear {
     /// A number.
     pub fn constant(constant: Rational) -> Self {
-        Self { constant, ..Self::default() }
+        Self {
+            constant,
+            ..Self::default()
+        }
     }
 
     /// A parameter.
     pub fn parameter(id: ParameterId) -> Self {
-        Self { parameters: BTreeMap::from([(id, Rational::ONE)]), ..Self::default() }
+        Self {
+            parameters: BTreeMap::from([(id, Rational::ONE)]),
+            ..Self::default()
+        }
     }
 
     /// The time of `to` minus the time of `from`.
@@ -114,7 +120,11 @@ impl Linear {
             return Some(other.scaled(factor));
         }
         // One side may hold times; the other only parameters; neither holds products.
-        let (parametric, other) = if self.times.is_empty() { (self, other) } else { (other, self) };
+        let (parametric, other) = if self.times.is_empty() {
+            (self, other)
+        } else {
+            (other, self)
+        };
         if !parametric.times.is_empty()
             || !parametric.products.is_empty()
             || !other.products.is_empty()
@@ -124,10 +134,18 @@ impl Linear {
         let mut product = other.scaled(&parametric.constant);
         for (&id, coefficient) in &parametric.parameters {
             if !other.constant.is_zero() {
-                add_term(&mut product.parameters, id, &(coefficient * &other.constant));
+                add_term(
+                    &mut product.parameters,
+                    id,
+                    &(coefficient * &other.constant),
+                );
             }
             for (&node, time) in &other.times {
-                add_term(&mut product.products, (id, Factor::Time(node)), &(coefficient * time));
+                add_term(
+                    &mut product.products,
+                    (id, Factor::Time(node)),
+                    &(coefficient * time),
+                );
             }
             for (&second, factor) in &other.parameters {
                 let key = (id.min(second), Factor::Parameter(id.max(second)));
@@ -242,7 +260,10 @@ mod tests {
         let product = rate.times(&duration).expect("bilinear");
         // (3 + 2) * (10 - 4)
         let times = [0, 4, 10].map(Rational::from);
-        assert_eq!(product.value(&times, &vec![Rational::from(3)]), Rational::from(30));
+        assert_eq!(
+            product.value(&times, &vec![Rational::from(3)]),
+            Rational::from(30)
+        );
         assert!(duration.times(&duration).is_none());
         assert!(product.times(&duration).is_none());
     }
@@ -251,6 +272,9 @@ mod tests {
     fn what_cancels_disappears() {
         let difference = Linear::difference(NodeId(1), NodeId(2));
         assert_eq!(difference.minus(&difference), Linear::default());
-        assert_eq!(Linear::difference(NodeId::ZERO, NodeId::ZERO), Linear::default());
+        assert_eq!(
+            Linear::difference(NodeId::ZERO, NodeId::ZERO),
+            Linear::default()
+        );
     }
 }

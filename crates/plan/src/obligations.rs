@@ -17,17 +17,15 @@ mod over_all;
 mod separation;
 mod timeline;
 
-use std::collections::BTreeMap;
-
 use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 use elbowroom_num::Rational;
 
 use crate::linear::Linear;
+use crate::parameter::ParameterId;
 use crate::stn_plan::{InstanceId, NodeId, StnPlan};
 
 pub use over_all::OverAll;
-pub(crate) use timeline::Timeline;
 
 /// `to - from <= bound`, or `<` when strict.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,12 +43,22 @@ pub struct Difference {
 impl Difference {
     /// `earlier < later`.
     pub fn before(earlier: NodeId, later: NodeId) -> Self {
-        Self { from: later, to: earlier, bound: Rational::ZERO, is_strict: true }
+        Self {
+            from: later,
+            to: earlier,
+            bound: Rational::ZERO,
+            is_strict: true,
+        }
     }
 
     /// `earlier <= later`.
     pub fn not_after(earlier: NodeId, later: NodeId) -> Self {
-        Self { from: later, to: earlier, bound: Rational::ZERO, is_strict: false }
+        Self {
+            from: later,
+            to: earlier,
+            bound: Rational::ZERO,
+            is_strict: false,
+        }
     }
 }
 
@@ -140,7 +148,9 @@ pub struct Obligations {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// A product or quotient is neither linear nor bilinear.
-    #[error("{place}: the value of {expression} is not linear in times and parameters; fix one of its factors")]
+    #[error(
+        "{place}: the value of {expression} is not linear in times and parameters; fix one of its factors"
+    )]
     NotLinear {
         /// Where it stands.
         place: String,
@@ -200,26 +210,35 @@ impl Requirement {
                 plan.node_words(task, *node),
                 task.describe_condition(condition)
             ),
-            Self::OverAll { instance, condition } => format!(
+            Self::OverAll {
+                instance,
+                condition,
+            } => format!(
                 "{} needs {} throughout",
                 plan.instance(*instance).action.name,
                 task.describe_condition(condition)
             ),
             Self::Duration { instance, .. } => {
-                format!("{} must obey its domain's duration", plan.instance(*instance).action.name)
+                format!(
+                    "{} must obey its domain's duration",
+                    plan.instance(*instance).action.name
+                )
             }
             Self::Defined { node } => {
-                format!("{} needs a number that has no value", plan.node_words(task, *node))
+                format!(
+                    "{} needs a number that has no value",
+                    plan.node_words(task, *node)
+                )
             }
             Self::Goal { condition } => {
-                format!("the goal {} must hold at the end", task.describe_condition(condition))
+                format!(
+                    "the goal {} must hold at the end",
+                    task.describe_condition(condition)
+                )
             }
         }
     }
 }
 
-/// Numbers that the nominal schedule gives to nodes, used to order happenings.
-pub(crate) type Times = Vec<Rational>;
-
-/// Replaces parameters that are differences of times by those differences.
-pub(crate) type Substitution = BTreeMap<crate::parameter::ParameterId, (NodeId, NodeId)>;
+/// Parameters that are differences of times: `t_second - t_first`.
+pub type Substitution = std::collections::BTreeMap<ParameterId, (NodeId, NodeId)>;

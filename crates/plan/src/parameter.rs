@@ -75,11 +75,12 @@ pub type Valuation = Vec<Rational>;
 
 impl ParametrizedPlan {
     /// A plan in which nothing is left open.
-    pub fn closed(plan: StnPlan) -> Self {
+    pub fn closed(task: &Task, plan: StnPlan) -> Self {
         Self {
             plan,
             parameters: Vec::new(),
             initial: BTreeMap::new(),
+            goal: task.goal().clone(),
         }
     }
 

@@ -12,7 +12,6 @@ mod certificate;
 mod flow;
 mod linear_program;
 mod proof;
-mod reduction;
 
 use std::collections::BTreeMap;
 
@@ -23,11 +22,10 @@ use elbowroom_stn::ConsistentNetwork;
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Obligations, Refusal, Requirement};
 use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
+use crate::reduction::{BoxEnd, Reduction};
 use bad_case::{Outcome, Schedules};
 use certificate::Certificate;
 use proof::{Proof, Prover};
-pub(crate) use reduction::Reduction;
-pub use reduction::{BoxEnd, Side};
 
 /// Decides, box by box, whether every schedule is valid.
 #[derive(Clone, Debug)]
@@ -91,7 +89,11 @@ impl<'a> Soundness<'a> {
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {
                 check_products(plan, &reduction, bad)?;
-                direct.push(DirectCase { obligation: index, case, proofs: None });
+                direct.push(DirectCase {
+                    obligation: index,
+                    case,
+                    proofs: None,
+                });
             }
         }
         let over_all = vec![None; obligations.over_all.len()];
@@ -130,14 +132,20 @@ impl<'a> Soundness<'a> {
         moved: Option<BoxEnd>,
     ) -> Result<Option<Broken>, Refusal> {
         let reduction = self.reduction.clone();
-        let mut schedules = Lazy { reduction: &reduction, envelope, schedules: None };
+        let mut schedules = Lazy {
+            reduction: &reduction,
+            envelope,
+            schedules: None,
+        };
         let count = self.direct.len();
         let suspect = self.suspect.min(count);
         for index in (suspect..count).chain(0..suspect) {
             if self.stands(index, envelope, moved) {
                 continue;
             }
-            let Some(schedules) = schedules.get() else { return Ok(None) };
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
             self.refutations += 1;
             let direct = &mut self.direct[index];
             let obligation = &self.obligations.direct[direct.obligation];
@@ -153,10 +161,15 @@ impl<'a> Soundness<'a> {
             }
         }
         for (over_all, proof) in self.obligations.over_all.iter().zip(&mut self.over_all) {
-            if proof.as_ref().is_some_and(|proof| proof.holds_in(envelope, moved)) {
+            if proof
+                .as_ref()
+                .is_some_and(|proof| proof.holds_in(envelope, moved))
+            {
                 continue;
             }
-            let Some(schedules) = schedules.get() else { return Ok(None) };
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
             self.refutations += 1;
             let mut prover = Prover::new(self.task, &self.plan.plan, over_all, schedules);
             match prover.prove(proof.as_ref(), moved)? {
@@ -177,7 +190,9 @@ impl<'a> Soundness<'a> {
 
     /// Whether the known proofs of a direct case still stand.
     fn stands(&self, index: usize, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
-        let Some(proofs) = &self.direct[index].proofs else { return false };
+        let Some(proofs) = &self.direct[index].proofs else {
+            return false;
+        };
         proofs.iter().all(|proof| match moved {
             Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
             None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
@@ -216,7 +231,11 @@ fn nominal_schedule(reduction: &Reduction, plan: &ParametrizedPlan) -> Option<Ve
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;
     let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));
-    let times: Vec<Rational> = earliest.times().iter().map(|time| time.real.clone()).collect();
+    let times: Vec<Rational> = earliest
+        .times()
+        .iter()
+        .map(|time| time.real.clone())
+        .collect();
     Some(reduction.times(&times))
 }
 
@@ -230,11 +249,18 @@ fn check_products(
     let multiplied: BTreeMap<ParameterId, ()> = case
         .inequalities
         .iter()
-        .flat_map(|inequality| inequality.expression.multiplied_parameters().map(|id| (id, ())))
+        .flat_map(|inequality| {
+            inequality
+                .expression
+                .multiplied_parameters()
+                .map(|id| (id, ()))
+        })
         .collect();
     for &parameter in multiplied.keys() {
         if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
-            return Err(Refusal::Coupled { name: plan.parameter(parameter).name.clone() });
+            return Err(Refusal::Coupled {
+                name: plan.parameter(parameter).name.clone(),
+            });
         }
     }
     Ok(())

@@ -38,10 +38,17 @@ impl Obligations {
     ) -> Result<Self, Refusal> {
         let mut order: Vec<NodeId> = plan.plan.nodes().map(|(id, _)| id).collect();
         order.sort_by(|a, b| nominal[a.index()].cmp(&nominal[b.index()]).then(a.cmp(b)));
-        let mut obligations =
-            Self { direct: separations(task, &plan.plan, &order, epsilon), over_all: Vec::new() };
+        let mut obligations = Self {
+            direct: separations(task, &plan.plan, &order, epsilon),
+            over_all: Vec::new(),
+        };
         let substitution = Rc::new(substitution.clone());
-        let compiler = Compiler { task, plan, order, substitution };
+        let compiler = Compiler {
+            task,
+            plan,
+            order,
+            substitution,
+        };
         let mut runs = vec![Run {
             position: 0,
             timeline: Timeline::initial(task, plan, &compiler.substitution),
@@ -163,8 +170,13 @@ impl Compiler<'_> {
                 let continuous = ends + body.end.effects.len();
                 let over_all = body.end.effects.iter().map(|effect| &effect.guard);
                 let over_all = over_all.chain(body.continuous.iter().map(|effect| &effect.guard));
-                if over_all.into_iter().any(|guard| !guard.over_all.is_trivial()) {
-                    return Err(Refusal::GuardOverAll { place: action.name.clone() });
+                if over_all
+                    .into_iter()
+                    .any(|guard| !guard.over_all.is_trivial())
+                {
+                    return Err(Refusal::GuardOverAll {
+                        place: action.name.clone(),
+                    });
                 }
                 if is_end {
                     for (index, effect) in body.end.effects.iter().enumerate() {
@@ -178,7 +190,11 @@ impl Compiler<'_> {
                         read(ends + index, GuardPart::AtStart, &effect.guard.at_start);
                     }
                     for (index, effect) in body.continuous.iter().enumerate() {
-                        read(continuous + index, GuardPart::AtStart, &effect.guard.at_start);
+                        read(
+                            continuous + index,
+                            GuardPart::AtStart,
+                            &effect.guard.at_start,
+                        );
                     }
                 }
             }
@@ -196,7 +212,10 @@ impl Compiler<'_> {
         match self.plan.plan.nodes[node.index()] {
             Node::Zero => Ok(()),
             Node::Timed(index) => {
-                let effects = self.task.timed()[index].changes.iter().map(|change| (change, true));
+                let effects = self.task.timed()[index]
+                    .changes
+                    .iter()
+                    .map(|change| (change, true));
                 self.apply(run, node, effects, obligations)
             }
             Node::Instant(id) | Node::Start(id) => {
@@ -231,7 +250,8 @@ impl Compiler<'_> {
                 let read = self.read_changes(run, node, effects.into_iter(), obligations)?;
                 for (index, effect) in body.continuous.iter().enumerate() {
                     if run.outcomes.get(&(id, first + index, GuardPart::AtStart)) != Some(&false) {
-                        run.timeline.change(node, effect.fluent, FluentChange::DriftEnd(since));
+                        run.timeline
+                            .change(node, effect.fluent, FluentChange::DriftEnd(since));
                     }
                 }
                 record(run, node, read);
@@ -252,8 +272,12 @@ impl Compiler<'_> {
             .iter()
             .enumerate()
             .map(|(index, effect)| {
-                let held = |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
-                (&effect.change, held(GuardPart::Now) && held(GuardPart::AtStart))
+                let held =
+                    |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
+                (
+                    &effect.change,
+                    held(GuardPart::Now) && held(GuardPart::AtStart),
+                )
             })
             .collect()
     }
@@ -266,11 +290,17 @@ impl Compiler<'_> {
         instance: InstanceId,
     ) -> Result<Vec<(elbowroom_model::ground::FluentId, Linear)>, Refusal> {
         let action = &self.plan.plan.instance(instance).action;
-        let Some(body) = action.durative() else { return Ok(Vec::new()) };
+        let Some(body) = action.durative() else {
+            return Ok(Vec::new());
+        };
         let first = body.start.effects.len() + body.end.effects.len();
         let mut drifts = Vec::new();
         for (index, effect) in body.continuous.iter().enumerate() {
-            if run.outcomes.get(&(instance, first + index, GuardPart::AtStart)) == Some(&false) {
+            if run
+                .outcomes
+                .get(&(instance, first + index, GuardPart::AtStart))
+                == Some(&false)
+            {
                 continue;
             }
             let changing = || Refusal::ChangingRate {
@@ -294,18 +324,25 @@ impl Compiler<'_> {
     }
 
     /// Whether anything from the node on may change what the expression reads.
-    fn changes_later(&self, expression: &elbowroom_model::ground::Expression, node: NodeId) -> bool {
+    fn changes_later(
+        &self,
+        expression: &elbowroom_model::ground::Expression,
+        node: NodeId,
+    ) -> bool {
         let mut read = Vec::new();
         expression.visit_fluents(&mut |fluent| read.push(fluent));
         if read.is_empty() {
             return false;
         }
-        self.order.iter().skip_while(|&&other| other != node).any(|&later| {
-            let footprint = self.plan.plan.footprint(self.task, later);
-            read.iter().any(|fluent| {
-                footprint.shifts.contains(fluent) || footprint.assigns.contains(fluent)
+        self.order
+            .iter()
+            .skip_while(|&&other| other != node)
+            .any(|&later| {
+                let footprint = self.plan.plan.footprint(self.task, later);
+                read.iter().any(|fluent| {
+                    footprint.shifts.contains(fluent) || footprint.assigns.contains(fluent)
+                })
             })
-        })
     }
 
     fn apply<'e>(
@@ -334,7 +371,11 @@ impl Compiler<'_> {
             match change {
                 Change::Add(fact) => additions.push(Recorded::Fact(*fact, true)),
                 Change::Delete(fact) => recorded.push(Recorded::Fact(*fact, false)),
-                Change::Update { operator, fluent, value } => {
+                Change::Update {
+                    operator,
+                    fluent,
+                    value,
+                } => {
                     let reading = self.reading(&run.timeline, node);
                     let value = reading.linear(value)?;
                     let old =
@@ -370,8 +411,13 @@ impl Compiler<'_> {
         obligations: &mut Obligations,
     ) -> Result<(), Refusal> {
         for condition in snap.condition.conjuncts() {
-            let broken = self.reading(&run.timeline, node).alternatives(condition, false)?;
-            let requirement = Requirement::Condition { node, condition: condition.clone() };
+            let broken = self
+                .reading(&run.timeline, node)
+                .alternatives(condition, false)?;
+            let requirement = Requirement::Condition {
+                node,
+                condition: condition.clone(),
+            };
             oblige(obligations, requirement, &run.timeline, broken);
         }
         Ok(())
@@ -392,9 +438,11 @@ impl Compiler<'_> {
         let (start, end) = (self.plan.plan.start(instance), self.plan.plan.end(instance));
         let duration = Linear::difference(start, end);
         if !at_end {
-            let broken =
-                compared(Comparison::AtLeast, &duration, &Linear::default(), false);
-            let requirement = Requirement::Duration { instance, constraint: None };
+            let broken = compared(Comparison::AtLeast, &duration, &Linear::default(), false);
+            let requirement = Requirement::Duration {
+                instance,
+                constraint: None,
+            };
             oblige(obligations, requirement, &run.timeline, broken);
         }
         let is_open = self
@@ -409,12 +457,17 @@ impl Compiler<'_> {
             if constraint.at_end != at_end {
                 continue;
             }
-            let bound = self.reading(&run.timeline, node).linear(&constraint.bound)?;
+            let bound = self
+                .reading(&run.timeline, node)
+                .linear(&constraint.bound)?;
             let broken = match bound {
                 Some(bound) => compared(constraint.comparison, &duration, &bound, false),
                 None => vec![Vec::new()],
             };
-            let requirement = Requirement::Duration { instance, constraint: Some(index) };
+            let requirement = Requirement::Duration {
+                instance,
+                constraint: Some(index),
+            };
             oblige(obligations, requirement, &run.timeline, broken);
         }
         Ok(())
@@ -426,7 +479,9 @@ impl Compiler<'_> {
         let plan = &self.plan.plan;
         for (index, instance) in plan.instances.iter().enumerate() {
             let id = InstanceId::from(index);
-            let Some(body) = instance.action.durative() else { continue };
+            let Some(body) = instance.action.durative() else {
+                continue;
+            };
             for condition in body.over_all.conjuncts() {
                 let (start, end) = (plan.start(id), plan.end(id));
                 let literal = match condition {
@@ -460,10 +515,14 @@ impl Compiler<'_> {
             }
         }
         for condition in self.plan.goal.conjuncts() {
-            let bad_cases =
-                goal_cases(self.task, plan, &timeline, &self.substitution, condition)?;
-            let requirement = Requirement::Goal { condition: condition.clone() };
-            obligations.direct.push(Obligation { requirement, bad_cases });
+            let bad_cases = goal_cases(self.task, plan, &timeline, &self.substitution, condition)?;
+            let requirement = Requirement::Goal {
+                condition: condition.clone(),
+            };
+            obligations.direct.push(Obligation {
+                requirement,
+                bad_cases,
+            });
         }
         Ok(())
     }
@@ -472,9 +531,10 @@ impl Compiler<'_> {
     fn reading<'r>(&'r self, timeline: &'r Timeline, node: NodeId) -> Reading<'r> {
         let plan = &self.plan.plan;
         let (action, place) = match plan.nodes[node.index()] {
-            Node::Start(id) | Node::End(id) => {
-                (Some((plan.start(id), plan.end(id))), plan.instance(id).action.name.as_str())
-            }
+            Node::Start(id) | Node::End(id) => (
+                Some((plan.start(id), plan.end(id))),
+                plan.instance(id).action.name.as_str(),
+            ),
             Node::Instant(id) => (None, plan.instance(id).action.name.as_str()),
             Node::Zero | Node::Timed(_) => (None, "timed initials"),
         };
@@ -530,7 +590,9 @@ fn updated(
         }
         UpdateOperator::ScaleDown => {
             let divisor = value.as_constant().ok_or_else(not_linear)?;
-            let Some(factor) = divisor.reciprocal() else { return Ok(None) };
+            let Some(factor) = divisor.reciprocal() else {
+                return Ok(None);
+            };
             FluentChange::Assign(Some(old.scaled(&factor)))
         }
     }))
@@ -553,5 +615,8 @@ fn oblige(
             inequalities: [&timeline.assumptions[..], &inequalities].concat(),
         })
         .collect();
-    obligations.direct.push(Obligation { requirement, bad_cases });
+    obligations.direct.push(Obligation {
+        requirement,
+        bad_cases,
+    });
 }

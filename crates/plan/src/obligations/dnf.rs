@@ -53,7 +53,11 @@ impl Reading<'_> {
             let alternatives = self.alternatives(part, wanted)?;
             product = product
                 .iter()
-                .flat_map(|so_far| alternatives.iter().map(move |more| [&so_far[..], more].concat()))
+                .flat_map(|so_far| {
+                    alternatives
+                        .iter()
+                        .map(move |more| [&so_far[..], more].concat())
+                })
                 .collect();
             if product.is_empty() {
                 break;
@@ -65,7 +69,10 @@ impl Reading<'_> {
 
     fn check_size(&self, alternatives: &Alternatives) -> Result<(), Refusal> {
         if alternatives.len() > MOST_ALTERNATIVES {
-            return Err(Refusal::TooManyCases { place: self.place.to_owned(), limit: MOST_ALTERNATIVES });
+            return Err(Refusal::TooManyCases {
+                place: self.place.to_owned(),
+                limit: MOST_ALTERNATIVES,
+            });
         }
         Ok(())
     }
@@ -91,8 +98,18 @@ pub(crate) fn compared(
     right: &Linear,
     wanted: bool,
 ) -> Alternatives {
-    let below = |is_strict| vec![Inequality { expression: left.minus(right), is_strict }];
-    let above = |is_strict| vec![Inequality { expression: right.minus(left), is_strict }];
+    let below = |is_strict| {
+        vec![Inequality {
+            expression: left.minus(right),
+            is_strict,
+        }]
+    };
+    let above = |is_strict| {
+        vec![Inequality {
+            expression: right.minus(left),
+            is_strict,
+        }]
+    };
     let alternatives = match (comparison, wanted) {
         (Comparison::Less, true) | (Comparison::AtLeast, false) => vec![below(true)],
         (Comparison::AtMost, true) | (Comparison::Greater, false) => vec![below(false)],
@@ -118,5 +135,9 @@ fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
 }
 
 fn always_if(condition: bool) -> Alternatives {
-    if condition { vec![Vec::new()] } else { Vec::new() }
+    if condition {
+        vec![Vec::new()]
+    } else {
+        Vec::new()
+    }
 }

@@ -23,9 +23,13 @@ pub(super) fn goal_cases(
 ) -> Result<Vec<BadCase>, Refusal> {
     let mut touched = BTreeSet::new();
     condition.visit_facts(&mut |fact| {
-        task.for_each_basis(fact, &mut |basis| touched.extend(timeline.fact_nodes(basis)));
+        task.for_each_basis(fact, &mut |basis| {
+            touched.extend(timeline.fact_nodes(basis))
+        });
     });
-    task.visit_fluents_of(condition, &mut |fluent| touched.extend(timeline.fluent_nodes(fluent)));
+    task.visit_fluents_of(condition, &mut |fluent| {
+        touched.extend(timeline.fluent_nodes(fluent))
+    });
     let timed: Vec<NodeId> = plan
         .nodes()
         .filter(|(id, node)| matches!(node, Node::Timed(_)) && touched.contains(id))
@@ -68,7 +72,10 @@ pub(super) fn goal_cases(
         for inequalities in reading.alternatives(condition, false)? {
             for differences in &windows {
                 let inequalities = [&timeline.assumptions[..], &inequalities].concat();
-                cases.push(BadCase { differences: differences.clone(), inequalities });
+                cases.push(BadCase {
+                    differences: differences.clone(),
+                    inequalities,
+                });
             }
         }
     }

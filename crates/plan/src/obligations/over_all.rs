@@ -48,7 +48,9 @@ impl OverAll {
     ) -> Self {
         let mut touched = BTreeSet::new();
         condition.visit_facts(&mut |fact| {
-            task.for_each_basis(fact, &mut |basis| touched.extend(timeline.fact_nodes(basis)));
+            task.for_each_basis(fact, &mut |basis| {
+                touched.extend(timeline.fact_nodes(basis))
+            });
         });
         task.visit_fluents_of(condition, &mut |fluent| {
             touched.extend(timeline.fluent_nodes(fluent));
@@ -58,7 +60,11 @@ impl OverAll {
             start: plan.start(instance),
             end: plan.end(instance),
             condition: condition.clone(),
-            events: order.iter().copied().filter(|node| touched.contains(node)).collect(),
+            events: order
+                .iter()
+                .copied()
+                .filter(|node| touched.contains(node))
+                .collect(),
             assumptions: timeline.assumptions.clone(),
             moment: NodeId::from(plan.nodes.len()),
             timeline: Rc::clone(timeline),
@@ -109,7 +115,11 @@ pub(super) fn literal_cases(
     if history.initially != wanted {
         wrongs.push(None);
     }
-    let wrong_events = history.events.iter().enumerate().filter(|(_, event)| event.1 != wanted);
+    let wrong_events = history
+        .events
+        .iter()
+        .enumerate()
+        .filter(|(_, event)| event.1 != wanted);
     wrongs.extend(wrong_events.map(|(index, _)| Some(index)));
     let mut cases = Vec::new();
     for wrong in wrongs {
@@ -132,8 +142,15 @@ pub(super) fn literal_cases(
         if righting.contains(&start) {
             continue;
         }
-        differences.extend(righting.iter().map(|&right| Difference::before(start, right)));
-        cases.push(BadCase { differences, inequalities: timeline.assumptions.clone() });
+        differences.extend(
+            righting
+                .iter()
+                .map(|&right| Difference::before(start, right)),
+        );
+        cases.push(BadCase {
+            differences,
+            inequalities: timeline.assumptions.clone(),
+        });
     }
     cases
 }

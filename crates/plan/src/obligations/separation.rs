@@ -41,8 +41,10 @@ pub(crate) fn interfering_in_order(
     plan: &StnPlan,
     order: &[NodeId],
 ) -> Vec<(NodeId, NodeId)> {
-    let footprints: Vec<Footprint> =
-        order.iter().map(|&node| plan.footprint(task, node)).collect();
+    let footprints: Vec<Footprint> = order
+        .iter()
+        .map(|&node| plan.footprint(task, node))
+        .collect();
     let mut earlier: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); order.len()];
     for (a, b) in candidates(&footprints) {
         earlier[a.max(b)].insert(a.min(b));

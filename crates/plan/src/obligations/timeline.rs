@@ -94,12 +94,20 @@ impl Timeline {
 
     /// Records that the fact becomes true or false at the node.
     pub(crate) fn set(&mut self, node: NodeId, fact: FactId, becomes: bool) {
-        self.facts.entry(fact).or_default().events.push((node, becomes));
+        self.facts
+            .entry(fact)
+            .or_default()
+            .events
+            .push((node, becomes));
     }
 
     /// Records a change of the fluent at the node.
     pub(crate) fn change(&mut self, node: NodeId, fluent: FluentId, change: FluentChange) {
-        self.fluents.entry(fluent).or_default().events.push((node, change));
+        self.fluents
+            .entry(fluent)
+            .or_default()
+            .events
+            .push((node, change));
     }
 
     /// What happens to a fact.
@@ -109,16 +117,24 @@ impl Timeline {
 
     /// The nodes at which the fact may change.
     pub(crate) fn fact_nodes(&self, fact: FactId) -> impl Iterator<Item = NodeId> + '_ {
-        self.facts.get(&fact).into_iter().flat_map(|h| h.events.iter().map(|&(node, _)| node))
+        self.facts
+            .get(&fact)
+            .into_iter()
+            .flat_map(|h| h.events.iter().map(|&(node, _)| node))
     }
 
     /// The nodes at which the fluent's value or rate may change.
     pub(crate) fn fluent_nodes(&self, fluent: FluentId) -> impl Iterator<Item = NodeId> + '_ {
-        self.fluents.get(&fluent).into_iter().flat_map(|h| h.events.iter().map(|(node, _)| *node))
+        self.fluents
+            .get(&fluent)
+            .into_iter()
+            .flat_map(|h| h.events.iter().map(|(node, _)| *node))
     }
 
     fn is_true(&self, fact: FactId, cut: Cut<'_>) -> bool {
-        let Some(history) = self.facts.get(&fact) else { return false };
+        let Some(history) = self.facts.get(&fact) else {
+            return false;
+        };
         history
             .events
             .iter()
@@ -204,11 +220,7 @@ impl Reading<'_> {
         Ok(derived)
     }
 
-    fn body_holds(
-        &self,
-        body: &Condition,
-        on_the_way: &mut Vec<FactId>,
-    ) -> Result<bool, Refusal> {
+    fn body_holds(&self, body: &Condition, on_the_way: &mut Vec<FactId>) -> Result<bool, Refusal> {
         Ok(match body {
             Condition::Fact(fact) => self.derivable(*fact, on_the_way)?,
             Condition::Not(part) => !self.body_holds(part, on_the_way)?,
@@ -248,15 +260,17 @@ impl Reading<'_> {
         Ok(match expression {
             Expression::Constant(value) => Some(Linear::constant(value.clone())),
             Expression::Fluent(fluent) => self.timeline.value(*fluent, self.cut, self.moment),
-            Expression::Duration => {
-                self.action.map(|(start, end)| Linear::difference(start, end))
-            }
+            Expression::Duration => self
+                .action
+                .map(|(start, end)| Linear::difference(start, end)),
             Expression::TotalTime => return Err(self.not_linear(expression)),
             Expression::Unknown(Unknown::Parameter(id)) => {
                 Some(parameter_value(ParameterId(*id), self.substitution))
             }
             Expression::Unknown(_) => {
-                return Err(Refusal::OpenNumber { place: self.place.to_owned() });
+                return Err(Refusal::OpenNumber {
+                    place: self.place.to_owned(),
+                });
             }
             Expression::Add(parts) => {
                 let mut sum = Some(Linear::default());
@@ -266,20 +280,24 @@ impl Reading<'_> {
                 }
                 sum
             }
-            Expression::Subtract(left, right) => {
-                self.linear(left)?.zip(self.linear(right)?).map(|(l, r)| l.minus(&r))
-            }
-            Expression::Negate(part) => {
-                self.linear(part)?.map(|part| part.scaled(&Rational::from(-1)))
-            }
+            Expression::Subtract(left, right) => self
+                .linear(left)?
+                .zip(self.linear(right)?)
+                .map(|(l, r)| l.minus(&r)),
+            Expression::Negate(part) => self
+                .linear(part)?
+                .map(|part| part.scaled(&Rational::from(-1))),
             Expression::Multiply(parts) => {
                 let mut product = Some(Linear::constant(Rational::ONE));
                 for part in parts {
                     let Some((so_far, part)) = product.zip(self.linear(part)?) else {
                         return Ok(None);
                     };
-                    product =
-                        Some(so_far.times(&part).ok_or_else(|| self.not_linear(expression))?);
+                    product = Some(
+                        so_far
+                            .times(&part)
+                            .ok_or_else(|| self.not_linear(expression))?,
+                    );
                 }
                 product
             }
@@ -287,7 +305,9 @@ impl Reading<'_> {
                 let Some((left, right)) = self.linear(left)?.zip(self.linear(right)?) else {
                     return Ok(None);
                 };
-                let divisor = right.as_constant().ok_or_else(|| self.not_linear(expression))?;
+                let divisor = right
+                    .as_constant()
+                    .ok_or_else(|| self.not_linear(expression))?;
                 divisor.reciprocal().map(|factor| left.scaled(&factor))
             }
         })

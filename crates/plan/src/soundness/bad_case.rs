@@ -9,11 +9,11 @@ use super::Counterexample;
 use super::certificate::Certificate;
 use super::flow;
 use super::linear_program;
-use super::reduction::{BoxEnd, BoxNetwork, Reduction, Side};
 use crate::decoupled::DecoupledEnvelope;
 use crate::linear::{Factor, Linear};
 use crate::obligations::{BadCase, Difference, Inequality};
 use crate::parameter::ParameterId;
+use crate::reduction::{BoxEnd, BoxNetwork, Reduction, Side};
 
 /// The schedules of a box: a network that can be tightened for a while.
 pub(crate) struct Schedules<'a> {
@@ -36,7 +36,12 @@ impl<'a> Schedules<'a> {
     pub(crate) fn new(reduction: &'a Reduction, envelope: &'a DecoupledEnvelope) -> Option<Self> {
         let BoxNetwork { network, edges } = reduction.network(envelope);
         let network = ConsistentNetwork::try_from(network).ok()?;
-        Some(Self { reduction, envelope, network, edges })
+        Some(Self {
+            reduction,
+            envelope,
+            network,
+            edges,
+        })
     }
 
     /// Tightens by a difference.
@@ -46,7 +51,10 @@ impl<'a> Schedules<'a> {
     pub(crate) fn assume(&mut self, difference: &Difference) -> Result<(), Certificate> {
         let constraint = self.constraint(difference);
         let bound = constraint.bound.clone();
-        self.network.add(constraint).map(|_| ()).map_err(|cycle| self.certificate(&cycle, &bound))
+        self.network
+            .add(constraint)
+            .map(|_| ())
+            .map_err(|cycle| self.certificate(&cycle, &bound))
     }
 
     /// `to - from <= bound` over classes.
@@ -54,7 +62,11 @@ impl<'a> Schedules<'a> {
         let (from, from_offset) = self.reduction.place(difference.from);
         let (to, to_offset) = self.reduction.place(difference.to);
         let bound = &difference.bound + &from_offset - &to_offset;
-        let bound = if difference.is_strict { Delta::just_below(bound) } else { Delta::from(bound) };
+        let bound = if difference.is_strict {
+            Delta::just_below(bound)
+        } else {
+            Delta::from(bound)
+        };
         Constraint { from, to, bound }
     }
 
@@ -155,18 +167,28 @@ impl<'a> Schedules<'a> {
             certificate.add_constant(&Delta::just_below(Rational::ZERO), &Rational::ONE);
         }
         for (&parameter, coefficient) in &negated.parameters {
-            let side = if coefficient.is_positive() { Side::Upper } else { Side::Lower };
+            let side = if coefficient.is_positive() {
+                Side::Upper
+            } else {
+                Side::Lower
+            };
             certificate.add_end(BoxEnd { parameter, side }, &coefficient.abs());
         }
         let flow = flow::cheapest(&self.network, &demand)?;
         let constraints = self.network.network().constraints();
-        for (index, amount) in flow.iter().enumerate().filter(|(_, amount)| amount.is_positive()) {
+        for (index, amount) in flow
+            .iter()
+            .enumerate()
+            .filter(|(_, amount)| amount.is_positive())
+        {
             match self.edges.get(index) {
                 Some(&edge) => certificate.add_edge(&self.reduction.edges()[edge], amount),
                 None => certificate.add_constant(&constraints[index].bound, amount),
             }
         }
-        certificate.holds_in(self.envelope, None).then_some(certificate)
+        certificate
+            .holds_in(self.envelope, None)
+            .then_some(certificate)
     }
 
     /// The expression's constant and its coefficient for each class; times count from class 0.
@@ -186,11 +208,12 @@ impl<'a> Schedules<'a> {
         let mut corners = vec![Corner::default()];
         for &parameter in parameters {
             let interval = self.envelope.interval(parameter);
+            let zero = Rational::ZERO;
             let (lower, upper) = (interval.lower.value(), interval.upper.value());
             let mut ends = vec![lower.ok_or(false), upper.ok_or(true)];
             if lower.is_none() && upper.is_none() {
                 // Where the factor vanishes, any value shows what is left.
-                ends.push(Ok(&Rational::ZERO));
+                ends.push(Ok(&zero));
             }
             ends.dedup();
             corners = corners
@@ -237,7 +260,10 @@ impl Corner {
             expression = coefficient.scaled(&sign);
             is_strict = true;
         }
-        Inequality { expression, is_strict }
+        Inequality {
+            expression,
+            is_strict,
+        }
     }
 }
 
@@ -285,23 +311,38 @@ pub(crate) fn witness(
     case: &BadCase,
 ) -> Option<Counterexample> {
     let schedules = Schedules::new(reduction, envelope)?;
-    let assumed: Vec<_> = case.differences.iter().map(|d| schedules.constraint(d)).collect();
-    let multiplied: Vec<ParameterId> =
-        case.inequalities.iter().flat_map(|i| i.expression.multiplied_parameters()).collect();
-    schedules.corners(&multiplied).into_iter().find_map(|corner| {
-        // At an infinite end there is no last value to show; a large one stands in.
-        let fixed: Vec<Inequality> = case.inequalities.iter().map(|i| corner.apply(i)).collect();
-        let (class_times, mut valuation) =
-            linear_program::witness(reduction, envelope, &assumed, &fixed)?;
-        for (parameter, value) in corner.values {
-            valuation[parameter.index()] = value;
-        }
-        let moment = case
-            .differences
-            .iter()
-            .flat_map(|difference| [difference.from, difference.to])
-            .any(|node| node.index() == reduction.node_count())
-            .then(|| &class_times[reduction.class_count()] - &class_times[0]);
-        Some(Counterexample { valuation, schedule: reduction.times(&class_times), moment })
-    })
+    let assumed: Vec<_> = case
+        .differences
+        .iter()
+        .map(|d| schedules.constraint(d))
+        .collect();
+    let multiplied: Vec<ParameterId> = case
+        .inequalities
+        .iter()
+        .flat_map(|i| i.expression.multiplied_parameters())
+        .collect();
+    schedules
+        .corners(&multiplied)
+        .into_iter()
+        .find_map(|corner| {
+            // At an infinite end there is no last value to show; a large one stands in.
+            let fixed: Vec<Inequality> =
+                case.inequalities.iter().map(|i| corner.apply(i)).collect();
+            let (class_times, mut valuation) =
+                linear_program::witness(reduction, envelope, &assumed, &fixed)?;
+            for (parameter, value) in corner.values {
+                valuation[parameter.index()] = value;
+            }
+            let moment = case
+                .differences
+                .iter()
+                .flat_map(|difference| [difference.from, difference.to])
+                .any(|node| node.index() == reduction.node_count())
+                .then(|| &class_times[reduction.class_count()] - &class_times[0]);
+            Some(Counterexample {
+                valuation,
+                schedule: reduction.times(&class_times),
+                moment,
+            })
+        })
 }

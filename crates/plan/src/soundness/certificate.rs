@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::{Delta, Rational};
 
-use super::reduction::{BoxEnd, Edge};
 use crate::decoupled::DecoupledEnvelope;
+use crate::reduction::{BoxEnd, Edge};
 
 /// A sum of constraints that comes out below zero on one side and at zero on the other.
 ///
@@ -59,6 +59,7 @@ impl Certificate {
         if moved.is_some_and(|end| self.fixed.contains(&end)) {
             return false;
         }
-        self.value(envelope).is_some_and(|value| value < Delta::ZERO)
+        self.value(envelope)
+            .is_some_and(|value| value < Delta::ZERO)
     }
 }

@@ -81,7 +81,10 @@ impl Search<'_> {
                 sink = Some((node, distance));
                 break;
             }
-            let along = network.leaving(node).iter().map(|&id| (Step::Along(id), network.constraint(id).to));
+            let along = network
+                .leaving(node)
+                .iter()
+                .map(|&id| (Step::Along(id), network.constraint(id).to));
             let back = network
                 .entering(node)
                 .iter()
@@ -98,7 +101,10 @@ impl Search<'_> {
                 let reduced =
                     &(&cost + &self.potential[node.index()]) - &self.potential[far.index()];
                 let candidate = &distance + &reduced;
-                if distances[far.index()].as_ref().is_none_or(|old| candidate < *old) {
+                if distances[far.index()]
+                    .as_ref()
+                    .is_none_or(|old| candidate < *old)
+                {
                     queue.push(Reverse((candidate.clone(), far)));
                     distances[far.index()] = Some(candidate);
                     steps[far.index()] = Some((step, node));
@@ -107,7 +113,9 @@ impl Search<'_> {
         }
         let (sink, reach) = sink?;
         for (potential, distance) in self.potential.iter_mut().zip(&distances) {
-            let moved = distance.as_ref().map_or(&reach, |distance| distance.min(&reach));
+            let moved = distance
+                .as_ref()
+                .map_or(&reach, |distance| distance.min(&reach));
             *potential = &*potential + moved;
         }
         let mut path = Vec::new();

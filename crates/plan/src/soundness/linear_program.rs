@@ -8,10 +8,10 @@ use elbowroom_stn::Constraint;
 
 use super::bad_case::spread;
 use super::certificate::Certificate;
-use super::reduction::{BoxEnd, Reduction, Side};
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::Inequality;
 use crate::parameter::{ParameterId, Valuation};
+use crate::reduction::{BoxEnd, Reduction, Side};
 
 /// What a bound of the linear program stands for.
 enum Meaning {
@@ -64,11 +64,18 @@ pub(crate) fn witness(
     let mut program = Program::new(reduction, envelope, assumed, inequalities);
     program.simplex.check().ok()?;
     let model = program.simplex.model();
-    let times: Vec<Rational> =
-        program.classes.iter().map(|variable| model[variable.index()].clone()).collect();
+    let times: Vec<Rational> = program
+        .classes
+        .iter()
+        .map(|variable| model[variable.index()].clone())
+        .collect();
     let count = envelope.intervals.len();
     let values = (0..count).map(ParameterId::from).map(|id| {
-        program.parameters.get(&id).map(|variable| model[variable.index()].clone()).unwrap_or_default()
+        program
+            .parameters
+            .get(&id)
+            .map(|variable| model[variable.index()].clone())
+            .unwrap_or_default()
     });
     Some((times, values.collect()))
 }
@@ -82,9 +89,16 @@ impl<'a> Program<'a> {
     ) -> Self {
         let mut simplex = Simplex::new();
         // One class more for the moment of an over-all condition, whether or not it occurs.
-        let classes = (0..=reduction.class_count()).map(|_| simplex.add_variable()).collect();
-        let mut program =
-            Self { reduction, simplex, classes, parameters: BTreeMap::new(), meanings: Vec::new() };
+        let classes = (0..=reduction.class_count())
+            .map(|_| simplex.add_variable())
+            .collect();
+        let mut program = Self {
+            reduction,
+            simplex,
+            classes,
+            parameters: BTreeMap::new(),
+            meanings: Vec::new(),
+        };
         program.fix_zero();
         for index in 0..envelope.intervals.len() {
             program.add_parameter(ParameterId::from(index), envelope);
@@ -97,7 +111,11 @@ impl<'a> Program<'a> {
                 (program.classes[constraint.to.index()], Rational::ONE),
                 (program.classes[constraint.from.index()], Rational::from(-1)),
             ];
-            program.at_most(&row, constraint.bound.clone(), Meaning::Constant(constraint.bound.clone()));
+            program.at_most(
+                &row,
+                constraint.bound.clone(),
+                Meaning::Constant(constraint.bound.clone()),
+            );
         }
         for inequality in inequalities {
             program.add_inequality(inequality);
@@ -117,12 +135,20 @@ impl<'a> Program<'a> {
         self.parameters.insert(parameter, variable);
         let interval = envelope.interval(parameter);
         if let Some(upper) = interval.upper.value() {
-            let tag = self.tag(Meaning::End(BoxEnd { parameter, side: Side::Upper }));
-            self.simplex.assert_upper(variable, Delta::from(upper.clone()), tag);
+            let tag = self.tag(Meaning::End(BoxEnd {
+                parameter,
+                side: Side::Upper,
+            }));
+            self.simplex
+                .assert_upper(variable, Delta::from(upper.clone()), tag);
         }
         if let Some(lower) = interval.lower.value() {
-            let tag = self.tag(Meaning::End(BoxEnd { parameter, side: Side::Lower }));
-            self.simplex.assert_lower(variable, Delta::from(lower.clone()), tag);
+            let tag = self.tag(Meaning::End(BoxEnd {
+                parameter,
+                side: Side::Lower,
+            }));
+            self.simplex
+                .assert_lower(variable, Delta::from(lower.clone()), tag);
         }
     }
 
@@ -139,20 +165,30 @@ impl<'a> Program<'a> {
             };
             *row.entry(self.parameters[&end.parameter]).or_default() += sign;
         }
-        let row: Vec<_> = row.into_iter().filter(|(_, factor)| !factor.is_zero()).collect();
+        let row: Vec<_> = row
+            .into_iter()
+            .filter(|(_, factor)| !factor.is_zero())
+            .collect();
         let bound = Delta::from(edge.constant.clone());
         self.at_most(&row, bound, Meaning::Edge(index));
     }
 
     fn add_inequality(&mut self, inequality: &Inequality) {
         let mut row: BTreeMap<VariableId, Rational> = BTreeMap::new();
-        let constant = spread(self.reduction, &inequality.expression, |class, coefficient| {
-            *row.entry(self.classes[class.index()]).or_default() += coefficient;
-        });
+        let constant = spread(
+            self.reduction,
+            &inequality.expression,
+            |class, coefficient| {
+                *row.entry(self.classes[class.index()]).or_default() += coefficient;
+            },
+        );
         for (id, coefficient) in &inequality.expression.parameters {
             *row.entry(self.parameters[id]).or_default() += coefficient;
         }
-        let row: Vec<_> = row.into_iter().filter(|(_, factor)| !factor.is_zero()).collect();
+        let row: Vec<_> = row
+            .into_iter()
+            .filter(|(_, factor)| !factor.is_zero())
+            .collect();
         let bound = if inequality.is_strict {
             Delta::just_below(-constant)
         } else {

@@ -5,9 +5,9 @@ use elbowroom_stn::Checkpoint;
 
 use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
-use super::reduction::BoxEnd;
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
+use crate::reduction::BoxEnd;
 use crate::stn_plan::{NodeId, StnPlan};
 
 /// How many places of the moment are told apart in one over-all condition.
@@ -59,7 +59,14 @@ impl<'a, 'b> Prover<'a, 'b> {
         over_all: &'a OverAll,
         schedules: &'b mut Schedules<'a>,
     ) -> Self {
-        Self { task, plan, over_all, schedules, assumed: Vec::new(), places: 0 }
+        Self {
+            task,
+            plan,
+            over_all,
+            schedules,
+            assumed: Vec::new(),
+            places: 0,
+        }
     }
 
     /// Proves the condition in the box, reusing what stands of an old proof.
@@ -133,8 +140,13 @@ impl<'a, 'b> Prover<'a, 'b> {
         )?;
         happened.pop();
         let Ok(after) = after else { return Ok(after) };
-        let before =
-            self.branch(Difference::before(moment, event), index, happened, old_before, moved)?;
+        let before = self.branch(
+            Difference::before(moment, event),
+            index,
+            happened,
+            old_before,
+            moved,
+        )?;
         Ok(before.map(|before| Proof::Either(Box::new(after), Box::new(before))))
     }
 
@@ -165,7 +177,10 @@ impl<'a, 'b> Prover<'a, 'b> {
         let mut proofs = Vec::new();
         for mut inequalities in self.over_all.cases(self.task, self.plan, &cut)? {
             inequalities.extend(self.over_all.assumptions.iter().cloned());
-            let case = BadCase { differences: self.assumed.clone(), inequalities };
+            let case = BadCase {
+                differences: self.assumed.clone(),
+                inequalities,
+            };
             match self.schedules.inequalities_possible(&case) {
                 Outcome::Impossible(certificates) => proofs.push(certificates),
                 Outcome::Possible => return Ok(Err(case)),

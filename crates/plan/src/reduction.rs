@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::{Delta, End, Rational};
-use elbowroom_stn::{Constraint, ConstraintId, Network, NodeId as ClassId};
+use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
 
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::Substitution;
@@ -41,7 +41,11 @@ impl BoxEnd {
     }
 
     /// The same interval with this end moved.
-    pub fn with_reach(self, envelope: &DecoupledEnvelope, reach: Option<Rational>) -> DecoupledEnvelope {
+    pub fn with_reach(
+        self,
+        envelope: &DecoupledEnvelope,
+        reach: Option<Rational>,
+    ) -> DecoupledEnvelope {
         let mut moved = envelope.clone();
         let interval = &mut moved.intervals[self.parameter.index()];
         match self.side {
@@ -56,11 +60,15 @@ impl BoxEnd {
 
 /// `t_to - t_from <= constant + reach(end)`, over classes.
 #[derive(Clone, Debug)]
-pub(crate) struct Edge {
-    pub(crate) from: ClassId,
-    pub(crate) to: ClassId,
-    pub(crate) constant: Rational,
-    pub(crate) end: Option<BoxEnd>,
+pub struct Edge {
+    /// The class subtracted.
+    pub from: ClassId,
+    /// The class it is subtracted from.
+    pub to: ClassId,
+    /// The part of the bound that does not depend on the box.
+    pub constant: Rational,
+    /// The end whose reach is added.
+    pub end: Option<BoxEnd>,
 }
 
 /// The plan's network over classes of rigidly connected nodes.
@@ -68,27 +76,34 @@ pub(crate) struct Edge {
 /// Two nodes are in one class if constraints without parameters fix their difference. Plans are
 /// full of such pairs (fixed durations, timed initials); what is left is often tiny.
 #[derive(Clone, Debug)]
-pub(crate) struct Reduction {
+pub struct Reduction {
     /// For each node its class, and by how much it comes after the class's own time.
     places: Vec<(ClassId, Rational)>,
     class_count: usize,
     edges: Vec<Edge>,
     /// Parameters that are differences of times, by the constraint `[p, p]` that says so.
-    pub(crate) substitution: Substitution,
+    pub substitution: Substitution,
     /// Parameters that bound more than the one difference they are.
-    pub(crate) coupled: Vec<ParameterId>,
+    pub coupled: Vec<ParameterId>,
 }
 
 /// The network of a box, and which edge each of its constraints comes from.
-pub(crate) struct BoxNetwork {
-    pub(crate) network: Network<Delta>,
-    pub(crate) edges: Vec<usize>,
+pub struct BoxNetwork {
+    /// Over classes.
+    pub network: Network<Delta>,
+    /// For each constraint of the network, a position in [`Reduction::edges`].
+    pub edges: Vec<usize>,
 }
 
 impl Reduction {
-    pub(crate) fn new(plan: &ParametrizedPlan) -> Self {
+    /// The reduced network of a plan.
+    pub fn new(plan: &ParametrizedPlan) -> Self {
         let places = classes(plan);
-        let class_count = 1 + places.iter().map(|(class, _)| class.index()).max().unwrap_or(0);
+        let class_count = 1 + places
+            .iter()
+            .map(|(class, _)| class.index())
+            .max()
+            .unwrap_or(0);
         let mut reduction = Self {
             places,
             class_count,
@@ -106,7 +121,10 @@ impl Reduction {
                 Bound::Infinite => {}
                 Bound::Finite(upper) => reduction.add_edge(from, to, upper.clone(), None),
                 Bound::Parameter(parameter) => {
-                    let end = BoxEnd { parameter: *parameter, side: Side::Upper };
+                    let end = BoxEnd {
+                        parameter: *parameter,
+                        side: Side::Upper,
+                    };
                     reduction.add_edge(from, to, Rational::ZERO, Some(end));
                 }
             }
@@ -114,7 +132,10 @@ impl Reduction {
                 Bound::Infinite => {}
                 Bound::Finite(lower) => reduction.add_edge(to, from, -lower, None),
                 Bound::Parameter(parameter) => {
-                    let end = BoxEnd { parameter: *parameter, side: Side::Lower };
+                    let end = BoxEnd {
+                        parameter: *parameter,
+                        side: Side::Lower,
+                    };
                     reduction.add_edge(to, from, Rational::ZERO, Some(end));
                 }
             }
@@ -151,11 +172,13 @@ impl Reduction {
 
     /// Whether an earlier constraint mentions the parameter.
     fn is_mentioned(&self, parameter: ParameterId) -> bool {
-        self.edges.iter().any(|edge| edge.end.is_some_and(|end| end.parameter == parameter))
+        self.edges
+            .iter()
+            .any(|edge| edge.end.is_some_and(|end| end.parameter == parameter))
     }
 
     /// Whether the parameter bounds a difference of times.
-    pub(crate) fn is_in_network(&self, parameter: ParameterId) -> bool {
+    pub fn is_in_network(&self, parameter: ParameterId) -> bool {
         self.substitution.contains_key(&parameter) || self.is_mentioned(parameter)
     }
 
@@ -166,7 +189,12 @@ impl Reduction {
         let constant = constant + from_offset - to_offset;
         let is_idle = from_class == to_class && end.is_none() && !constant.is_negative();
         if !is_idle {
-            self.edges.push(Edge { from: *from_class, to: *to_class, constant, end });
+            self.edges.push(Edge {
+                from: *from_class,
+                to: *to_class,
+                constant,
+                end,
+            });
         }
     }
 
@@ -174,20 +202,27 @@ impl Reduction {
     fn keep_tightest(&mut self) {
         let mut tightest: BTreeMap<(ClassId, ClassId, Option<BoxEnd>), Rational> = BTreeMap::new();
         for edge in self.edges.drain(..) {
-            let bound = tightest.entry((edge.from, edge.to, edge.end)).or_insert_with(|| edge.constant.clone());
+            let bound = tightest
+                .entry((edge.from, edge.to, edge.end))
+                .or_insert_with(|| edge.constant.clone());
             if edge.constant < *bound {
                 *bound = edge.constant;
             }
         }
         self.edges = tightest
             .into_iter()
-            .map(|((from, to, end), constant)| Edge { from, to, constant, end })
+            .map(|((from, to, end), constant)| Edge {
+                from,
+                to,
+                constant,
+                end,
+            })
             .collect();
     }
 
     /// The node's class, and by how much the node comes after it. One node more than the plan has
     /// is the moment of an over-all condition; it has a class of its own, the last.
-    pub(crate) fn place(&self, node: NodeId) -> (ClassId, Rational) {
+    pub fn place(&self, node: NodeId) -> (ClassId, Rational) {
         match self.places.get(node.index()) {
             Some((class, offset)) => (*class, offset.clone()),
             None => (self.moment(), Rational::ZERO),
@@ -195,36 +230,45 @@ impl Reduction {
     }
 
     /// The class of the moment at which an over-all condition is read.
-    pub(crate) fn moment(&self) -> ClassId {
+    pub fn moment(&self) -> ClassId {
         ClassId(u32::try_from(self.class_count).expect("fewer classes than nodes"))
     }
 
-    pub(crate) fn edges(&self) -> &[Edge] {
+    /// The constraints.
+    pub fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
-    pub(crate) fn class_count(&self) -> usize {
+    /// How many classes there are.
+    pub fn class_count(&self) -> usize {
         self.class_count
     }
 
-    pub(crate) fn node_count(&self) -> usize {
+    /// How many nodes the plan has.
+    pub fn node_count(&self) -> usize {
         self.places.len()
     }
 
     /// The network in which every parameter ranges over its interval, separately for each edge.
-    pub(crate) fn network(&self, envelope: &DecoupledEnvelope) -> BoxNetwork {
+    pub fn network(&self, envelope: &DecoupledEnvelope) -> BoxNetwork {
         let mut network = Network::with_nodes(self.class_count);
         let mut edges = Vec::with_capacity(self.edges.len());
         for (index, edge) in self.edges.iter().enumerate() {
-            let Some(bound) = edge.bound(envelope) else { continue };
-            network.add(Constraint { from: edge.from, to: edge.to, bound: Delta::from(bound) });
+            let Some(bound) = edge.bound(envelope) else {
+                continue;
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound: Delta::from(bound),
+            });
             edges.push(index);
         }
         BoxNetwork { network, edges }
     }
 
     /// The times of all nodes, from those of the classes; class 0 holds time zero.
-    pub(crate) fn times(&self, class_times: &[Rational]) -> Vec<Rational> {
+    pub fn times(&self, class_times: &[Rational]) -> Vec<Rational> {
         self.places
             .iter()
             .map(|(class, offset)| &class_times[class.index()] - &class_times[0] + offset)
@@ -234,18 +278,11 @@ impl Reduction {
 
 impl Edge {
     /// The bound in a box; `None` if there is none.
-    pub(crate) fn bound(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
+    pub fn bound(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
         match self.end {
             None => Some(self.constant.clone()),
             Some(end) => end.reach(envelope).map(|reach| &self.constant + reach),
         }
-    }
-}
-
-impl BoxNetwork {
-    /// The edge behind a constraint; `None` for one that was added later.
-    pub(crate) fn edge_index(&self, id: ConstraintId) -> Option<usize> {
-        self.edges.get(id.index()).copied()
     }
 }
 
@@ -259,8 +296,9 @@ fn parameter_of(bound: &Bound) -> Option<ParameterId> {
 /// Each node's class and offset: a union-find over constraints of the form `[c, c]`.
 fn classes(plan: &ParametrizedPlan) -> Vec<(ClassId, Rational)> {
     // `parent[n]` and by how much `n` comes after its parent.
-    let mut parents: Vec<(usize, Rational)> =
-        (0..plan.plan.nodes.len()).map(|node| (node, Rational::ZERO)).collect();
+    let mut parents: Vec<(usize, Rational)> = (0..plan.plan.nodes.len())
+        .map(|node| (node, Rational::ZERO))
+        .collect();
     for constraint in &plan.plan.constraints {
         let (Bound::Finite(lower), Bound::Finite(upper)) = (&constraint.lower, &constraint.upper)
         else {
@@ -284,7 +322,10 @@ fn classes(plan: &ParametrizedPlan) -> Vec<(ClassId, Rational)> {
             let (root, offset) = root(&parents, node);
             let next = numbers.len();
             let class = *numbers.entry(root).or_insert(next);
-            (ClassId(u32::try_from(class).expect("fewer classes than nodes")), offset)
+            (
+                ClassId(u32::try_from(class).expect("fewer classes than nodes")),
+                offset,
+            )
         })
         .collect()
 }
