@@ -163,8 +163,8 @@ pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> V
             state: judge.now.to_state(),
             margins: margins(task, plan, judge.margins),
         }),
-        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(violation),
-        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(undecided),
+        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(*violation),
+        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(*undecided),
     }
 }
 

@@ -84,7 +84,7 @@ impl<'a> Derivation<'a> {
                             derived: &derived,
                         };
                         let truth = holds(&rule.body, &view);
-                        has_grown |= accept(&mut derived, rule.head, truth);
+                        has_grown |= accept(&mut derived, rule.head, &truth);
                     }
                 }
             }
@@ -106,12 +106,14 @@ impl Derived {
         self.holding.contains(&fact) || self.unclear.contains_key(&fact)
     }
 
-    fn accept_true(&mut self, head: FactId, truth: Result<bool, Fault>) -> bool {
-        truth == Ok(true) && self.holding.insert(head)
+    fn accept_true(&mut self, head: FactId, truth: &Result<bool, Fault>) -> bool {
+        *truth == Ok(true) && self.holding.insert(head)
     }
 
-    fn accept_unclear(&mut self, head: FactId, truth: Result<bool, Fault>) -> bool {
-        truth.is_err_and(|fault| self.unclear.insert(head, fault).is_none())
+    fn accept_unclear(&mut self, head: FactId, truth: &Result<bool, Fault>) -> bool {
+        truth
+            .as_ref()
+            .is_err_and(|fault| self.unclear.insert(head, fault.clone()).is_none())
     }
 
     /// The truth of a fact that rules define; `None` for basic facts.

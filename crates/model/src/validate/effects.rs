@@ -39,7 +39,7 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
         {
             rates.push(Rate {
                 fluent: effect.fluent,
-                rate: &effect.rate,
+                per_time: &effect.rate,
                 duration: step.duration.as_ref(),
             });
         }

@@ -104,7 +104,7 @@ impl World {
     /// Sections: `duration`, `start`, `over all`, `end`, `start effect`, `end effect`, and
     /// `rate` (`x 2`: x increases by 2 per unit of time).
     pub(super) fn durative(mut self, name: &str, sections: &[(&str, &str)]) -> Self {
-        let mut text = |wanted: &str| {
+        let text = |wanted: &str| {
             let found = sections.iter().find(|(section, _)| *section == wanted);
             found.map_or("", |(_, text)| text)
         };
@@ -216,20 +216,17 @@ impl World {
             "and" => Condition::And(rest()),
             "or" => Condition::Or(rest()),
             "not" => Condition::Not(Box::new(self.condition(&parts[1]))),
-            name => match comparison(name) {
-                Some(comparison) => Condition::Compare(
-                    comparison,
-                    self.expression(&parts[1]),
-                    self.expression(&parts[2]),
-                ),
-                None => {
-                    let predicate = self.predicate(name);
-                    Condition::Atom(Atom {
-                        predicate,
-                        arguments: Vec::new(),
-                    })
+            name => {
+                if let Some(comparison) = comparison(name) {
+                    let left = self.expression(&parts[1]);
+                    return Condition::Compare(comparison, left, self.expression(&parts[2]));
                 }
-            },
+                let predicate = self.predicate(name);
+                Condition::Atom(Atom {
+                    predicate,
+                    arguments: Vec::new(),
+                })
+            }
         }
     }
 
