@@ -65,6 +65,7 @@ impl<'a> Judge<'a> {
                 self.since.insert(fact, (group.time.clone(), what));
             }
         }
+        self.derived.take();
         for happening in &group.happenings {
             if let What::End(position) = happening.what {
                 self.running.remove(&position);

@@ -1,10 +1,11 @@
 //! The plan is carried out, happening group by happening group.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::derived::{Derivation, With};
+use super::derived::{Derivation, Derived};
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
 use super::piece::{Piece, mentions_derived};
@@ -25,6 +26,8 @@ pub(super) struct Judge<'a> {
     pub(super) settings: &'a Settings,
     pub(super) derivation: Derivation<'a>,
     pub(super) now: Now,
+    /// The derived facts that hold in `now`, once something has asked for them.
+    pub(super) derived: OnceCell<Derived>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
     /// What last changed each fact: time and happening.
@@ -69,6 +72,7 @@ impl<'a> Judge<'a> {
         let length = to - from;
         self.watch_over_all(from, &motion, &length)?;
         motion.carry(&mut self.now, &length);
+        self.derived.take();
         for running in self.running.values_mut() {
             running.is_new = false;
         }
@@ -265,15 +269,12 @@ impl<'a> Judge<'a> {
     ) -> T {
         let reading = self.reading_of(now, step);
         if mentions_derived(condition, &self.derivation) {
-            // Rules know no `?duration`.
-            let derived = self.derivation.derive(&self.reading_of(now, None));
-            look(
-                &reading,
-                &With {
-                    basic: &reading,
-                    derived: &derived,
-                },
-            )
+            // Derived once for each state; rules know no `?duration`.
+            let derive = || self.derivation.derive(&self.reading_of(now, None));
+            let fresh = OnceCell::new();
+            let is_current = std::ptr::eq(now, &self.now);
+            let derived = if is_current { &self.derived } else { &fresh }.get_or_init(derive);
+            look(&reading, &self.derivation.on_top_of(&reading, derived))
         } else {
             look(&reading, &reading)
         }
