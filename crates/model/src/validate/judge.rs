@@ -259,21 +259,19 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Hands `look` the moment `now`, with derived facts if the condition needs them.
-    pub(super) fn with_moment<T>(
+    /// Hands `look` the moment `now`, with its derived facts if the condition needs them.
+    fn with_moment<T>(
         &self,
         condition: &Condition,
-        now: &Now,
+        (now, derived): (&Now, &OnceCell<Derived>),
         step: Option<usize>,
         look: &dyn Fn(&Reading<'_>, &dyn Moment) -> T,
     ) -> T {
         let reading = self.reading_of(now, step);
         if mentions_derived(condition, &self.derivation) {
-            // Derived once for each state; rules know no `?duration`.
+            // Rules know no `?duration`.
             let derive = || self.derivation.derive(&self.reading_of(now, None));
-            let fresh = OnceCell::new();
-            let is_current = std::ptr::eq(now, &self.now);
-            let derived = if is_current { &self.derived } else { &fresh }.get_or_init(derive);
+            let derived = derived.get_or_init(derive);
             look(&reading, &self.derivation.on_top_of(&reading, derived))
         } else {
             look(&reading, &reading)
@@ -287,19 +285,24 @@ impl<'a> Judge<'a> {
         now: &Now,
         step: Option<usize>,
     ) -> Vec<super::violation::Reason> {
-        self.with_moment(condition, now, step, &|reading, moment| {
-            let since = |fact| {
-                let (time, what) = self.since.get(&fact)?;
-                Some(self.occurrence(*what, time))
-            };
-            Witness {
-                task: self.task,
-                reading,
-                moment,
-                since: &since,
-            }
-            .reasons(condition)
-        })
+        self.with_moment(
+            condition,
+            (now, &OnceCell::new()),
+            step,
+            &|reading, moment| {
+                let since = |fact| {
+                    let (time, what) = self.since.get(&fact)?;
+                    Some(self.occurrence(*what, time))
+                };
+                Witness {
+                    task: self.task,
+                    reading,
+                    moment,
+                    since: &since,
+                }
+                .reasons(condition)
+            },
+        )
     }
 
     /// The step and its durative body; only asked for steps that have one.
