@@ -240,7 +240,8 @@ impl<'a> Judge<'a> {
 
     /// Whether a condition of a step, or the goal, holds in the current state.
     pub(super) fn reads(&self, condition: &Condition, step: Option<usize>) -> Result<bool, Fault> {
-        self.with_moment(condition, &self.now, step, &|_, moment| {
+        let current = (&self.now, &self.derived);
+        self.with_moment(condition, current, step, &|_, moment| {
             holds(condition, moment)
         })
     }
