@@ -14,6 +14,21 @@
 //!   [`Settings::epsilon`] apart. Timed initials take part, but not against each other.
 //! - The goal holds after the last happening of the plan's actions. Timed initials after that do
 //!   not count.
+//!
+//! A part of a condition that says nothing (it reads a fluent without a value, divides by zero)
+//! is a violation, unless the other parts decide whatever it would say.
+//!
+//! ```
+//! use elbowroom_model::validate::{Settings, Verdict, validate};
+//! use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
+//!
+//! let task = Task::new(Problem::default());
+//! match validate(&task, &TimeTriggeredPlan::default(), &Settings::default()) {
+//!     Verdict::Valid(report) => assert_eq!(report.makespan.to_string(), "0"),
+//!     Verdict::Invalid(violation) => println!("invalid: {violation}"),
+//!     Verdict::Undecided(undecided) => println!("cannot tell: {undecided}"),
+//! }
+//! ```
 
 mod derived;
 mod display;
@@ -30,6 +45,7 @@ mod stop;
 mod timeline;
 mod violation;
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
@@ -153,6 +169,7 @@ pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> V
         settings,
         derivation,
         now: state::Now::initial(task),
+        derived: OnceCell::new(),
         running: BTreeMap::new(),
         since: BTreeMap::new(),
         margins: margin::Margins::default(),
@@ -163,8 +180,8 @@ pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> V
             state: judge.now.to_state(),
             margins: margins(task, plan, judge.margins),
         }),
-        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(violation),
-        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(undecided),
+        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(*violation),
+        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(*undecided),
     }
 }
 

@@ -11,6 +11,8 @@ use crate::task::{GroundRule, Task};
 pub(super) struct Derivation<'a> {
     /// Rules of one stratum; lower strata first.
     strata: Vec<Vec<&'a GroundRule>>,
+    /// The facts that rules define.
+    heads: BTreeSet<FactId>,
 }
 
 impl<'a> Derivation<'a> {
@@ -44,7 +46,8 @@ impl<'a> Derivation<'a> {
         for rule in task.rules() {
             strata[level[&rule.head]].push(rule);
         }
-        Some(Self { strata })
+        let heads = level.into_keys().collect();
+        Some(Self { strata, heads })
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -53,7 +56,7 @@ impl<'a> Derivation<'a> {
 
     /// Whether rules define the fact.
     pub(super) fn defines(&self, fact: FactId) -> bool {
-        self.strata.iter().flatten().any(|rule| rule.head == fact)
+        self.heads.contains(&fact)
     }
 
     /// Calls `visit` for the body of each rule.
@@ -66,9 +69,6 @@ impl<'a> Derivation<'a> {
     /// The truth of derived facts when basic facts and numbers are as `basic` says.
     pub(super) fn derive(&self, basic: &dyn Moment) -> Derived {
         let mut derived = Derived::default();
-        derived
-            .heads
-            .extend(self.strata.iter().flatten().map(|rule| rule.head));
         for stratum in &self.strata {
             // First what certainly holds, then what rests on something that says nothing.
             for accept in [Derived::accept_true, Derived::accept_unclear] {
@@ -79,24 +79,32 @@ impl<'a> Derivation<'a> {
                         if derived.is_settled(rule.head) {
                             continue;
                         }
-                        let view = With {
-                            basic,
-                            derived: &derived,
-                        };
-                        let truth = holds(&rule.body, &view);
-                        has_grown |= accept(&mut derived, rule.head, truth);
+                        let truth = holds(&rule.body, &self.on_top_of(basic, &derived));
+                        has_grown |= accept(&mut derived, rule.head, &truth);
                     }
                 }
             }
         }
         derived
     }
+
+    /// A moment with its derived facts.
+    pub(super) fn on_top_of<'b>(
+        &'b self,
+        basic: &'b dyn Moment,
+        derived: &'b Derived,
+    ) -> impl Moment + 'b {
+        With {
+            heads: &self.heads,
+            basic,
+            derived,
+        }
+    }
 }
 
 /// The truth of derived facts at one moment.
 #[derive(Debug, Default)]
 pub(super) struct Derived {
-    heads: BTreeSet<FactId>,
     holding: BTreeSet<FactId>,
     unclear: BTreeMap<FactId, Fault>,
 }
@@ -106,38 +114,32 @@ impl Derived {
         self.holding.contains(&fact) || self.unclear.contains_key(&fact)
     }
 
-    fn accept_true(&mut self, head: FactId, truth: Result<bool, Fault>) -> bool {
-        truth == Ok(true) && self.holding.insert(head)
+    fn accept_true(&mut self, head: FactId, truth: &Result<bool, Fault>) -> bool {
+        *truth == Ok(true) && self.holding.insert(head)
     }
 
-    fn accept_unclear(&mut self, head: FactId, truth: Result<bool, Fault>) -> bool {
-        truth.is_err_and(|fault| self.unclear.insert(head, fault).is_none())
-    }
-
-    /// The truth of a fact that rules define; `None` for basic facts.
-    fn fact(&self, fact: FactId) -> Option<Result<bool, Fault>> {
-        if let Some(fault) = self.unclear.get(&fact) {
-            return Some(Err(fault.clone()));
-        }
-        self.heads
-            .contains(&fact)
-            .then(|| Ok(self.holding.contains(&fact)))
+    fn accept_unclear(&mut self, head: FactId, truth: &Result<bool, Fault>) -> bool {
+        truth
+            .as_ref()
+            .is_err_and(|fault| self.unclear.insert(head, fault.clone()).is_none())
     }
 }
 
-/// A moment at which derived facts have been computed.
-pub(super) struct With<'a> {
-    /// Basic facts and numbers.
-    pub(super) basic: &'a dyn Moment,
-    /// The others.
-    pub(super) derived: &'a Derived,
+struct With<'a> {
+    heads: &'a BTreeSet<FactId>,
+    basic: &'a dyn Moment,
+    derived: &'a Derived,
 }
 
 impl Moment for With<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Fault> {
-        self.derived
-            .fact(fact)
-            .unwrap_or_else(|| self.basic.fact(fact))
+        if !self.heads.contains(&fact) {
+            self.basic.fact(fact)
+        } else if let Some(fault) = self.derived.unclear.get(&fact) {
+            Err(fault.clone())
+        } else {
+            Ok(self.derived.holding.contains(&fact))
+        }
     }
 
     fn compare(

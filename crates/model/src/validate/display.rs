@@ -57,11 +57,12 @@ impl fmt::Display for Violation {
             is_after, is_exact, ..
         } = &self.mistake
         {
-            let (after, about) = (
-                if *is_after { "just after " } else { "at " },
-                if *is_exact { "" } else { "about " },
-            );
-            write!(f, "{after}{about}{}: ", clock(&self.time))?;
+            let after = if *is_after { "just after" } else { "at" };
+            if *is_exact {
+                write!(f, "{after} {}: ", clock(&self.time))?;
+            } else {
+                write!(f, "{after} about {}: ", self.time.to_decimal(6))?;
+            }
         } else {
             write!(f, "at {}: ", clock(&self.time))?;
         }

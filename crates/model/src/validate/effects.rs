@@ -39,7 +39,7 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
         {
             rates.push(Rate {
                 fluent: effect.fluent,
-                rate: &effect.rate,
+                per_time: &effect.rate,
                 duration: step.duration.as_ref(),
             });
         }
@@ -65,6 +65,7 @@ impl<'a> Judge<'a> {
                 self.since.insert(fact, (group.time.clone(), what));
             }
         }
+        self.derived.take();
         for happening in &group.happenings {
             if let What::End(position) = happening.what {
                 self.running.remove(&position);

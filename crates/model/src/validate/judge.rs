@@ -1,10 +1,11 @@
 //! The plan is carried out, happening group by happening group.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::derived::{Derivation, With};
+use super::derived::{Derivation, Derived};
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
 use super::piece::{Piece, mentions_derived};
@@ -25,6 +26,8 @@ pub(super) struct Judge<'a> {
     pub(super) settings: &'a Settings,
     pub(super) derivation: Derivation<'a>,
     pub(super) now: Now,
+    /// The derived facts that hold in `now`, once something has asked for them.
+    pub(super) derived: OnceCell<Derived>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
     /// What last changed each fact: time and happening.
@@ -69,6 +72,7 @@ impl<'a> Judge<'a> {
         let length = to - from;
         self.watch_over_all(from, &motion, &length)?;
         motion.carry(&mut self.now, &length);
+        self.derived.take();
         for running in self.running.values_mut() {
             running.is_new = false;
         }
@@ -236,7 +240,8 @@ impl<'a> Judge<'a> {
 
     /// Whether a condition of a step, or the goal, holds in the current state.
     pub(super) fn reads(&self, condition: &Condition, step: Option<usize>) -> Result<bool, Fault> {
-        self.with_moment(condition, &self.now, step, &|_, moment| {
+        let current = (&self.now, &self.derived);
+        self.with_moment(condition, current, step, &|_, moment| {
             holds(condition, moment)
         })
     }
@@ -255,25 +260,20 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Hands `look` the moment `now`, with derived facts if the condition needs them.
-    pub(super) fn with_moment<T>(
+    /// Hands `look` the moment `now`, with its derived facts if the condition needs them.
+    fn with_moment<T>(
         &self,
         condition: &Condition,
-        now: &Now,
+        (now, derived): (&Now, &OnceCell<Derived>),
         step: Option<usize>,
         look: &dyn Fn(&Reading<'_>, &dyn Moment) -> T,
     ) -> T {
         let reading = self.reading_of(now, step);
         if mentions_derived(condition, &self.derivation) {
             // Rules know no `?duration`.
-            let derived = self.derivation.derive(&self.reading_of(now, None));
-            look(
-                &reading,
-                &With {
-                    basic: &reading,
-                    derived: &derived,
-                },
-            )
+            let derive = || self.derivation.derive(&self.reading_of(now, None));
+            let derived = derived.get_or_init(derive);
+            look(&reading, &self.derivation.on_top_of(&reading, derived))
         } else {
             look(&reading, &reading)
         }
@@ -286,19 +286,24 @@ impl<'a> Judge<'a> {
         now: &Now,
         step: Option<usize>,
     ) -> Vec<super::violation::Reason> {
-        self.with_moment(condition, now, step, &|reading, moment| {
-            let since = |fact| {
-                let (time, what) = self.since.get(&fact)?;
-                Some(self.occurrence(*what, time))
-            };
-            Witness {
-                task: self.task,
-                reading,
-                moment,
-                since: &since,
-            }
-            .reasons(condition)
-        })
+        self.with_moment(
+            condition,
+            (now, &OnceCell::new()),
+            step,
+            &|reading, moment| {
+                let since = |fact| {
+                    let (time, what) = self.since.get(&fact)?;
+                    Some(self.occurrence(*what, time))
+                };
+                Witness {
+                    task: self.task,
+                    reading,
+                    moment,
+                    since: &since,
+                }
+                .reasons(condition)
+            },
+        )
     }
 
     /// The step and its durative body; only asked for steps that have one.

@@ -6,7 +6,7 @@
 
 use elbowroom_num::Rational;
 
-use super::derived::{Derivation, With};
+use super::derived::Derivation;
 use super::polynomial::{Polynomial, Root};
 use super::reading::{Fault, Moment, compare_signs, evaluate, holds};
 use super::state::{Motion, Now};
@@ -110,13 +110,7 @@ impl Piece<'_> {
             // Rules know no `?duration`.
             let plain = self.view(None, view.place.clone());
             let derived = self.derivation.derive(&plain);
-            holds(
-                condition,
-                &With {
-                    basic: view,
-                    derived: &derived,
-                },
-            )
+            holds(condition, &self.derivation.on_top_of(view, &derived))
         } else {
             holds(condition, view)
         }

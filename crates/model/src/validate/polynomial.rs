@@ -164,7 +164,7 @@ impl Polynomial {
         roots.extend(
             brackets
                 .into_iter()
-                .map(|(low, high)| Root::Between(low, high)),
+                .map(|(low, high)| rest.recognised(low, high)),
         );
         roots.sort_by(|a, b| a.lower().cmp(b.lower()));
         roots
@@ -201,6 +201,31 @@ impl Polynomial {
             open.push((low, middle));
         }
         Ok(found)
+    }
+
+    /// The zero in a bracket, exact if it is rational.
+    fn recognised(&self, low: Rational, high: Rational) -> Root {
+        // Multiplied out to whole coefficients, the denominator of a rational zero divides the
+        // leading one: the zero is a multiple of `unit`.
+        let whole = self
+            .0
+            .iter()
+            .try_fold(Rational::ONE, |product, coefficient| {
+                Some(product * Rational::from(coefficient.denominator()?))
+            });
+        let leading = self.0.last().map(Rational::abs);
+        let unit = whole
+            .zip(leading)
+            .and_then(|(whole, leading)| (whole * leading).reciprocal());
+        let bracket = Root::Between(low, high);
+        let Some(unit) = unit else { return bracket };
+        let narrow = self.narrowed(&bracket, &(&unit / Rational::from(2)));
+        let candidate = (narrow.upper() / &unit).floor() * &unit;
+        if self.at(&candidate).is_zero() && candidate >= *narrow.lower() {
+            Root::Exact(candidate)
+        } else {
+            bracket
+        }
     }
 
     /// How many distinct zeros lie strictly between two numbers that are none.

@@ -89,10 +89,10 @@ impl Moment for Reading<'_> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
-/// `d fluent / dt` has the term `rate`, of an action with this duration.
+/// `d fluent / dt` has the term `per_time`, of an action with this duration.
 pub(super) struct Rate<'a> {
     pub(super) fluent: FluentId,
-    pub(super) rate: &'a Expression,
+    pub(super) per_time: &'a Expression,
     pub(super) duration: Option<&'a Rational>,
 }
 
@@ -111,7 +111,7 @@ impl Motion {
             let is_ready = |rates: &Vec<&Rate<'_>>| {
                 let mut is_ready = true;
                 for rate in rates {
-                    rate.rate.visit_fluents(&mut |fluent| {
+                    rate.per_time.visit_fluents(&mut |fluent| {
                         is_ready &= !terms.contains_key(&fluent);
                     });
                 }
@@ -122,7 +122,7 @@ impl Motion {
             let mut speed = Polynomial::constant(Rational::ZERO);
             for rate in terms.remove(&fluent).into_iter().flatten() {
                 let read = |fluent| motion.value(now, fluent);
-                speed = speed.plus(&evaluate(rate.rate, rate.duration, &read)?);
+                speed = speed.plus(&evaluate(rate.per_time, rate.duration, &read)?);
             }
             motion
                 .0

@@ -13,21 +13,21 @@ use super::violation::{
 use crate::ground::{Condition, DurationConstraint, Expression, FluentId};
 use crate::task::Task;
 
-/// The end of the matter.
+/// The end of the matter; boxed, because nearly all calls return nothing of the kind.
 #[derive(Debug)]
 pub(super) enum Stop {
-    Violation(Violation),
-    Undecided(Undecided),
+    Violation(Box<Violation>),
+    Undecided(Box<Undecided>),
 }
 
 impl Stop {
     pub(super) fn continuous_guard(task: &Task, time: &Rational, fluent: FluentId) -> Self {
-        Self::Undecided(Undecided {
+        Self::Undecided(Box::new(Undecided {
             time: Some(time.clone()),
             difficulty: Difficulty::ContinuousGuard {
                 fluent: task.fluent_name(fluent),
             },
-        })
+        }))
     }
 }
 
@@ -88,11 +88,11 @@ impl<'a> Judge<'a> {
     /// The violation that a step, or the goal, commits.
     pub(super) fn violation(&self, time: &Rational, step: Option<usize>, mistake: Mistake) -> Stop {
         let action = step.map(|position| self.instance(position));
-        Stop::Violation(Violation {
+        Stop::Violation(Box::new(Violation {
             time: time.clone(),
             action,
             mistake,
-        })
+        }))
     }
 
     pub(super) fn instance(&self, position: usize) -> ActionInstance {
@@ -173,9 +173,9 @@ impl<'a> Judge<'a> {
                 fluent: self.task.fluent_name(fluent),
             },
         };
-        Stop::Undecided(Undecided {
+        Stop::Undecided(Box::new(Undecided {
             time: Some(place.time.clone()),
             difficulty,
-        })
+        }))
     }
 }

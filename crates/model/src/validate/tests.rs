@@ -5,6 +5,7 @@ mod continuous;
 mod durations;
 mod effects;
 mod explanations;
+mod forms;
 mod groups;
 mod pieces;
 mod polynomials;

@@ -22,7 +22,7 @@ fn a_start_condition_reads_the_state_before_any_effect_at_that_time() {
     let world = World::new("").durative("a", &[("start", "(p)"), ("start effect", "(p)")]);
     assert_eq!(
         world.judge("1: a [2]"),
-        "at 1.000: a needs (p) at start: (p) is false".replace(" a ", " (a) ")
+        "at 1.000: (a) needs (p) at start: (p) is false"
     );
 }
 

@@ -4,6 +4,7 @@
 
 use elbowroom_num::Rational;
 
+use super::forms::{Form, forms, head, words};
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::problem::{
     Atom, Body, Comparison, Condition, ContinuousEffect, DurationConstraint, Effect, Expression,
@@ -16,13 +17,6 @@ use crate::validate::{Report, Settings, Verdict, validate};
 pub(super) struct World {
     pub(super) problem: Problem,
     pub(super) settings: Settings,
-}
-
-/// A word, or a list in parentheses.
-#[derive(Clone, Debug)]
-enum Form {
-    Word(String),
-    List(Vec<Form>),
 }
 
 impl World {
@@ -104,7 +98,7 @@ impl World {
     /// Sections: `duration`, `start`, `over all`, `end`, `start effect`, `end effect`, and
     /// `rate` (`x 2`: x increases by 2 per unit of time).
     pub(super) fn durative(mut self, name: &str, sections: &[(&str, &str)]) -> Self {
-        let mut text = |wanted: &str| {
+        let text = |wanted: &str| {
             let found = sections.iter().find(|(section, _)| *section == wanted);
             found.map_or("", |(_, text)| text)
         };
@@ -216,20 +210,17 @@ impl World {
             "and" => Condition::And(rest()),
             "or" => Condition::Or(rest()),
             "not" => Condition::Not(Box::new(self.condition(&parts[1]))),
-            name => match comparison(name) {
-                Some(comparison) => Condition::Compare(
-                    comparison,
-                    self.expression(&parts[1]),
-                    self.expression(&parts[2]),
-                ),
-                None => {
-                    let predicate = self.predicate(name);
-                    Condition::Atom(Atom {
-                        predicate,
-                        arguments: Vec::new(),
-                    })
+            name => {
+                if let Some(comparison) = comparison(name) {
+                    let left = self.expression(&parts[1]);
+                    return Condition::Compare(comparison, left, self.expression(&parts[2]));
                 }
-            },
+                let predicate = self.predicate(name);
+                Condition::Atom(Atom {
+                    predicate,
+                    arguments: Vec::new(),
+                })
+            }
         }
     }
 
@@ -362,45 +353,4 @@ fn comparison(symbol: &str) -> Option<Comparison> {
 
 pub(super) fn number(text: &str) -> Rational {
     text.parse().expect("a number")
-}
-
-fn head(parts: &[Form]) -> &str {
-    match &parts[0] {
-        Form::Word(word) => word,
-        Form::List(_) => panic!("{parts:?}"),
-    }
-}
-
-/// The words of a flat list, or the word itself.
-fn words(form: &Form) -> Vec<&str> {
-    match form {
-        Form::Word(word) => vec![word],
-        Form::List(parts) => parts
-            .iter()
-            .filter_map(|part| match part {
-                Form::Word(word) => Some(word.as_str()),
-                Form::List(_) => None,
-            })
-            .collect(),
-    }
-}
-
-fn forms(text: &str) -> Vec<Form> {
-    let spaced = text.replace('(', " ( ").replace(')', " ) ");
-    let mut stack = vec![Vec::new()];
-    for token in spaced.split_whitespace() {
-        match token {
-            "(" => stack.push(Vec::new()),
-            ")" => {
-                let list = stack.pop().expect("balanced");
-                stack.last_mut().expect("balanced").push(Form::List(list));
-            }
-            word => stack
-                .last_mut()
-                .expect("balanced")
-                .push(Form::Word(word.to_owned())),
-        }
-    }
-    assert_eq!(stack.len(), 1, "unbalanced: {text}");
-    stack.remove(0)
 }
