@@ -92,7 +92,9 @@ impl Feature {
                 "`or`, `not`, `imply`, `exists` over parts with different time specifiers: refused"
             }
             Self::Modules => "`:modules`, external code (TFD/M): refused",
-            Self::OtherSections => "`:length`, `:time` and unknown sections: ignored with a warning",
+            Self::OtherSections => {
+                "`:length`, `:time` and unknown sections: ignored with a warning"
+            }
             Self::UnknownRequirements => "requirement flags not known: ignored with a warning",
         }
     }

@@ -3,6 +3,7 @@
 mod diagnostic;
 mod feature;
 mod lower;
+mod plan_text;
 mod render;
 mod report;
 mod source;
@@ -12,4 +13,5 @@ mod syntax;
 pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 pub use feature::Feature;
 pub use lower::read_problem;
+pub use plan_text::{read_plan, write_plan};
 pub use source::Source;

@@ -22,13 +22,16 @@ mod term;
 mod timed;
 mod typed_list;
 
+use std::rc::Rc;
+
 use elbowroom_model::Problem;
+use elbowroom_model::problem::TypeId;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::lower::names::Names;
 use crate::lower::sections::Sections;
 use crate::report::Report;
-use crate::source::{FileId, Source};
+use crate::source::{FileId, Source, Span};
 use crate::syntax;
 
 /// Reads a planning problem from the texts of its domain and problem files.
@@ -67,6 +70,8 @@ struct Reader {
     names: Names,
     /// How much text was copied because it stands around more than one effect.
     copied: usize,
+    /// The types resolved last.
+    resolved_types: Option<(Rc<[(String, Span)]>, Vec<TypeId>)>,
 }
 
 impl Reader {
@@ -76,6 +81,7 @@ impl Reader {
             problem: Problem::default(),
             names: Names::default(),
             copied: 0,
+            resolved_types: None,
         }
     }
 

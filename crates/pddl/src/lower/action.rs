@@ -92,8 +92,7 @@ impl Reader {
                     .help(format!("expected one of {}", allowed.join(", ")));
                 continue;
             };
-            let is_keyword =
-                |node: &Node| node.word().is_some_and(|word| word.starts_with(':'));
+            let is_keyword = |node: &Node| node.word().is_some_and(|word| word.starts_with(':'));
             let value = nodes.next_if(|next| !is_keyword(next));
             let Some(&keyword) = allowed.iter().find(|keyword| **keyword == word) else {
                 let near = match word.as_ref() {
@@ -117,7 +116,10 @@ impl Reader {
             }
             if fields.insert(keyword, (node.span, value)).is_some() {
                 self.report
-                    .error(node.span, format!("a second `{keyword}` in action `{action}`"))
+                    .error(
+                        node.span,
+                        format!("a second `{keyword}` in action `{action}`"),
+                    )
                     .help("join them by `and`");
             }
         }

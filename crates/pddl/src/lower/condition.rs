@@ -25,13 +25,15 @@ impl Reader {
             return self.comparison(comparison, node, parts, scope);
         }
         if self.names.predicates.contains_key(head.as_ref()) && !is_connective(&head) {
-            return self.atom(node, scope).map_or(Condition::TRUE, Condition::Atom);
+            return self
+                .atom(node, scope)
+                .map_or(Condition::TRUE, Condition::Atom);
         }
         match (head.as_ref(), parts) {
             ("and", _) => Condition::And(self.conditions(parts, scope)),
-            ("or", _) => without_preferences(scope, |scope| {
-                Condition::Or(self.conditions(parts, scope))
-            }),
+            ("or", _) => {
+                without_preferences(scope, |scope| Condition::Or(self.conditions(parts, scope)))
+            }
             ("not", [part]) => without_preferences(scope, |scope| {
                 Condition::Not(Box::new(self.condition(part, scope)))
             }),
@@ -70,7 +72,9 @@ impl Reader {
                     .help("time specifiers belong into durative actions, and do not nest");
                 Condition::TRUE
             }
-            _ => self.atom(node, scope).map_or(Condition::TRUE, Condition::Atom),
+            _ => self
+                .atom(node, scope)
+                .map_or(Condition::TRUE, Condition::Atom),
         }
     }
 
@@ -187,10 +191,7 @@ impl Reader {
 }
 
 /// Runs `read` where leaving out a preference would change what must hold.
-pub(super) fn without_preferences<T>(
-    scope: &mut Scope,
-    read: impl FnOnce(&mut Scope) -> T,
-) -> T {
+pub(super) fn without_preferences<T>(scope: &mut Scope, read: impl FnOnce(&mut Scope) -> T) -> T {
     scope.without_preferences += 1;
     let read = read(scope);
     scope.without_preferences -= 1;

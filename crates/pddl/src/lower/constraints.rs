@@ -27,7 +27,10 @@ impl Reader {
             .unsupported(
                 Feature::TrajectoryConstraints,
                 place.span,
-                format!("`{}`: trajectory constraints are not supported", place.quote()),
+                format!(
+                    "`{}`: trajectory constraints are not supported",
+                    place.quote()
+                ),
             )
             .help("express them by timed initial literals, or by an action that lasts");
     }

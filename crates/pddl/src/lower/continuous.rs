@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 
 use crate::lower::Reader;
 use crate::lower::scope::Scope;
-use crate::syntax::{Node, Kind};
+use crate::syntax::{Kind, Node};
 
 /// `constant + rate * #t`; a part that is missing is zero.
 #[derive(Debug, Default)]
@@ -90,8 +90,7 @@ impl Reader {
                     self.refuse_nonlinear(node);
                     return None;
                 };
-                let over =
-                    |part| Expression::Divide(Box::new(part), Box::new(divisor.clone()));
+                let over = |part| Expression::Divide(Box::new(part), Box::new(divisor.clone()));
                 Some(Linear {
                     constant: dividend.constant.map(over),
                     rate: dividend.rate.map(over),

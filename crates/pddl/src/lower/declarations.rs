@@ -66,9 +66,9 @@ impl Reader {
             }
             let parameters = self.variables(parameters);
             let same = self.names.predicates.entry(name.clone()).or_default();
-            let again = same
-                .iter()
-                .find(|id| self.problem.predicates[id.index()].parameters.len() == parameters.len());
+            let again = same.iter().find(|id| {
+                self.problem.predicates[id.index()].parameters.len() == parameters.len()
+            });
             if let Some(&again) = again {
                 self.report
                     .warning(node.span, format!("`{name}` is declared already"))
@@ -101,7 +101,9 @@ impl Reader {
                     .unsupported(
                         Feature::ObjectFluents,
                         *span,
-                        format!("`{name}` has values of type `{ty}`: object fluents are not supported"),
+                        format!(
+                            "`{name}` has values of type `{ty}`: object fluents are not supported"
+                        ),
                     )
                     .help("use a predicate with one more argument");
                 self.names.object_functions.insert(name);

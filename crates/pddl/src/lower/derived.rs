@@ -89,10 +89,7 @@ impl Reader {
         for rule in negative_circles(&self.problem) {
             let name = &self.problem.predicates[self.problem.rules[rule].predicate.index()].name;
             self.report
-                .error(
-                    spans[rule],
-                    format!("`{name}` depends on its own negation"),
-                )
+                .error(spans[rule], format!("`{name}` depends on its own negation"))
                 .help("a derived predicate may not be negated in what it is derived from");
         }
     }

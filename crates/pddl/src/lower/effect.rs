@@ -1,8 +1,6 @@
 //! Effects, instantaneous and durative.
 
-use elbowroom_model::problem::{
-    Change, ContinuousEffect, Effect, Guard, UpdateOperator, Variable,
-};
+use elbowroom_model::problem::{Change, ContinuousEffect, Effect, Guard, UpdateOperator, Variable};
 
 use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
@@ -81,7 +79,10 @@ impl Reader {
                 }
                 _ => {
                     self.report
-                        .error(node.span, format!("`{}` does not belong here", node.quote()))
+                        .error(
+                            node.span,
+                            format!("`{}` does not belong here", node.quote()),
+                        )
                         .help("effects of durative actions happen `at start` or `at end`");
                 }
             }
@@ -263,7 +264,10 @@ impl Reader {
         if self.copied > MOST_COPIED {
             self.copied = 0;
             self.report
-                .error(node.span, "too many effects under one condition or quantifier")
+                .error(
+                    node.span,
+                    "too many effects under one condition or quantifier",
+                )
                 .help("this domain is too large to be read");
             return None;
         }
@@ -286,7 +290,10 @@ impl Reader {
             };
             if looks_ahead {
                 self.report
-                    .error(when.span, "a condition that is read after its effect happens")
+                    .error(
+                        when.span,
+                        "a condition that is read after its effect happens",
+                    )
                     .help("only effects `at end` may depend on conditions `at end`");
                 let label = self.report.label(node.span, "this is the effect");
                 self.report.attach(label);

@@ -75,9 +75,7 @@ impl Reader {
                     .help("write a number without parentheses");
                 WRONG
             }
-            _ => self
-                .fluent(node, scope)
-                .map_or(WRONG, Expression::Fluent),
+            _ => self.fluent(node, scope).map_or(WRONG, Expression::Fluent),
         }
     }
 
@@ -113,9 +111,7 @@ impl Reader {
                 Expression::TotalTime
             }
             _ if word.starts_with('?') => self.unknown(word, node, scope),
-            _ => self
-                .fluent(node, scope)
-                .map_or(WRONG, Expression::Fluent),
+            _ => self.fluent(node, scope).map_or(WRONG, Expression::Fluent),
         }
     }
 

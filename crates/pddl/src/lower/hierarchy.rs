@@ -38,7 +38,9 @@ impl Reader {
             }
         }
         for entry in &entries {
-            let Some(name) = entry.node.lower() else { continue };
+            let Some(name) = entry.node.lower() else {
+                continue;
+            };
             for (parent, span) in entry.types.iter() {
                 self.warn_of_undeclared_parent(parent, *span, &declared);
                 self.declare_type(parent);
@@ -82,7 +84,10 @@ impl Reader {
         }
         if let Some(near) = nearest(name, declared.keys().map(String::as_str)) {
             self.report
-                .warning(span, format!("`{name}` is not declared, and becomes a new type"))
+                .warning(
+                    span,
+                    format!("`{name}` is not declared, and becomes a new type"),
+                )
                 .suggest(Some(near));
         }
     }
@@ -141,8 +146,11 @@ impl Reader {
 
     /// Whether every object of one of `own` is of one of `asked`.
     pub(super) fn always_fits(&self, own: &[TypeId], asked: &[TypeId]) -> bool {
-        own.iter()
-            .all(|&own| asked.iter().any(|&asked| self.problem.is_subtype(own, asked)))
+        own.iter().all(|&own| {
+            asked
+                .iter()
+                .any(|&asked| self.problem.is_subtype(own, asked))
+        })
     }
 
     /// Whether some object can be of one of `own` and one of `asked`.

@@ -43,8 +43,8 @@ impl Reader {
             Some(section) => self.goal(section),
             None => {
                 self.report
-                    .error(sections.name_span, "a problem without `:goal`")
-                    .help("expected `(:goal condition)`; `(:goal (and))` always holds");
+                    .warning(sections.name_span, "a problem without `:goal`")
+                    .help("every plan reaches it; expected `(:goal condition)`");
             }
         }
         for section in sections.all(":constraints") {
@@ -74,7 +74,10 @@ impl Reader {
             [name] => {
                 self.report.warning(
                     name.span,
-                    format!("a problem of domain `{}`, read with `{expected}`", name.quote()),
+                    format!(
+                        "a problem of domain `{}`, read with `{expected}`",
+                        name.quote()
+                    ),
                 );
             }
             _ => {

@@ -83,7 +83,8 @@ impl<'t, 's> Sections<'t, 's> {
 
     /// The sections of that keyword.
     pub(super) fn all(&self, keyword: &str) -> impl Iterator<Item = &Section<'t, 's>> {
-        self.iter().filter(move |section| section.keyword == keyword)
+        self.iter()
+            .filter(move |section| section.keyword == keyword)
     }
 
     /// All sections.
@@ -121,11 +122,7 @@ impl<'t, 's> Sections<'t, 's> {
 }
 
 /// Reads `(domain name)` or `(problem name)`.
-fn name<'s>(
-    file: FileId,
-    node: Option<&Node<'s>>,
-    report: &mut Report,
-) -> Option<(&'s str, Span)> {
+fn name<'s>(file: FileId, node: Option<&Node<'s>>, report: &mut Report) -> Option<(&'s str, Span)> {
     let node = node?;
     let kind = kind(file);
     match node.form() {

@@ -1,8 +1,6 @@
 //! Objects and variables as arguments, and what they are arguments of.
 
-use elbowroom_model::problem::{
-    Atom, Fluent, FunctionId, ObjectId, PredicateId, Term, TypeId, Variable,
-};
+use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, Term, Variable};
 
 use crate::lower::Reader;
 use crate::lower::scope::Scope;
@@ -132,7 +130,10 @@ impl Reader {
                         arguments.len()
                     ),
                 )
-                .help(format!("expected `({})`", [name, &expected].join(" ").trim_end()));
+                .help(format!(
+                    "expected `({})`",
+                    [name, &expected].join(" ").trim_end()
+                ));
             return None;
         }
         let terms = terms.into_iter().collect::<Option<Vec<_>>>()?;
@@ -237,17 +238,12 @@ impl Reader {
             self.report
                 .error(
                     span,
-                    format!("`{}` is defined by rules, and cannot be set", predicate.name),
+                    format!(
+                        "`{}` is defined by rules, and cannot be set",
+                        predicate.name
+                    ),
                 )
                 .help("change what its rules depend on");
-        }
-    }
-
-    /// The types of a term.
-    pub(super) fn types_of<'a>(&'a self, term: Term, scope: &'a Scope) -> &'a [TypeId] {
-        match term {
-            Term::Object(object) => &self.problem.objects[object.index()].types,
-            Term::Variable(position) => &scope.variables[position].types,
         }
     }
 }

@@ -151,9 +151,9 @@ impl Reader {
                 let part = without_preferences(scope, |scope| self.timed_condition(part, scope));
                 scope.variables.truncate(outside);
                 match part.only_time() {
-                    Some(time) => part.map_only(time, |part| {
-                        Condition::Exists(variables, Box::new(part))
-                    }),
+                    Some(time) => {
+                        part.map_only(time, |part| Condition::Exists(variables, Box::new(part)))
+                    }
                     None => self.mixed_times(&head, node),
                 }
             }
@@ -169,13 +169,7 @@ impl Reader {
     }
 
     /// `or`, `not`, `imply` over parts that all are read at the same time.
-    fn at_one_time(
-        &mut self,
-        head: &str,
-        node: &Node,
-        parts: &[Node],
-        scope: &mut Scope,
-    ) -> Timed {
+    fn at_one_time(&mut self, head: &str, node: &Node, parts: &[Node], scope: &mut Scope) -> Timed {
         let parts: Vec<Timed> = without_preferences(scope, |scope| {
             parts
                 .iter()

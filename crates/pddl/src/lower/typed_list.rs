@@ -34,8 +34,7 @@ impl Reader {
                 match nodes.next() {
                     Some(types) => self.type_names(types),
                     None => {
-                        self.report
-                            .error(node.span, "expected a type after `-`");
+                        self.report.error(node.span, "expected a type after `-`");
                         Rc::clone(&untyped)
                     }
                 }
@@ -50,8 +49,10 @@ impl Reader {
                 continue;
             };
             if first_untyped == entries.len() {
-                self.report
-                    .error(node.span, "`-` and a type, but nothing before it to be typed");
+                self.report.error(
+                    node.span,
+                    "`-` and a type, but nothing before it to be typed",
+                );
             }
             for entry in &mut entries[first_untyped..] {
                 entry.types = Rc::clone(&types);
@@ -89,9 +90,14 @@ impl Reader {
     }
 
     /// The ids of the types; `object` if there are none. Reports those not declared.
-    pub(super) fn resolve_types(&mut self, types: &[(String, Span)]) -> Vec<TypeId> {
+    pub(super) fn resolve_types(&mut self, types: &Rc<[(String, Span)]>) -> Vec<TypeId> {
+        // Entries typed together share one report, too.
+        match &self.resolved_types {
+            Some((last, ids)) if Rc::ptr_eq(last, types) => return ids.clone(),
+            _ => {}
+        }
         let mut ids = Vec::with_capacity(types.len().max(1));
-        for (name, span) in types {
+        for (name, span) in types.iter() {
             match self.names.types.get(name) {
                 Some(&id) => ids.push(id),
                 None => {
@@ -106,6 +112,7 @@ impl Reader {
         if ids.is_empty() {
             ids.push(TypeId::OBJECT);
         }
+        self.resolved_types = Some((Rc::clone(types), ids.clone()));
         ids
     }
 

@@ -12,7 +12,11 @@ pub(crate) enum Token<'s> {
 }
 
 /// The tokens of a text with their places. Reports characters that belong nowhere.
-pub(crate) fn tokens<'s>(file: FileId, text: &'s str, report: &mut Report) -> Vec<(Token<'s>, Span)> {
+pub(crate) fn tokens<'s>(
+    file: FileId,
+    text: &'s str,
+    report: &mut Report,
+) -> Vec<(Token<'s>, Span)> {
     let mut tokens = Vec::new();
     let mut at = 0;
     while let Some(first) = text[at..].chars().next() {

@@ -39,7 +39,8 @@ impl<'s> Node<'s> {
 
     /// Whether it is this word, whatever the case.
     pub(crate) fn is(&self, word: &str) -> bool {
-        self.word().is_some_and(|own| own.eq_ignore_ascii_case(word))
+        self.word()
+            .is_some_and(|own| own.eq_ignore_ascii_case(word))
     }
 
     /// The elements, if it is a list.
@@ -265,7 +266,11 @@ mod tests {
         let mut report = Report::new(&source, &source);
         let nodes = parse(FileId::Domain, source.text(), &mut report);
         let shown: Vec<_> = nodes.iter().map(show).collect();
-        let messages = report.into_diagnostics().iter().map(ToString::to_string).collect();
+        let messages = report
+            .into_diagnostics()
+            .iter()
+            .map(ToString::to_string)
+            .collect();
         (shown.join(" "), messages)
     }
 
@@ -285,7 +290,8 @@ mod tests {
 
     #[test]
     fn a_section_inside_another_shows_where_a_parenthesis_is_missing() {
-        let (tree, messages) = parsed("(define (domain d)\n (:action a :effect (and (p))\n (:action b))");
+        let (tree, messages) =
+            parsed("(define (domain d)\n (:action a :effect (and (p))\n (:action b))");
         assert_eq!(
             tree,
             "[define [domain d] [:action a :effect [and [p]]] [:action b]]"
@@ -304,7 +310,10 @@ mod tests {
     fn a_million_parentheses_are_one_mistake() {
         let (_, messages) = parsed(&"(".repeat(1_000_000));
         assert_eq!(messages.len(), 2);
-        assert_eq!(messages[0], "f:1:201: error: lists nested more than 200 deep");
+        assert_eq!(
+            messages[0],
+            "f:1:201: error: lists nested more than 200 deep"
+        );
         let balanced = "(".repeat(1_000_000) + &")".repeat(1_000_000);
         assert_eq!(parsed(&balanced).1.len(), 1);
     }
