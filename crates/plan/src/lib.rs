@@ -13,6 +13,7 @@ mod durations;
 pub mod format;
 mod network;
 mod parameter;
+pub mod parametrize;
 mod stn_plan;
 mod suggestion;
 #[cfg(test)]
