@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use elbowroom::model::{Problem, Task};
+use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 
 use crate::args::ProblemArgs;
@@ -19,8 +19,17 @@ const LARGEST_FILE: u64 = 256 << 20;
 pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
-    let problem: Problem = with_warnings(pddl::read(&domain, &problem))?;
+    let problem: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
     Ok(Task::new(Arc::new(problem)))
+}
+
+/// Reads a plan with fixed times.
+pub(crate) fn time_triggered_plan(
+    task: &mut Task,
+    path: &Path,
+) -> Result<TimeTriggeredPlan, Failure> {
+    let text = source(path, "plan")?;
+    with_warnings(pddl::read_plan(&text, task))
 }
 
 /// Reads a text file, or standard input for `-`.

@@ -17,6 +17,7 @@ pub mod obligations;
 mod parameter;
 pub mod reduction;
 pub mod soundness;
+pub mod parametrize;
 mod stn_plan;
 mod suggestion;
 #[cfg(test)]
