@@ -5,11 +5,17 @@ use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
 use std::sync::Arc;
 
+use elbowroom::PlanKind;
 use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
+use elbowroom::plan::ParametrizedPlan;
+use elbowroom::plan::format::{self, FormatErrors};
+use elbowroom::plan::parametrize::VarySpec;
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
+use crate::look::{BAD, styled};
 use crate::output::{self, plain};
 
 /// Larger than any plan or problem, smaller than memory.
@@ -30,6 +36,63 @@ pub(crate) fn time_triggered_plan(
 ) -> Result<TimeTriggeredPlan, Failure> {
     let text = source(path, "plan")?;
     with_warnings(pddl::read_plan(&text, task))
+}
+
+/// Reads a plan of either kind, and leaves open what `vary` says.
+pub(crate) fn parametrized_plan(
+    task: &mut Task,
+    path: &Path,
+    vary: &[String],
+    epsilon: &Rational,
+) -> Result<ParametrizedPlan, Failure> {
+    let specs = vary
+        .iter()
+        .map(|text| text.parse::<VarySpec>())
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| Failure::new(error, ""))?;
+    let text = source(path, "plan")?;
+    let is_stn_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("stn"))
+        || PlanKind::of_text(text.text()) == PlanKind::Stn;
+    if is_stn_file {
+        let plan = format::read(text.text().as_bytes(), task)
+            .map_err(|errors| Failure::rendered(stn_mistakes(&text, &errors)))?;
+        return elbowroom::vary_stn_plan(task, plan, &specs)
+            .map_err(|error| Failure::new(error, ""));
+    }
+    let plan = with_warnings(pddl::read_plan(&text, task))?;
+    elbowroom::leave_room(task, &plan, &specs, epsilon).map_err(|error| Failure::new(error, ""))
+}
+
+/// The mistakes in an STN plan file, with excerpts.
+fn stn_mistakes(text: &Source, errors: &FormatErrors) -> String {
+    let mut shown = String::new();
+    for error in &errors.errors {
+        let line = error.line.to_string();
+        let margin = " ".repeat(line.len());
+        let carets = "^".repeat(error.length.max(1));
+        let offset = " ".repeat(error.column.saturating_sub(1));
+        shown.push_str(&format!(
+            "{}: {}\n{margin}--> {}:{}:{}\n",
+            styled(BAD, "error"),
+            error.message,
+            text.name(),
+            error.line,
+            error.column,
+        ));
+        // An excerpt of a long line does not start at its first column.
+        if error.column <= error.excerpt.chars().count() + 1 {
+            let expected = error.expected.as_deref().unwrap_or_default();
+            shown.push_str(&format!(
+                "{margin} |\n{line} | {}\n{margin} | {offset}{carets} {expected}\n",
+                error.excerpt
+            ));
+        } else if let Some(expected) = &error.expected {
+            shown.push_str(&format!("{margin} = {expected}\n"));
+        }
+        shown.push('\n');
+    }
+    shown.push_str(&output::counted(errors.errors.len(), "error"));
+    shown
 }
 
 /// Reads a text file, or standard input for `-`.
@@ -122,14 +185,7 @@ pub(crate) fn with_warnings<T>(
         Err(diagnostics) => Err(Failure::rendered(format!(
             "{}\n\n{}",
             diagnostics.render(true),
-            count(diagnostics.errors().count())
+            output::counted(diagnostics.errors().count(), "error")
         ))),
-    }
-}
-
-fn count(errors: usize) -> String {
-    match errors {
-        1 => "1 error".to_owned(),
-        many => format!("{many} errors"),
     }
 }

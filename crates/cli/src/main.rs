@@ -10,11 +10,13 @@ mod clock;
 mod commands;
 mod exit;
 mod input;
+mod interrupt;
 mod json;
 mod limits;
 mod look;
 mod number;
 mod output;
+mod progress;
 mod table;
 
 use std::process::ExitCode;
@@ -29,7 +31,7 @@ fn main() -> ExitCode {
     let answer = match CommandLine::parse().command {
         Command::Check(arguments) => commands::check::run(&arguments),
         Command::Stn(_) => todo!(),
-        Command::Envelope(_) => todo!(),
+        Command::Envelope(arguments) => commands::envelope::run(&arguments),
     };
     let exit = answer.unwrap_or_else(|failure| {
         output::tell(&failure.to_string());

@@ -52,6 +52,12 @@ fn survive(result: io::Result<()>, target: &str) -> Result<(), Failure> {
     }
 }
 
+/// `1 check`, `2 checks`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
 /// The error without the number that the operating system gives it.
 pub(crate) fn plain(error: &io::Error) -> String {
     let text = error.to_string();

@@ -120,7 +120,7 @@ impl<'a> Explainer<'a> {
         };
         let mut times = example.schedule.clone();
         times.extend(example.moment.clone());
-        let value = inequality.expression.evaluate(&times, &example.valuation);
+        let value = inequality.expression.value(&times, &example.valuation);
         Some(value.abs())
     }
 
@@ -202,6 +202,3 @@ impl<'a> Explainer<'a> {
         &self.plan.plan.instance(id).action.name
     }
 }
-
-#[cfg(test)]
-mod tests;

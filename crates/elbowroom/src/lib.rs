@@ -1,6 +1,8 @@
 //! Elbowroom.
 
 mod box_text;
+mod explain;
+mod makespan;
 mod plan_file;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
@@ -10,4 +12,6 @@ pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
 pub use elbowroom_stn as stn;
+pub use explain::{Explainer, Explanation};
+pub use makespan::earliest_end;
 pub use plan_file::PlanKind;

@@ -42,12 +42,15 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
             origins.push(Origin::AtMost(constraint));
         }
     }
-    let walked: Vec<Origin<'_>> = cycle
+    let mut walked: Vec<Origin<'_>> = cycle
         .constraints
         .iter()
         .map(|id| origins[id.index()])
         .collect();
-    // Walking a cycle goes back in time along what takes long; people read forwards.
+    // Walking a cycle goes back in time along what takes long; people read forwards, from the
+    // first of what must fit to the last.
+    let first_room = walked.iter().position(|o| matches!(o, Origin::AtMost(_)));
+    walked.rotate_left(first_room.unwrap_or(0));
     let mut needs: Vec<String> = Vec::new();
     let mut rooms: Vec<String> = Vec::new();
     for (position, origin) in walked.iter().enumerate() {
