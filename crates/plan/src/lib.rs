@@ -11,9 +11,13 @@
 mod decoupled;
 mod durations;
 pub mod format;
+pub mod linear;
 mod network;
+pub mod obligations;
 mod parameter;
 pub mod parametrize;
+pub mod reduction;
+pub mod soundness;
 mod stn_plan;
 mod suggestion;
 #[cfg(test)]

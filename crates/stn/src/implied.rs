@@ -161,31 +161,22 @@ impl<W: Weight> Search<'_, W> {
             for (id, target) in self.edges_out_of(source) {
                 edges_by_target.entry(target).or_default().push(id);
             }
-            let all = edges_by_target.values().flatten();
-            let Some(limit) = all.map(|id| &self.slack[id.index()]).max().cloned() else {
-                continue;
-            };
-            reach.explore(self, source, &limit);
+            reach.look_for_detours(self, source, &edges_by_target);
             for (target, edges) in edges_by_target {
-                self.thin_out(
-                    edges,
-                    reach.distance[target].as_ref(),
-                    reach.has_detour[target],
-                );
+                self.thin_out(edges, reach.has_detour[target]);
             }
         }
     }
 
     /// Of the edges between two groups, keeps the oldest shortest one if there is no detour.
-    fn thin_out(&mut self, mut edges: Vec<ConstraintId>, distance: Option<&W>, has_detour: bool) {
-        let is_shortest = |id: &ConstraintId| Some(&self.slack[id.index()]) == distance;
-        edges.sort_unstable();
-        let stays = |id: &&ConstraintId| !self.can_go[id.index()] && is_shortest(id);
-        let needed = if has_detour || edges.iter().any(|id| stays(&id)) {
-            None
-        } else {
-            edges.iter().copied().find(is_shortest)
-        };
+    fn thin_out(&mut self, mut edges: Vec<ConstraintId>, has_detour: bool) {
+        // What cannot go counts as older than the rest: it makes the others superfluous.
+        edges.sort_unstable_by_key(|id| (self.can_go[id.index()], *id));
+        let shortest = edges
+            .iter()
+            .min_by_key(|id| &self.slack[id.index()])
+            .copied();
+        let needed = shortest.filter(|_| !has_detour);
         for id in edges {
             if self.can_go[id.index()] && Some(id) != needed {
                 self.is_gone[id.index()] = true;
@@ -211,8 +202,9 @@ impl<W: Weight> Search<'_, W> {
 
 /// The groups near a source, kept between searches to spare allocations.
 struct Reach<W> {
-    distance: Vec<Option<W>>,
-    /// Whether a shortest path of two or more edges leads to a group.
+    /// The length of the shortest path found.
+    length: Vec<Option<W>>,
+    /// Whether a path of two or more edges is at least as short as the shortest single edge.
     has_detour: Vec<bool>,
     is_final: Vec<bool>,
     touched: Vec<usize>,
@@ -222,7 +214,7 @@ struct Reach<W> {
 impl<W: Weight> Reach<W> {
     fn new(group_count: usize) -> Self {
         Self {
-            distance: vec![None; group_count],
+            length: vec![None; group_count],
             has_detour: vec![false; group_count],
             is_final: vec![false; group_count],
             touched: Vec::new(),
@@ -230,40 +222,72 @@ impl<W: Weight> Reach<W> {
         }
     }
 
-    /// Dijkstra's algorithm, exact for all groups not farther away than `limit`.
-    fn explore(&mut self, search: &Search<'_, W>, source: usize, limit: &W) {
-        for group in self.touched.drain(..) {
-            self.distance[group] = None;
-            self.has_detour[group] = false;
-            self.is_final[group] = false;
-        }
-        self.queue.clear();
+    /// Dijkstra's algorithm from `source`, as far as needed to know which of its edges have a
+    /// detour.
+    fn look_for_detours(
+        &mut self,
+        search: &Search<'_, W>,
+        source: usize,
+        edges_by_target: &BTreeMap<usize, Vec<ConstraintId>>,
+    ) {
+        self.clear();
+        self.is_final[source] = true;
         self.touched.push(source);
-        self.distance[source] = Some(W::zero());
-        self.queue.push(Reverse((W::zero(), source)));
+        let mut open: Vec<(W, usize)> = Vec::new();
+        for (&target, edges) in edges_by_target {
+            let lengths = edges.iter().map(|id| &search.slack[id.index()]);
+            let Some(shortest) = lengths.min() else {
+                continue;
+            };
+            self.reach(target, shortest.clone());
+            if edges.iter().any(|id| search.can_go[id.index()]) {
+                open.push((shortest.clone(), target));
+            }
+        }
+        open.sort_unstable();
         while let Some(Reverse((length, group))) = self.queue.pop() {
+            while open
+                .pop_if(|(_, target)| self.has_detour[*target])
+                .is_some()
+            {}
+            let Some((limit, _)) = open.last() else {
+                return;
+            };
+            if length > *limit {
+                return;
+            }
             if std::mem::replace(&mut self.is_final[group], true) {
                 continue;
             }
             for (id, target) in search.edges_out_of(group) {
-                let distance = length.plus(&search.slack[id.index()]);
-                if distance > *limit {
+                let longer = length.plus(&search.slack[id.index()]);
+                if target == source || longer > *limit {
                     continue;
                 }
-                let old = &self.distance[target];
-                if old.as_ref().is_some_and(|old| distance > *old) {
-                    continue;
-                }
-                let is_tie = old.as_ref() == Some(&distance);
-                self.has_detour[target] = (is_tie && self.has_detour[target]) || group != source;
-                if !is_tie {
-                    if old.is_none() {
-                        self.touched.push(target);
+                match &self.length[target] {
+                    Some(old) if longer > *old => {}
+                    Some(old) if longer == *old => self.has_detour[target] = true,
+                    _ => {
+                        self.has_detour[target] = true;
+                        self.reach(target, longer);
                     }
-                    self.distance[target] = Some(distance.clone());
-                    self.queue.push(Reverse((distance, target)));
                 }
             }
         }
+    }
+
+    fn reach(&mut self, group: usize, length: W) {
+        self.touched.push(group);
+        self.length[group] = Some(length.clone());
+        self.queue.push(Reverse((length, group)));
+    }
+
+    fn clear(&mut self) {
+        for group in self.touched.drain(..) {
+            self.length[group] = None;
+            self.has_detour[group] = false;
+            self.is_final[group] = false;
+        }
+        self.queue.clear();
     }
 }
