@@ -1,0 +1,46 @@
+//! Boxes: an interval for each parameter.
+
+use elbowroom_num::{Interval, Rational};
+
+use crate::parameter::{ParameterId, Valuation};
+
+/// An interval for each parameter, by position (ρ in paper 1, definition 3).
+///
+/// As a type it is only a box. That the plan is guaranteed to work in all of it is what
+/// `elbowroom-envelope` establishes.
+#[doc(alias = "DRE")]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DecoupledEnvelope {
+    /// One interval for each parameter; ends are closed or infinite.
+    pub intervals: Vec<Interval>,
+}
+
+impl DecoupledEnvelope {
+    /// The box that holds one valuation only.
+    pub fn point(valuation: &[Rational]) -> Self {
+        Self {
+            intervals: valuation.iter().cloned().map(Interval::point).collect(),
+        }
+    }
+
+    /// The interval of a parameter.
+    pub fn interval(&self, id: ParameterId) -> &Interval {
+        &self.intervals[id.index()]
+    }
+
+    /// Whether the valuation lies in the box.
+    pub fn contains(&self, valuation: &Valuation) -> bool {
+        self.intervals
+            .iter()
+            .zip(valuation)
+            .all(|(interval, value)| interval.contains(value))
+    }
+
+    /// Whether every valuation of `other` lies in this box (`other` not empty).
+    pub fn includes(&self, other: &Self) -> bool {
+        self.intervals
+            .iter()
+            .zip(&other.intervals)
+            .all(|(mine, theirs)| mine.intersection(theirs) == *theirs)
+    }
+}

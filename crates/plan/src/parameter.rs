@@ -1,0 +1,122 @@
+//! What is left open in a plan.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::FluentId;
+use elbowroom_num::{Interval, Rational};
+
+use crate::stn_plan::{InstanceId, StnPlan};
+
+/// A parameter of a [`ParametrizedPlan`], by position in its list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ParameterId(pub u32);
+
+impl ParameterId {
+    /// The position in [`ParametrizedPlan::parameters`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl From<usize> for ParameterId {
+    fn from(index: usize) -> Self {
+        Self(u32::try_from(index).expect("fewer than 2^32 parameters"))
+    }
+}
+
+/// A quantity left open (γ in paper 1).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Unique in its plan.
+    pub name: String,
+    /// Which quantity it is.
+    pub kind: ParameterKind,
+    /// The value in the original plan (π(γ) in paper 1).
+    pub nominal: Rational,
+    /// How strongly a search should favour it (ω in paper 1).
+    pub weight: Rational,
+    /// The values it can take at all; no interval found for it goes beyond.
+    pub range: Interval,
+}
+
+/// Which quantity a parameter stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// The duration of an action instance. The domain's duration constraints no longer bind it.
+    Duration(InstanceId),
+    /// A constant in an action instance: an effect, a condition, a rate.
+    Constant(InstanceId),
+    /// A number of the domain, the same wherever it occurs.
+    Domain,
+    /// The value of a fluent at time 0.
+    Initial(FluentId),
+    /// The time of a group of timed initials: an index into [`Task::timed`].
+    Timed(usize),
+    /// A bound between two other time points of an STN plan file.
+    Bound,
+}
+
+/// An STN plan some of whose numbers are parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParametrizedPlan {
+    /// The plan; its bounds and its actions' expressions may mention parameters.
+    pub plan: StnPlan,
+    /// The parameters.
+    pub parameters: Vec<Parameter>,
+    /// Initial values that are parameters.
+    pub initial: BTreeMap<FluentId, ParameterId>,
+}
+
+/// A value for each parameter, by position.
+pub type Valuation = Vec<Rational>;
+
+impl ParametrizedPlan {
+    /// A plan in which nothing is left open.
+    pub fn closed(plan: StnPlan) -> Self {
+        Self {
+            plan,
+            parameters: Vec::new(),
+            initial: BTreeMap::new(),
+        }
+    }
+
+    /// The parameter of that id.
+    pub fn parameter(&self, id: ParameterId) -> &Parameter {
+        &self.parameters[id.index()]
+    }
+
+    /// The parameter of that name.
+    pub fn find(&self, name: &str) -> Option<ParameterId> {
+        self.parameters
+            .iter()
+            .position(|p| p.name == name)
+            .map(ParameterId::from)
+    }
+
+    /// The nominal values.
+    pub fn nominal(&self) -> Valuation {
+        self.parameters
+            .iter()
+            .map(|parameter| parameter.nominal.clone())
+            .collect()
+    }
+
+    /// The quantity in plain words: `duration of (move a b)`.
+    pub fn describe(&self, task: &Task, id: ParameterId) -> String {
+        let action = |instance: InstanceId| self.plan.instance(instance).action.name.clone();
+        match self.parameter(id).kind {
+            ParameterKind::Duration(instance) => format!("duration of {}", action(instance)),
+            ParameterKind::Constant(instance) => format!("number in {}", action(instance)),
+            ParameterKind::Domain => "number of the domain".to_owned(),
+            ParameterKind::Initial(fluent) => format!("initial {}", task.fluent_name(fluent)),
+            ParameterKind::Timed(index) => {
+                format!(
+                    "time of the timed initials at {}",
+                    task.timed()[index].time.to_decimal(3)
+                )
+            }
+            ParameterKind::Bound => "bound between two time points".to_owned(),
+        }
+    }
+}

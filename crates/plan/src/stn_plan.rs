@@ -1,0 +1,236 @@
+//! The STN plan: time points and bounds on their differences.
+
+use elbowroom_model::ground::{Action, Body};
+use elbowroom_model::{Footprint, Task};
+use elbowroom_num::Rational;
+
+use crate::parameter::ParameterId;
+
+/// A time point of an [`StnPlan`], by position in [`StnPlan::nodes`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// The start of the plan, time 0; always the first node.
+    pub const ZERO: Self = Self(0);
+
+    /// The position in [`StnPlan::nodes`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl From<usize> for NodeId {
+    fn from(index: usize) -> Self {
+        Self(u32::try_from(index).expect("fewer than 2^32 time points"))
+    }
+}
+
+/// An action instance of an [`StnPlan`], by position in [`StnPlan::instances`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct InstanceId(pub u32);
+
+impl InstanceId {
+    /// The position in [`StnPlan::instances`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl From<usize> for InstanceId {
+    fn from(index: usize) -> Self {
+        Self(u32::try_from(index).expect("fewer than 2^32 action instances"))
+    }
+}
+
+/// What happens at a time point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Node {
+    /// The plan begins; time 0.
+    Zero,
+    /// A durative action starts.
+    Start(InstanceId),
+    /// A durative action ends.
+    End(InstanceId),
+    /// An instantaneous action happens.
+    Instant(InstanceId),
+    /// The timed initials of one time happen: an index into [`Task::timed`].
+    Timed(usize),
+}
+
+/// An action of the plan, with the name by which constraints refer to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// `n0`, `refuel_2`, …; unique in its plan.
+    pub label: String,
+    /// What is done. Numbers left open are `Expression::Unknown(Unknown::Parameter(_))`.
+    pub action: Action,
+}
+
+/// One side of a [`Constraint`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// No limit.
+    Infinite,
+    /// A number.
+    Finite(Rational),
+    /// The value of a parameter.
+    Parameter(ParameterId),
+}
+
+impl From<Rational> for Bound {
+    fn from(value: Rational) -> Self {
+        Self::Finite(value)
+    }
+}
+
+/// `lower <= to - from <= upper`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Constraint {
+    /// The time point subtracted.
+    pub from: NodeId,
+    /// The time point it is subtracted from.
+    pub to: NodeId,
+    /// Least difference; [`Bound::Infinite`] means minus infinity.
+    pub lower: Bound,
+    /// Greatest difference.
+    pub upper: Bound,
+    /// Why the constraint is there.
+    pub reason: Reason,
+}
+
+/// Why a constraint of a plan is there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// An STN plan file says so.
+    Given,
+    /// The duration of an action, from its domain.
+    Duration(InstanceId),
+    /// A timed initial falls at a fixed time.
+    Timed(usize),
+    /// The two happenings interfere and keep their order.
+    Interference,
+    /// One of the happenings writes what an over-all condition of the other's action reads.
+    OverAll,
+    /// Fixed as in the original plan, because numeric conditions leave no other choice.
+    Pinned,
+}
+
+/// A plan as a simple temporal network: nodes with meanings, and constraints between them.
+///
+/// Besides the constraints listed, every node is at time 0 or later.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StnPlan {
+    /// The actions.
+    pub instances: Vec<Instance>,
+    /// The time points; the first is [`Node::Zero`].
+    pub nodes: Vec<Node>,
+    /// Bounds on differences of time points.
+    pub constraints: Vec<Constraint>,
+}
+
+impl StnPlan {
+    /// The plan of these instances without any constraint but those that fix the timed initials.
+    ///
+    /// Nodes: zero, then each instance's start and end, or instant, in order, then the timed
+    /// initials in order of time.
+    pub fn unconstrained(task: &Task, instances: Vec<Instance>) -> Self {
+        let mut nodes = vec![Node::Zero];
+        for (index, instance) in instances.iter().enumerate() {
+            let id = InstanceId::from(index);
+            match instance.action.body {
+                Body::Instantaneous(_) => nodes.push(Node::Instant(id)),
+                Body::Durative(_) => nodes.extend([Node::Start(id), Node::End(id)]),
+            }
+        }
+        let mut constraints = Vec::new();
+        for (index, timed) in task.timed().iter().enumerate() {
+            constraints.push(Constraint {
+                from: NodeId::ZERO,
+                to: NodeId::from(nodes.len()),
+                lower: Bound::Finite(timed.time.clone()),
+                upper: Bound::Finite(timed.time.clone()),
+                reason: Reason::Timed(index),
+            });
+            nodes.push(Node::Timed(index));
+        }
+        Self {
+            instances,
+            nodes,
+            constraints,
+        }
+    }
+
+    /// The instance of that id.
+    pub fn instance(&self, id: InstanceId) -> &Instance {
+        &self.instances[id.index()]
+    }
+
+    /// The node at which the instance starts, or happens.
+    pub fn start(&self, id: InstanceId) -> NodeId {
+        self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))
+    }
+
+    /// The node at which the instance ends, or happens.
+    pub fn end(&self, id: InstanceId) -> NodeId {
+        self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
+    }
+
+    /// The node of a group of timed initials.
+    pub fn timed(&self, index: usize) -> NodeId {
+        self.node_where(|node| node == Node::Timed(index))
+    }
+
+    fn node_where(&self, is_it: impl Fn(Node) -> bool) -> NodeId {
+        let index = self.nodes.iter().position(|&node| is_it(node));
+        NodeId::from(index.expect("every instance and timed initial has its nodes"))
+    }
+
+    /// All nodes with their meaning.
+    pub fn nodes(&self) -> impl Iterator<Item = (NodeId, Node)> + '_ {
+        self.nodes
+            .iter()
+            .enumerate()
+            .map(|(index, &node)| (NodeId::from(index), node))
+    }
+
+    /// How STN plan files call the node: `.zero`, `n0.start`, `n0.end`, `r`. Timed initials, which
+    /// such files do not mention, are `.timed` and their position.
+    pub fn node_label(&self, node: NodeId) -> String {
+        match self.nodes[node.index()] {
+            Node::Zero => ".zero".to_owned(),
+            Node::Start(id) => format!("{}.start", self.instance(id).label),
+            Node::End(id) => format!("{}.end", self.instance(id).label),
+            Node::Instant(id) => self.instance(id).label.clone(),
+            Node::Timed(index) => format!(".timed{index}"),
+        }
+    }
+
+    /// The node in words: `start of (move a b)`, `(open w) becomes false`.
+    pub fn node_words(&self, task: &Task, node: NodeId) -> String {
+        match self.nodes[node.index()] {
+            Node::Zero => "the beginning of the plan".to_owned(),
+            Node::Start(id) => format!("start of {}", self.instance(id).action.name),
+            Node::End(id) => format!("end of {}", self.instance(id).action.name),
+            Node::Instant(id) => self.instance(id).action.name.clone(),
+            Node::Timed(index) => {
+                format!(
+                    "timed initials at {}",
+                    task.timed()[index].time.to_decimal(3)
+                )
+            }
+        }
+    }
+
+    /// What happens at the node reads and writes.
+    pub fn footprint(&self, task: &Task, node: NodeId) -> Footprint {
+        match self.nodes[node.index()] {
+            Node::Zero => Footprint::default(),
+            Node::Start(id) | Node::Instant(id) => {
+                Footprint::of_start(task, &self.instance(id).action)
+            }
+            Node::End(id) => Footprint::of_end(task, &self.instance(id).action),
+            Node::Timed(index) => Footprint::of_timed(&task.timed()[index]),
+        }
+    }
+}
