@@ -1,0 +1,101 @@
+//! Features of PDDL that are understood but not executed.
+
+/// A feature that is refused, or ignored with a warning where it cannot affect validity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Feature {
+    /// PDDL+ `:process`
+    Processes,
+    /// PDDL+ `:event`
+    Events,
+    /// PDDL+ `:constraint`
+    GlobalConstraints,
+    /// Functions whose values are objects (PDDL 3.1)
+    ObjectFluents,
+    /// `:control` parameters
+    ControlParameters,
+    /// `:constraints` on the trajectory (PDDL 3)
+    TrajectoryConstraints,
+    /// `preference`, `is-violated` (PDDL 3)
+    Preferences,
+    /// Continuous change that is not linear in `#t`
+    NonlinearTime,
+    /// `<` and `>` on `?duration`
+    StrictDurations,
+    /// `or`, `not`, `exists` over conditions read at different times
+    MixedTimes,
+    /// `:modules` with external code
+    Modules,
+    /// Sections that say nothing about validity, such as `:length`
+    OtherSections,
+    /// Requirement flags that are not known
+    UnknownRequirements,
+}
+
+impl Feature {
+    /// All of them, in the order in which documents list them.
+    pub const ALL: &[Self] = &[
+        Self::Processes,
+        Self::Events,
+        Self::GlobalConstraints,
+        Self::ObjectFluents,
+        Self::ControlParameters,
+        Self::TrajectoryConstraints,
+        Self::Preferences,
+        Self::NonlinearTime,
+        Self::StrictDurations,
+        Self::MixedTimes,
+        Self::Modules,
+        Self::OtherSections,
+        Self::UnknownRequirements,
+    ];
+
+    /// What the feature is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Processes => "processes",
+            Self::Events => "events",
+            Self::GlobalConstraints => "global constraints",
+            Self::ObjectFluents => "object fluents",
+            Self::ControlParameters => "control parameters",
+            Self::TrajectoryConstraints => "trajectory constraints",
+            Self::Preferences => "preferences",
+            Self::NonlinearTime => "change not linear in #t",
+            Self::StrictDurations => "strict duration bounds",
+            Self::MixedTimes => "disjunction over several times",
+            Self::Modules => "modules",
+            Self::OtherSections => "other sections",
+            Self::UnknownRequirements => "unknown requirements",
+        }
+    }
+
+    /// How it is written, and what becomes of it.
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Processes => "PDDL+ `:process`: refused",
+            Self::Events => "PDDL+ `:event`: refused",
+            Self::GlobalConstraints => "PDDL+ `:constraint`: refused",
+            Self::ObjectFluents => "functions whose values are objects (PDDL 3.1): refused",
+            Self::ControlParameters => {
+                "`:control` parameters, numbers the planner chooses: refused; \
+                 see `:synth-parameters` for numbers that stay open"
+            }
+            Self::TrajectoryConstraints => {
+                "`:constraints` (PDDL 3): refused, unless all of them are preferences"
+            }
+            Self::Preferences => {
+                "`preference`, `is-violated` (PDDL 3): ignored with a warning, \
+                 because a preference never makes a plan invalid"
+            }
+            Self::NonlinearTime => "a product of two `#t`, a division by `#t`: refused",
+            Self::StrictDurations => "`(< ?duration …)`, `(> ?duration …)`: refused",
+            Self::MixedTimes => {
+                "`or`, `not`, `imply`, `exists` over parts with different time specifiers: refused"
+            }
+            Self::Modules => "`:modules`, external code (TFD/M): refused",
+            Self::OtherSections => {
+                "`:length`, `:time` and unknown sections: ignored with a warning"
+            }
+            Self::UnknownRequirements => "requirement flags not known: ignored with a warning",
+        }
+    }
+}

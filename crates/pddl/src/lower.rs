@@ -1,0 +1,92 @@
+//! From nested lists to the model.
+
+mod action;
+mod condition;
+mod constraints;
+mod continuous;
+mod declarations;
+mod derived;
+mod domain;
+mod duration;
+mod effect;
+mod expression;
+mod hierarchy;
+mod init;
+mod names;
+mod objective;
+mod scope;
+mod sections;
+mod shift;
+mod stratify;
+mod term;
+mod timed;
+mod typed_list;
+
+use std::rc::Rc;
+
+use elbowroom_model::Problem;
+use elbowroom_model::problem::TypeId;
+
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::lower::names::Names;
+use crate::lower::sections::Sections;
+use crate::report::Report;
+use crate::source::{FileId, Source, Span};
+use crate::syntax;
+
+/// Reads a planning problem from the texts of its domain and problem files.
+///
+/// Returns the problem with the warnings, if any.
+///
+/// # Errors
+/// When the texts contain mistakes, or features that are not executed
+/// ([`Diagnostics::is_unsupported`]). All that were found are in the diagnostics, and the
+/// warnings too.
+pub fn read_problem(
+    domain: &Source,
+    problem: &Source,
+) -> Result<(Problem, Vec<Diagnostic>), Diagnostics> {
+    let mut reader = Reader::new(domain, problem);
+    let domain = syntax::parse(FileId::Domain, domain.text(), &mut reader.report);
+    let problem = syntax::parse(FileId::Problem, problem.text(), &mut reader.report);
+    let domain = Sections::find(FileId::Domain, &domain, &mut reader.report);
+    let problem = Sections::find(FileId::Problem, &problem, &mut reader.report);
+    if let Some(domain) = &domain {
+        reader.domain(domain);
+        if let Some(problem) = &problem {
+            reader.problem(problem);
+        }
+    }
+    reader.finish()
+}
+
+/// The problem as far as it is read, with what is needed to read on.
+///
+/// After a mistake, reading goes on with some harmless value in the place of what is wrong: the
+/// outcome is an error anyway, and further mistakes are worth reporting.
+struct Reader {
+    report: Report,
+    problem: Problem,
+    names: Names,
+    /// How much text was copied because it stands around more than one effect.
+    copied: usize,
+    /// The types resolved last.
+    resolved_types: Option<(Rc<[(String, Span)]>, Vec<TypeId>)>,
+}
+
+impl Reader {
+    fn new(domain: &Source, problem: &Source) -> Self {
+        Self {
+            report: Report::new(domain, problem),
+            problem: Problem::default(),
+            names: Names::default(),
+            copied: 0,
+            resolved_types: None,
+        }
+    }
+
+    fn finish(self) -> Result<(Problem, Vec<Diagnostic>), Diagnostics> {
+        let problem = (!self.report.is_failed()).then_some(self.problem);
+        Diagnostics::outcome(problem, self.report.into_diagnostics())
+    }
+}

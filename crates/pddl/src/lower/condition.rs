@@ -1,0 +1,215 @@
+//! Conditions without time specifiers.
+
+use elbowroom_model::problem::{Comparison, Condition};
+
+use crate::feature::Feature;
+use crate::lower::Reader;
+use crate::lower::expression::number;
+use crate::lower::scope::Scope;
+use crate::lower::timed::time_specifier;
+use crate::syntax::Node;
+
+impl Reader {
+    /// A condition on one state.
+    pub(super) fn condition(&mut self, node: &Node, scope: &mut Scope) -> Condition {
+        if node.is_empty_list() {
+            return Condition::TRUE;
+        }
+        let Some((head, parts)) = node.form() else {
+            self.report
+                .error(node.span, format!("unexpected `{}`", node.quote()))
+                .help("expected a condition such as `(predicate argument …)` or `(and …)`");
+            return Condition::TRUE;
+        };
+        if let Some(comparison) = comparison(&head) {
+            return self.comparison(comparison, node, parts, scope);
+        }
+        if self.names.predicates.contains_key(head.as_ref()) && !is_connective(&head) {
+            return self
+                .atom(node, scope)
+                .map_or(Condition::TRUE, Condition::Atom);
+        }
+        match (head.as_ref(), parts) {
+            ("and", _) => Condition::And(self.conditions(parts, scope)),
+            ("or", _) => {
+                without_preferences(scope, |scope| Condition::Or(self.conditions(parts, scope)))
+            }
+            ("not", [part]) => without_preferences(scope, |scope| {
+                Condition::Not(Box::new(self.condition(part, scope)))
+            }),
+            ("imply", [premise, conclusion]) => without_preferences(scope, |scope| {
+                Condition::Or(vec![
+                    Condition::Not(Box::new(self.condition(premise, scope))),
+                    self.condition(conclusion, scope),
+                ])
+            }),
+            ("exists", [variables, part]) => without_preferences(scope, |scope| {
+                let (variables, part) = self.quantified(variables, part, scope);
+                Condition::Exists(variables, Box::new(part))
+            }),
+            ("forall", [variables, part]) => {
+                let (variables, part) = self.quantified(variables, part, scope);
+                if part.is_trivial() {
+                    part
+                } else {
+                    Condition::Forall(variables, Box::new(part))
+                }
+            }
+            ("not" | "imply" | "exists" | "forall", _) => {
+                self.wrong_parts(&head, node);
+                Condition::TRUE
+            }
+            ("preference", _) => {
+                self.preference(node, scope);
+                Condition::TRUE
+            }
+            _ if time_specifier(node).is_some() => {
+                self.report
+                    .error(
+                        node.span,
+                        format!("`{}` does not belong here", node.quote()),
+                    )
+                    .help("time specifiers belong into durative actions, and do not nest");
+                Condition::TRUE
+            }
+            _ => self
+                .atom(node, scope)
+                .map_or(Condition::TRUE, Condition::Atom),
+        }
+    }
+
+    fn conditions(&mut self, parts: &[Node], scope: &mut Scope) -> Vec<Condition> {
+        parts
+            .iter()
+            .map(|part| self.condition(part, scope))
+            .filter(|part| !part.is_trivial())
+            .collect()
+    }
+
+    fn quantified(
+        &mut self,
+        variables: &Node,
+        part: &Node,
+        scope: &mut Scope,
+    ) -> (Vec<elbowroom_model::problem::Variable>, Condition) {
+        let variables = self.variable_list(variables);
+        let outside = scope.variables.len();
+        scope.variables.extend(variables.iter().cloned());
+        let part = self.condition(part, scope);
+        scope.variables.truncate(outside);
+        (variables, part)
+    }
+
+    /// `(< a b)`, or `(= a b)` of numbers or of objects.
+    fn comparison(
+        &mut self,
+        comparison: Comparison,
+        node: &Node,
+        operands: &[Node],
+        scope: &Scope,
+    ) -> Condition {
+        let [left, right] = operands else {
+            self.report
+                .error(
+                    node.span,
+                    format!("`{}` takes two operands", comparison.symbol()),
+                )
+                .help(format!("expected `({} a b)`", comparison.symbol()));
+            return Condition::TRUE;
+        };
+        if comparison == Comparison::Equal {
+            let is_object = |node: &Node| self.is_term(node, scope);
+            if is_object(left) && (is_object(right) || !self.is_number(right, scope))
+                || is_object(right) && !self.is_number(left, scope)
+            {
+                return match (self.term(left, scope), self.term(right, scope)) {
+                    (Some(left), Some(right)) => Condition::Equal(left, right),
+                    _ => Condition::TRUE,
+                };
+            }
+        }
+        Condition::Compare(
+            comparison,
+            self.expression(left, scope),
+            self.expression(right, scope),
+        )
+    }
+
+    /// Whether a word denotes an object here.
+    fn is_term(&self, node: &Node, scope: &Scope) -> bool {
+        node.lower().is_some_and(|word| {
+            scope.variable(&word).is_some()
+                || self.names.objects.contains_key(word.as_ref())
+                    && !self.names.functions.contains_key(word.as_ref())
+        })
+    }
+
+    /// Whether something can only be a number here.
+    fn is_number(&self, node: &Node, scope: &Scope) -> bool {
+        match node.lower() {
+            Some(word) => {
+                number(node).is_some()
+                    || word == "?duration"
+                    || scope.unknown(&word).is_some()
+                    || self.names.functions.contains_key(word.as_ref())
+                    || self.problem.unknowns.contains(&word.into_owned())
+            }
+            None => node
+                .form()
+                .is_some_and(|(head, _)| !self.names.object_functions.contains(head.as_ref())),
+        }
+    }
+
+    /// `(preference name condition)`: need not hold.
+    pub(super) fn preference(&mut self, node: &Node, scope: &Scope) {
+        if scope.without_preferences > 0 {
+            self.report
+                .error(node.span, "a preference cannot stand here")
+                .help("preferences stand under `and` and `forall` only");
+        } else {
+            self.report.ignored(
+                Feature::Preferences,
+                node.span,
+                "preferences do not make plans invalid, and are ignored",
+            );
+        }
+    }
+
+    /// Reports the wrong number of parts of a connective.
+    pub(super) fn wrong_parts(&mut self, head: &str, node: &Node) {
+        let expected = match head {
+            "imply" => "(imply condition condition)",
+            "exists" => "(exists (?x - type) condition)",
+            "forall" => "(forall (?x - type) …)",
+            "when" => "(when condition effect)",
+            _ => "(not …)",
+        };
+        self.report
+            .error(node.span, format!("`{head}` has the wrong number of parts"))
+            .help(format!("expected `{expected}`"));
+    }
+}
+
+/// Runs `read` where leaving out a preference would change what must hold.
+pub(super) fn without_preferences<T>(scope: &mut Scope, read: impl FnOnce(&mut Scope) -> T) -> T {
+    scope.without_preferences += 1;
+    let read = read(scope);
+    scope.without_preferences -= 1;
+    read
+}
+
+/// The comparison that a symbol denotes.
+pub(super) fn comparison(symbol: &str) -> Option<Comparison> {
+    Some(match symbol {
+        "<" => Comparison::Less,
+        "<=" => Comparison::AtMost,
+        "=" => Comparison::Equal,
+        ">=" => Comparison::AtLeast,
+        ">" => Comparison::Greater,
+        _ => return None,
+    })
+}
+
+fn is_connective(head: &str) -> bool {
+    matches!(head, "and" | "or" | "not" | "imply" | "exists" | "forall")
+}

@@ -1,0 +1,168 @@
+//! Constants, objects, predicates, functions, unknowns.
+
+use elbowroom_model::problem::{Function, FunctionId, Object, ObjectId, Predicate, PredicateId};
+
+use crate::feature::Feature;
+use crate::lower::Reader;
+use crate::lower::sections::Section;
+use crate::source::Span;
+use crate::syntax::Node;
+
+impl Reader {
+    /// `:constants` or `:objects`.
+    pub(super) fn objects(&mut self, section: &Section) {
+        for entry in self.typed_list(section.content) {
+            let Some(name) = entry.node.word() else {
+                self.report
+                    .error(entry.node.span, "expected the name of an object");
+                continue;
+            };
+            if name.starts_with('?') {
+                self.report
+                    .error(entry.node.span, format!("`{name}` is a variable"))
+                    .help("names of objects have no question mark");
+            }
+            let types = self.resolve_types(&entry.types);
+            let key = name.to_ascii_lowercase();
+            if let Some(&id) = self.names.objects.get(&key) {
+                self.redeclare(id, types, name, entry.node.span);
+            } else {
+                let id = ObjectId::from(self.problem.objects.len());
+                self.names.objects.insert(key, id);
+                self.problem.objects.push(Object {
+                    name: name.to_owned(),
+                    types,
+                });
+            }
+        }
+    }
+
+    /// An object declared again: as a constant and as an object, or with one more type.
+    fn redeclare(
+        &mut self,
+        id: ObjectId,
+        types: Vec<elbowroom_model::problem::TypeId>,
+        name: &str,
+        span: Span,
+    ) {
+        self.report
+            .warning(span, format!("`{name}` is declared already"));
+        let own = &mut self.problem.objects[id.index()].types;
+        for ty in types {
+            if !own.contains(&ty) {
+                own.push(ty);
+            }
+        }
+    }
+
+    /// `:predicates`
+    pub(super) fn predicates(&mut self, section: &Section) {
+        for node in section.content {
+            let Some((name, parameters)) = self.declared_head(node) else {
+                continue;
+            };
+            if name == "=" {
+                continue;
+            }
+            let parameters = self.variables(parameters);
+            let same = self.names.predicates.entry(name.clone()).or_default();
+            let again = same.iter().find(|id| {
+                self.problem.predicates[id.index()].parameters.len() == parameters.len()
+            });
+            if let Some(&again) = again {
+                self.report
+                    .warning(node.span, format!("`{name}` is declared already"))
+                    .help("its arguments may be of the types of either declaration");
+                let own = &mut self.problem.predicates[again.index()].parameters;
+                for (own, more) in own.iter_mut().zip(parameters) {
+                    own.types.extend(more.types);
+                    own.types.sort_unstable();
+                    own.types.dedup();
+                }
+            } else {
+                same.push(PredicateId::from(self.problem.predicates.len()));
+                self.problem.predicates.push(Predicate {
+                    name,
+                    parameters,
+                    is_derived: false,
+                });
+            }
+        }
+    }
+
+    /// `:functions`
+    pub(super) fn functions(&mut self, section: &Section) {
+        for entry in self.typed_list(section.content) {
+            let Some((name, parameters)) = self.declared_head(entry.node) else {
+                continue;
+            };
+            if let Some((ty, span)) = entry.types.iter().find(|(ty, _)| ty != "number") {
+                self.report
+                    .unsupported(
+                        Feature::ObjectFluents,
+                        *span,
+                        format!(
+                            "`{name}` has values of type `{ty}`: object fluents are not supported"
+                        ),
+                    )
+                    .help("use a predicate with one more argument");
+                self.names.object_functions.insert(name);
+                continue;
+            }
+            let parameters = self.variables(parameters);
+            let same = self.names.functions.entry(name.clone()).or_default();
+            let again = same
+                .iter()
+                .any(|id| self.problem.functions[id.index()].parameters.len() == parameters.len());
+            if again {
+                self.report
+                    .warning(entry.node.span, format!("`{name}` is declared already"));
+            } else {
+                same.push(FunctionId::from(self.problem.functions.len()));
+                self.problem.functions.push(Function { name, parameters });
+            }
+        }
+    }
+
+    /// `(name parameter …)` of a predicate or function.
+    fn declared_head<'t, 's>(&mut self, node: &'t Node<'s>) -> Option<(String, &'t [Node<'s>])> {
+        if let Some((name, parameters)) = node.form()
+            && !name.starts_with(['?', ':'])
+        {
+            return Some((name.into_owned(), parameters));
+        }
+        self.report
+            .error(node.span, format!("unexpected `{}`", node.quote()))
+            .help("expected `(name ?parameter - type …)`");
+        None
+    }
+
+    /// `:synth-parameters`, of the domain or of an action; perhaps with `- number`.
+    pub(super) fn unknowns(&mut self, nodes: &[Node]) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for entry in self.typed_list(nodes) {
+            let name = entry.node.lower().filter(|name| name.starts_with('?'));
+            match name {
+                Some(name) if names.iter().any(|own| *own == name) => {
+                    self.report
+                        .error(entry.node.span, format!("`{name}` is declared twice"));
+                }
+                Some(name) => names.push(name.into_owned()),
+                None => {
+                    self.report
+                        .error(
+                            entry.node.span,
+                            format!("`{}` cannot be an unknown", entry.node.quote()),
+                        )
+                        .help("expected `?name`");
+                }
+            }
+            if let Some((ty, span)) = entry.types.iter().find(|(ty, _)| ty != "number") {
+                self.report
+                    .error(*span, format!("an unknown of type `{ty}`"))
+                    .help("`:synth-parameters` are numbers");
+            }
+        }
+        names
+    }
+}

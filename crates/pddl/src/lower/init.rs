@@ -1,0 +1,166 @@
+//! `:init`: facts and numbers at time 0, and those that come later.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::problem::{FunctionId, ObjectId, TimedChange, TimedInitial};
+use elbowroom_num::Rational;
+
+use crate::lower::Reader;
+use crate::lower::expression::number;
+use crate::lower::scope::Scope;
+use crate::lower::sections::Section;
+use crate::source::Span;
+use crate::syntax::Node;
+
+/// The place in the list of initial values of each fluent that has one.
+type Valued = BTreeMap<(FunctionId, Vec<ObjectId>), usize>;
+
+impl Reader {
+    /// Reads the initial state and what happens to it.
+    pub(super) fn init(&mut self, section: &Section) {
+        let mut valued = Valued::new();
+        for node in section.content {
+            self.initial(node, &mut valued);
+        }
+    }
+
+    fn initial(&mut self, node: &Node, valued: &mut Valued) {
+        match node.form() {
+            Some((head, parts)) if head == "and" => {
+                for part in parts {
+                    self.initial(part, valued);
+                }
+            }
+            Some((head, [time, content]))
+                if head == "at" && number(time).is_some() && content.list().is_some() =>
+            {
+                self.timed_initial(time, content, valued);
+            }
+            _ => match self.initial_change(node) {
+                // What is not said to be true is false anyway.
+                None | Some(TimedChange::Delete(..)) => {}
+                Some(change) => self.initially(change, node.span, valued),
+            },
+        }
+    }
+
+    /// `(at time (p …))`, `(at time (not (p …)))`, `(at time (= (f …) number))`
+    fn timed_initial(&mut self, time_node: &Node, content: &Node, valued: &mut Valued) {
+        if let Some((head, parts)) = content.form()
+            && head == "and"
+        {
+            for part in parts {
+                self.timed_initial(time_node, part, valued);
+            }
+            return;
+        }
+        let time = number(time_node).unwrap_or_default();
+        if time.is_negative() {
+            self.report
+                .error(time_node.span, "a time before 0")
+                .help("the plan begins at time 0");
+        }
+        let Some(change) = self.initial_change(content) else {
+            return;
+        };
+        if time.is_zero() {
+            self.report.warning(
+                time_node.span,
+                "at time 0: read as part of the initial state",
+            );
+            self.initially(change, content.span, valued);
+        } else {
+            self.problem.timed.push(TimedInitial { time, change });
+        }
+    }
+
+    /// What becomes so, at time 0 or later. `None`, with a report unless an object fluent is
+    /// the reason, if it cannot be understood.
+    fn initial_change(&mut self, node: &Node) -> Option<TimedChange> {
+        let scope = Scope::default();
+        if let Some((head, parts)) = node.form() {
+            match (head.as_ref(), parts) {
+                ("=" | "assign", [fluent, value]) => {
+                    let fluent = self.fluent(fluent, &scope)?;
+                    let value = self.constant(value);
+                    let arguments = Self::objects_only(&fluent.arguments)?;
+                    return Some(TimedChange::Assign(fluent.function, arguments, value));
+                }
+                ("not", [atom]) => {
+                    let (predicate, arguments) = self.initial_fact(atom, &scope)?;
+                    return Some(TimedChange::Delete(predicate, arguments));
+                }
+                ("=" | "assign" | "not" | "increase" | "decrease", _) => {
+                    self.not_initial(node);
+                    return None;
+                }
+                _ => {
+                    let (predicate, arguments) = self.initial_fact(node, &scope)?;
+                    return Some(TimedChange::Add(predicate, arguments));
+                }
+            }
+        }
+        self.not_initial(node);
+        None
+    }
+
+    fn initial_fact(
+        &mut self,
+        node: &Node,
+        scope: &Scope,
+    ) -> Option<(elbowroom_model::problem::PredicateId, Vec<ObjectId>)> {
+        let atom = self.atom(node, scope)?;
+        self.refuse_derived(atom.predicate, node.span);
+        let arguments = Self::objects_only(&atom.arguments)?;
+        Some((atom.predicate, arguments))
+    }
+
+    fn not_initial(&mut self, node: &Node) {
+        self.report
+            .error(node.span, format!("unexpected `{}`", node.quote()))
+            .help(
+                "expected `(predicate object …)`, `(= (function object …) number)`, \
+                 or one of these in `(at time …)`",
+            );
+    }
+
+    fn initially(&mut self, change: TimedChange, span: Span, valued: &mut Valued) {
+        match change {
+            TimedChange::Add(predicate, arguments) => {
+                self.problem.initial_facts.push((predicate, arguments));
+            }
+            TimedChange::Delete(predicate, arguments) => {
+                let deleted = (predicate, arguments);
+                self.problem.initial_facts.retain(|fact| *fact != deleted);
+            }
+            TimedChange::Assign(function, arguments, value) => {
+                self.initially_equal(function, arguments, value, span, valued);
+            }
+        }
+    }
+
+    fn initially_equal(
+        &mut self,
+        function: FunctionId,
+        arguments: Vec<ObjectId>,
+        value: Rational,
+        span: Span,
+        valued: &mut Valued,
+    ) {
+        let values = &mut self.problem.initial_values;
+        match valued.get(&(function, arguments.clone())) {
+            Some(&place) => {
+                if values[place].2 != value {
+                    self.report
+                        .warning(span, "a second initial value of this fluent")
+                        .help("the last one counts");
+                }
+                values[place].2 = value;
+            }
+            None => {
+                valued.insert((function, arguments.clone()), values.len());
+                values.push((function, arguments, value));
+            }
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! The frame of a file: `(define (domain name) (:section …) …)`.
+
+use std::borrow::Cow;
+
+use crate::report::Report;
+use crate::source::{FileId, Span};
+use crate::suggest::nearest;
+use crate::syntax::Node;
+
+/// A file taken apart into its sections.
+#[derive(Debug)]
+pub(super) struct Sections<'t, 's> {
+    /// The name of the domain or problem.
+    pub(super) name: &'s str,
+    /// Where the name stands.
+    pub(super) name_span: Span,
+    sections: Vec<Section<'t, 's>>,
+}
+
+/// One section.
+#[derive(Debug)]
+pub(super) struct Section<'t, 's> {
+    /// Its keyword in lower case.
+    pub(super) keyword: Cow<'s, str>,
+    /// What follows the keyword.
+    pub(super) content: &'t [Node<'s>],
+    /// Where the keyword stands.
+    pub(super) span: Span,
+}
+
+impl<'t, 's> Sections<'t, 's> {
+    /// Finds the frame; `None`, with a report, if there is none.
+    pub(super) fn find(file: FileId, nodes: &'t [Node<'s>], report: &mut Report) -> Option<Self> {
+        let kind = kind(file);
+        let defined = nodes
+            .iter()
+            .position(|node| node.form().is_some_and(|(head, _)| head == "define"));
+        let Some(defined) = defined else {
+            let span = nodes.first().map_or(start_of(file), |node| node.span);
+            report
+                .error(span, format!("this is not a PDDL {kind}"))
+                .help(format!("expected `(define ({kind} name) …)`"));
+            return None;
+        };
+        let (_, content) = nodes[defined].form()?;
+        let Some((name, name_span)) = name(file, content.first(), report) else {
+            if content.is_empty() {
+                report
+                    .error(nodes[defined].span, format!("this {kind} is empty"))
+                    .help(format!("expected `(define ({kind} name) …)`"));
+            }
+            return None;
+        };
+        let mut found = Self {
+            name,
+            name_span,
+            sections: Vec::new(),
+        };
+        for node in &content[1..] {
+            found.add(node, report);
+        }
+        for (index, node) in nodes.iter().enumerate() {
+            if index != defined {
+                found.add_from_outside(node, report);
+            }
+        }
+        Some(found)
+    }
+
+    /// The section of that keyword; a second one is reported.
+    pub(super) fn only(&self, keyword: &str, report: &mut Report) -> Option<&Section<'t, 's>> {
+        let mut same = self.all(keyword);
+        let first = same.next()?;
+        for second in same {
+            report
+                .error(second.span, format!("a second `{keyword}` section"))
+                .help("put everything into one section");
+            let label = report.label(first.span, "the first is here");
+            report.attach(label);
+        }
+        Some(first)
+    }
+
+    /// The sections of that keyword.
+    pub(super) fn all(&self, keyword: &str) -> impl Iterator<Item = &Section<'t, 's>> {
+        self.iter()
+            .filter(move |section| section.keyword == keyword)
+    }
+
+    /// All sections.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Section<'t, 's>> {
+        self.sections.iter()
+    }
+
+    fn add(&mut self, node: &'t Node<'s>, report: &mut Report) {
+        match node.form() {
+            Some((keyword, content)) if keyword.starts_with(':') => self.sections.push(Section {
+                keyword,
+                content,
+                span: node.head_span(),
+            }),
+            _ => {
+                report
+                    .error(node.span, format!("unexpected `{}`", node.quote()))
+                    .help("expected a section such as `(:init …)` or `(:action …)`");
+            }
+        }
+    }
+
+    /// A list outside of `(define …)`: what comes after one `)` too many.
+    fn add_from_outside(&mut self, node: &'t Node<'s>, report: &mut Report) {
+        report
+            .error(
+                node.head_span(),
+                format!("`{}` stands outside of `(define …)`", node.quote()),
+            )
+            .help("check the parentheses before it: perhaps there is one `)` too many");
+        if node.form().is_some_and(|(head, _)| head.starts_with(':')) {
+            self.add(node, report);
+        }
+    }
+}
+
+/// Reads `(domain name)` or `(problem name)`.
+fn name<'s>(file: FileId, node: Option<&Node<'s>>, report: &mut Report) -> Option<(&'s str, Span)> {
+    let node = node?;
+    let kind = kind(file);
+    match node.form() {
+        Some((head, [name])) if head == kind && name.word().is_some() => {
+            Some((name.word()?, name.span))
+        }
+        Some((head, _)) if head == self::kind(other(file)) => {
+            report
+                .error(node.span, format!("this is a {head}, not a {kind}"))
+                .help("are the two files given in the wrong order?");
+            None
+        }
+        Some((head, _)) if nearest(&head, [kind]).is_some() || head == kind => {
+            report
+                .error(node.span, format!("expected `({kind} name)`"))
+                .help(format!("write one name after `{kind}`"));
+            None
+        }
+        _ => {
+            report
+                .error(node.span, format!("unexpected `{}`", node.quote()))
+                .help(format!("expected `({kind} name)`"));
+            None
+        }
+    }
+}
+
+fn kind(file: FileId) -> &'static str {
+    match file {
+        FileId::Domain => "domain",
+        FileId::Problem => "problem",
+    }
+}
+
+fn other(file: FileId) -> FileId {
+    match file {
+        FileId::Domain => FileId::Problem,
+        FileId::Problem => FileId::Domain,
+    }
+}
+
+fn start_of(file: FileId) -> Span {
+    Span {
+        file,
+        start: 0,
+        end: 0,
+    }
+}

@@ -1,0 +1,257 @@
+//! Objects and variables as arguments, and what they are arguments of.
+
+use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, Term, Variable};
+
+use crate::lower::Reader;
+use crate::lower::scope::Scope;
+use crate::source::Span;
+use crate::suggest::nearest;
+use crate::syntax::Node;
+
+impl Reader {
+    /// `(predicate term …)`. `None`, with a report, if it cannot be understood.
+    pub(super) fn atom(&mut self, node: &Node, scope: &Scope) -> Option<Atom> {
+        let Some((name, arguments)) = node.form() else {
+            self.report
+                .error(node.span, format!("unexpected `{}`", node.quote()))
+                .help("expected `(predicate argument …)`");
+            return None;
+        };
+        let Some(overloads) = self.names.predicates.get(name.as_ref()) else {
+            self.unknown_predicate(&name, node);
+            return None;
+        };
+        let predicate = *overloads
+            .iter()
+            .find(|id| self.predicate_parameters(**id).len() == arguments.len())
+            .unwrap_or(&overloads[0]);
+        let parameters = self.predicate_parameters(predicate).to_vec();
+        let arguments = self.arguments(&name, node, arguments, &parameters, scope)?;
+        Some(Atom {
+            predicate,
+            arguments,
+        })
+    }
+
+    /// `(function term …)`, or the bare name of a function without arguments. `None`, with a
+    /// report unless it is an object fluent, if it cannot be understood.
+    pub(super) fn fluent(&mut self, node: &Node, scope: &Scope) -> Option<Fluent> {
+        let none: &[Node] = &[];
+        let form = node.form().or_else(|| Some((node.lower()?, none)));
+        let Some((name, arguments)) = form else {
+            self.report
+                .error(node.span, format!("unexpected `{}`", node.quote()))
+                .help("expected `(function argument …)`");
+            return None;
+        };
+        if self.names.object_functions.contains(name.as_ref()) {
+            return None;
+        }
+        let Some(overloads) = self.names.functions.get(name.as_ref()) else {
+            self.unknown_function(&name, node);
+            return None;
+        };
+        let function = *overloads
+            .iter()
+            .find(|id| self.function_parameters(**id).len() == arguments.len())
+            .unwrap_or(&overloads[0]);
+        let parameters = self.function_parameters(function).to_vec();
+        let arguments = self.arguments(&name, node, arguments, &parameters, scope)?;
+        Some(Fluent {
+            function,
+            arguments,
+        })
+    }
+
+    /// A variable or an object. `None`, with a report, if it is neither.
+    pub(super) fn term(&mut self, node: &Node, scope: &Scope) -> Option<Term> {
+        let Some(word) = node.lower() else {
+            let is_object_fluent = node
+                .form()
+                .is_some_and(|(head, _)| self.names.object_functions.contains(head.as_ref()));
+            if !is_object_fluent {
+                self.report
+                    .error(node.span, format!("unexpected `{}`", node.quote()))
+                    .help("expected the name of an object, or a `?variable`");
+            }
+            return None;
+        };
+        if word.starts_with('?') {
+            if let Some((term, _)) = scope.variable(&word) {
+                return Some(term);
+            }
+            let near = nearest(&word, scope.variables.iter().map(|v| v.name.as_str()));
+            let is_number = scope.unknown(&word).is_some() || word == "?duration";
+            let diagnostic = self.report.error(
+                node.span,
+                if is_number {
+                    format!("`{word}` is a number, not an object")
+                } else {
+                    format!("unknown variable `{word}`")
+                },
+            );
+            if !is_number {
+                diagnostic
+                    .help("declare it under `:parameters`, or by `forall` or `exists`")
+                    .suggest(near);
+            }
+            return None;
+        }
+        if let Some(&object) = self.names.objects.get(word.as_ref()) {
+            return Some(Term::Object(object));
+        }
+        let near = nearest(&word, self.names.objects.keys().map(String::as_str));
+        self.report
+            .error(node.span, format!("unknown object `{}`", node.quote()))
+            .help("declare it under `:objects` or `:constants`")
+            .suggest(near);
+        None
+    }
+
+    /// The arguments, as many and of the types that the parameters ask for.
+    fn arguments(
+        &mut self,
+        name: &str,
+        node: &Node,
+        arguments: &[Node],
+        parameters: &[Variable],
+        scope: &Scope,
+    ) -> Option<Vec<Term>> {
+        let terms: Vec<_> = arguments.iter().map(|a| self.term(a, scope)).collect();
+        if arguments.len() != parameters.len() {
+            let expected: Vec<_> = parameters.iter().map(|p| p.name.as_str()).collect();
+            let expected = expected.join(" ");
+            self.report
+                .error(
+                    node.span,
+                    format!(
+                        "`{name}` takes {}, not {}",
+                        count(parameters.len()),
+                        arguments.len()
+                    ),
+                )
+                .help(format!(
+                    "expected `({})`",
+                    [name, &expected].join(" ").trim_end()
+                ));
+            return None;
+        }
+        let terms = terms.into_iter().collect::<Option<Vec<_>>>()?;
+        for ((term, argument), parameter) in terms.iter().zip(arguments).zip(parameters) {
+            self.check_type(*term, argument.span, name, parameter, scope);
+        }
+        Some(terms)
+    }
+
+    /// Warns when an argument need not be of the parameter's type.
+    fn check_type(
+        &mut self,
+        term: Term,
+        span: Span,
+        name: &str,
+        parameter: &Variable,
+        scope: &Scope,
+    ) {
+        let (own, shown) = match term {
+            Term::Object(object) => {
+                if self.problem.has_type(object, &parameter.types) {
+                    return;
+                }
+                let object = &self.problem.objects[object.index()];
+                (object.types.as_slice(), object.name.as_str())
+            }
+            Term::Variable(position) => {
+                let variable = &scope.variables[position];
+                (variable.types.as_slice(), variable.name.as_str())
+            }
+        };
+        if self.always_fits(own, &parameter.types) {
+            return;
+        }
+        let asked = self.type_list(&parameter.types);
+        let given = self.type_list(own);
+        let message = if self.can_fit(own, &parameter.types) {
+            format!("`{shown}` of type {given} need not be of type {asked}, as `{name}` asks")
+        } else {
+            format!("`{shown}` is of type {given}, but `{name}` asks for {asked}")
+        };
+        self.report.warning(span, message);
+    }
+
+    /// Only objects, for places where no variable can be in scope.
+    pub(super) fn objects_only(terms: &[Term]) -> Option<Vec<ObjectId>> {
+        terms
+            .iter()
+            .map(|term| match term {
+                Term::Object(object) => Some(*object),
+                Term::Variable(_) => None,
+            })
+            .collect()
+    }
+
+    fn predicate_parameters(&self, id: PredicateId) -> &[Variable] {
+        &self.problem.predicates[id.index()].parameters
+    }
+
+    fn function_parameters(&self, id: FunctionId) -> &[Variable] {
+        &self.problem.functions[id.index()].parameters
+    }
+
+    fn unknown_predicate(&mut self, name: &str, node: &Node) {
+        // Object fluents are refused where they are declared.
+        if self.names.object_functions.contains(name) {
+            return;
+        }
+        let near = nearest(name, self.names.predicates.keys().map(String::as_str));
+        let is_function = self.names.functions.contains_key(name);
+        let diagnostic = self
+            .report
+            .error(node.head_span(), format!("unknown predicate `{name}`"));
+        if is_function {
+            diagnostic.help("it is a function: compare it with a number, as in `(>= (f) 1)`");
+        } else {
+            diagnostic
+                .help("declare it under `:predicates`")
+                .suggest(near);
+        }
+    }
+
+    fn unknown_function(&mut self, name: &str, node: &Node) {
+        let near = nearest(name, self.names.functions.keys().map(String::as_str));
+        let is_predicate = self.names.predicates.contains_key(name);
+        let diagnostic = self
+            .report
+            .error(node.head_span(), format!("unknown function `{name}`"));
+        if is_predicate {
+            diagnostic.help("it is a predicate, and has no number as its value");
+        } else {
+            diagnostic
+                .help("declare it under `:functions`")
+                .suggest(near);
+        }
+    }
+
+    /// Reports an effect on, or an initial value of, what rules define.
+    pub(super) fn refuse_derived(&mut self, predicate: PredicateId, span: Span) {
+        let predicate = &self.problem.predicates[predicate.index()];
+        if predicate.is_derived {
+            self.report
+                .error(
+                    span,
+                    format!(
+                        "`{}` is defined by rules, and cannot be set",
+                        predicate.name
+                    ),
+                )
+                .help("change what its rules depend on");
+        }
+    }
+}
+
+fn count(arguments: usize) -> String {
+    match arguments {
+        0 => "no arguments".to_owned(),
+        1 => "1 argument".to_owned(),
+        n => format!("{n} arguments"),
+    }
+}

@@ -1,0 +1,167 @@
+//! `a b - type c - (either d e) f`
+
+use std::rc::Rc;
+
+use elbowroom_model::problem::{TypeId, Variable};
+
+use crate::lower::Reader;
+use crate::source::Span;
+use crate::suggest::nearest;
+use crate::syntax::Node;
+
+/// Longest `either`; the list is kept once for each name it types.
+const LONGEST_EITHER: usize = 100;
+
+/// An entry of a typed list.
+#[derive(Debug)]
+pub(super) struct Typed<'t, 's> {
+    /// What is typed: a name, or a function's head.
+    pub(super) node: &'t Node<'s>,
+    /// The types' names in lower case; none if nothing is said. Shared by all entries typed
+    /// together.
+    pub(super) types: Rc<[(String, Span)]>,
+}
+
+impl Reader {
+    /// Takes a typed list apart.
+    pub(super) fn typed_list<'t, 's>(&mut self, nodes: &'t [Node<'s>]) -> Vec<Typed<'t, 's>> {
+        let untyped: Rc<[_]> = Rc::new([]);
+        let mut entries: Vec<Typed> = Vec::new();
+        let mut first_untyped = 0;
+        let mut nodes = nodes.iter();
+        while let Some(node) = nodes.next() {
+            let types = if node.is("-") {
+                match nodes.next() {
+                    Some(types) => self.type_names(types),
+                    None => {
+                        self.report.error(node.span, "expected a type after `-`");
+                        Rc::clone(&untyped)
+                    }
+                }
+            } else if let Some(name) = node.word().and_then(type_after_dash) {
+                // `?x -type` without a space.
+                Rc::new([(name.to_ascii_lowercase(), node.span)])
+            } else {
+                entries.push(Typed {
+                    node,
+                    types: Rc::clone(&untyped),
+                });
+                continue;
+            };
+            if first_untyped == entries.len() {
+                self.report.error(
+                    node.span,
+                    "`-` and a type, but nothing before it to be typed",
+                );
+            }
+            for entry in &mut entries[first_untyped..] {
+                entry.types = Rc::clone(&types);
+            }
+            first_untyped = entries.len();
+        }
+        entries
+    }
+
+    /// `type` or `(either type …)`.
+    fn type_names(&mut self, node: &Node) -> Rc<[(String, Span)]> {
+        if let Some(name) = node.lower() {
+            return Rc::new([(name.into_owned(), node.span)]);
+        }
+        match node.form() {
+            Some((head, names))
+                if head == "either"
+                    && (1..=LONGEST_EITHER).contains(&names.len())
+                    && names.iter().all(|name| name.word().is_some()) =>
+            {
+                names
+                    .iter()
+                    .filter_map(|name| Some((name.lower()?.into_owned(), name.span)))
+                    .collect()
+            }
+            _ => {
+                self.report
+                    .error(node.span, format!("`{}` is not a type", node.quote()))
+                    .help(format!(
+                        "expected a name, or `(either a b)` with at most {LONGEST_EITHER} names"
+                    ));
+                Rc::new([])
+            }
+        }
+    }
+
+    /// The ids of the types; `object` if there are none. Reports those not declared.
+    pub(super) fn resolve_types(&mut self, types: &Rc<[(String, Span)]>) -> Vec<TypeId> {
+        // Entries typed together share one report, too.
+        match &self.resolved_types {
+            Some((last, ids)) if Rc::ptr_eq(last, types) => return ids.clone(),
+            _ => {}
+        }
+        let mut ids = Vec::with_capacity(types.len().max(1));
+        for (name, span) in types.iter() {
+            match self.names.types.get(name) {
+                Some(&id) => ids.push(id),
+                None => {
+                    let near = nearest(name, self.names.types.keys().map(String::as_str));
+                    self.report
+                        .error(*span, format!("unknown type `{name}`"))
+                        .help("declare it under `:types`")
+                        .suggest(near);
+                }
+            }
+        }
+        if ids.is_empty() {
+            ids.push(TypeId::OBJECT);
+        }
+        self.resolved_types = Some((Rc::clone(types), ids.clone()));
+        ids
+    }
+
+    /// A list of variables: parameters, or what a quantifier binds.
+    pub(super) fn variables(&mut self, nodes: &[Node]) -> Vec<Variable> {
+        let mut variables: Vec<Variable> = Vec::new();
+        for entry in self.typed_list(nodes) {
+            let Some(name) = entry.node.lower().filter(|name| name.starts_with('?')) else {
+                self.report
+                    .error(
+                        entry.node.span,
+                        format!("`{}` is not a variable", entry.node.quote()),
+                    )
+                    .help("expected `?name`, and perhaps `- type` after it");
+                continue;
+            };
+            if name == "?duration" {
+                self.report
+                    .error(entry.node.span, "`?duration` cannot be a parameter")
+                    .help("it always means the action's duration");
+            }
+            if variables.iter().any(|v| v.name == *name) {
+                self.report
+                    .error(entry.node.span, format!("`{name}` is declared twice"));
+            }
+            let types = self.resolve_types(&entry.types);
+            variables.push(Variable {
+                name: name.into_owned(),
+                types,
+            });
+        }
+        variables
+    }
+
+    /// The variables of `node`, which should be a list of them.
+    pub(super) fn variable_list(&mut self, node: &Node) -> Vec<Variable> {
+        match node.list() {
+            Some(nodes) => self.variables(nodes),
+            None => {
+                self.report
+                    .error(node.span, "expected a list of variables")
+                    .help("write `(?x - type)`, or `()` for none");
+                Vec::new()
+            }
+        }
+    }
+}
+
+fn type_after_dash(word: &str) -> Option<&str> {
+    word.strip_prefix('-')
+        .filter(|name| name.starts_with(|c: char| c.is_alphabetic()))
+}

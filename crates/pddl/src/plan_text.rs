@@ -1,0 +1,9 @@
+//! Plans as planners print them.
+
+mod duration;
+mod line;
+mod read;
+mod write;
+
+pub use read::read_plan;
+pub use write::write_plan;

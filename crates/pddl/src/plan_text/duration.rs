@@ -1,0 +1,127 @@
+//! Durations that a plan does not give.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::{
+    Body, Change, Comparison, Expression, Fluent, FunctionId, ObjectId, Problem, Schema, Term,
+    TimedChange,
+};
+use elbowroom_num::Rational;
+
+/// The duration of an action that the domain fixes to one number, the same in every state.
+///
+/// # Errors
+/// Says why there is no such number.
+pub(super) fn only_duration(
+    task: &Task,
+    schema: &Schema,
+    arguments: &[ObjectId],
+    changing: &BTreeSet<FunctionId>,
+) -> Result<Rational, String> {
+    let Body::Durative { duration, .. } = &schema.body else {
+        return Err("the action takes no time".to_owned());
+    };
+    let equal = duration
+        .iter()
+        .find(|constraint| constraint.comparison == Comparison::Equal)
+        .ok_or("the domain allows more than one duration")?;
+    let value = value(&equal.bound, &|fluent| {
+        static_value(task, fluent, arguments, changing)
+    })?;
+    if value.is_negative() {
+        return Err("its duration by the domain is negative".to_owned());
+    }
+    Ok(value)
+}
+
+/// The functions that some effect or timed initial changes.
+pub(super) fn changing_functions(problem: &Problem) -> BTreeSet<FunctionId> {
+    let mut changing = BTreeSet::new();
+    for schema in &problem.schemas {
+        let (instant, end, continuous) = match &schema.body {
+            Body::Instantaneous { effects, .. } => (effects, None, None),
+            Body::Durative {
+                start_effects,
+                end_effects,
+                continuous,
+                ..
+            } => (start_effects, Some(end_effects), Some(continuous)),
+        };
+        for effect in instant.iter().chain(end.into_iter().flatten()) {
+            if let Change::Update { fluent, .. } = &effect.change {
+                changing.insert(fluent.function);
+            }
+        }
+        for effect in continuous.into_iter().flatten() {
+            changing.insert(effect.fluent.function);
+        }
+    }
+    for timed in &problem.timed {
+        if let TimedChange::Assign(function, ..) = &timed.change {
+            changing.insert(*function);
+        }
+    }
+    changing
+}
+
+/// The value of a fluent that nothing changes.
+fn static_value(
+    task: &Task,
+    fluent: &Fluent,
+    arguments: &[ObjectId],
+    changing: &BTreeSet<FunctionId>,
+) -> Result<Rational, String> {
+    let problem = task.problem();
+    let name = &problem.functions[fluent.function.index()].name;
+    if changing.contains(&fluent.function) {
+        return Err(format!("it depends on `{name}`, which changes"));
+    }
+    let objects: Vec<_> = fluent
+        .arguments
+        .iter()
+        .map(|term| match term {
+            Term::Variable(position) => arguments[*position],
+            Term::Object(object) => *object,
+        })
+        .collect();
+    task.find_fluent(fluent.function, &objects)
+        .and_then(|fluent| task.initial().values.get(&fluent).cloned())
+        .ok_or_else(|| {
+            let fluent = problem.apply_name(name, &objects);
+            format!("it depends on `{fluent}`, which has no value")
+        })
+}
+
+/// The value of an expression, given those of its fluents.
+fn value(
+    expression: &Expression,
+    of: &impl Fn(&Fluent) -> Result<Rational, String>,
+) -> Result<Rational, String> {
+    Ok(match expression {
+        Expression::Constant(value) => value.clone(),
+        Expression::Fluent(fluent) => of(fluent)?,
+        Expression::Add(parts) => {
+            let mut total = Rational::ZERO;
+            for part in parts {
+                total += value(part, of)?;
+            }
+            total
+        }
+        Expression::Multiply(parts) => {
+            let mut product = Rational::ONE;
+            for part in parts {
+                product *= value(part, of)?;
+            }
+            product
+        }
+        Expression::Subtract(left, right) => value(left, of)? - value(right, of)?,
+        Expression::Divide(left, right) => value(left, of)?
+            .checked_div(&value(right, of)?)
+            .ok_or("the domain divides by zero")?,
+        Expression::Negate(part) => -value(part, of)?,
+        Expression::Duration | Expression::TotalTime | Expression::Unknown(_) => {
+            return Err("the domain leaves it open".to_owned());
+        }
+    })
+}

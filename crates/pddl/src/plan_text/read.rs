@@ -1,0 +1,264 @@
+//! From a planner's output to a plan.
+
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId};
+use elbowroom_model::{Step, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use crate::plan_text::duration::{changing_functions, only_duration};
+use crate::plan_text::line::{Line, RawStep, Word, line};
+use crate::report::Report;
+use crate::source::{FileId, Source, Span};
+use crate::suggest::nearest;
+
+/// Longest duration that planners print for an action which has none.
+const NEGLIGIBLE: (i64, i64) = (1, 100);
+
+/// Reads a plan: `0.000: (action argument …) [10.000]` on each line.
+///
+/// Tolerates what planners print around it, `;` comments, upper case, `[D:…; C:…]`. Of several
+/// plans in one log, the last is read. Actions without times happen at 0, 1, 2, …. A duration
+/// that is not given is taken from the domain if it is one fixed number there.
+///
+/// # Errors
+/// When actions, objects, types or numbers do not fit the task.
+pub fn read_plan(
+    source: &Source,
+    task: &mut Task,
+) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics> {
+    let mut reader = PlanReader::new(source, task);
+    let steps = reader.last_plan();
+    let mut plan = TimeTriggeredPlan::default();
+    for (index, step) in steps.iter().enumerate() {
+        plan.steps.extend(reader.step(step, index));
+    }
+    let plan = (!reader.report.is_failed()).then_some(plan);
+    Diagnostics::outcome(plan, reader.report.into_diagnostics())
+}
+
+struct PlanReader<'a> {
+    source: &'a Source,
+    task: &'a mut Task,
+    report: Report,
+    schemas: BTreeMap<String, SchemaId>,
+    objects: BTreeMap<String, ObjectId>,
+    /// Looked for when the first duration is missing.
+    changing: OnceCell<BTreeSet<FunctionId>>,
+}
+
+impl<'a> PlanReader<'a> {
+    fn new(source: &'a Source, task: &'a mut Task) -> Self {
+        let problem = task.problem();
+        let schemas = (0..problem.schemas.len()).map(SchemaId::from);
+        let objects = (0..problem.objects.len()).map(ObjectId::from);
+        Self {
+            schemas: schemas
+                .map(|id| (problem.schemas[id.index()].name.to_ascii_lowercase(), id))
+                .collect(),
+            objects: objects
+                .map(|id| (problem.objects[id.index()].name.to_ascii_lowercase(), id))
+                .collect(),
+            source,
+            task,
+            report: Report::new(source, source),
+            changing: OnceCell::new(),
+        }
+    }
+
+    /// The steps of the last plan in the text. Reports broken lines of that plan only.
+    fn last_plan(&mut self) -> Vec<RawStep<'a>> {
+        let mut plans: Vec<Vec<Line>> = vec![Vec::new()];
+        let mut start = 0;
+        for text in self.source.text().split_inclusive('\n') {
+            let line = line(text, start);
+            start += text.len();
+            match line {
+                Line::Blank => {}
+                Line::Separator | Line::Noise => {
+                    if plans.last().is_some_and(|plan| !plan.is_empty()) {
+                        plans.push(Vec::new());
+                    }
+                }
+                line => plans.last_mut().expect("never empty").push(line),
+            }
+        }
+        plans.retain(|plan| !plan.is_empty());
+        // Logs quote other things in parentheses; where some lines have times, those are the plan.
+        if plans.iter().any(|plan| plan.iter().any(is_timed)) {
+            plans.retain(|plan| plan.iter().any(is_timed));
+        }
+        let count = plans.len();
+        let mut steps = Vec::new();
+        for line in plans.pop().unwrap_or_default() {
+            match line {
+                Line::Steps(more) => steps.extend(more),
+                Line::Broken(at, expected) => {
+                    self.report
+                        .error(span(&(at..at)), "this is not an action of a plan")
+                        .label(expected)
+                        .help("expected `time: (action argument …) [duration]`");
+                }
+                Line::Blank | Line::Separator | Line::Noise => {}
+            }
+        }
+        if count > 1 {
+            let first = steps
+                .first()
+                .map_or(0..0, |step| step.words[0].range.clone());
+            self.report
+                .warning(span(&first), format!("{count} plans in one text"))
+                .label("the last one is read, from here");
+        }
+        if steps.is_empty() && !self.report.is_failed() {
+            self.report
+                .warning(span(&(0..0)), "no actions in this plan")
+                .help("expected lines such as `0.000: (action argument …) [10.000]`");
+        }
+        steps
+    }
+
+    /// The step that a line describes, the `index`th of its plan.
+    fn step(&mut self, raw: &RawStep, index: usize) -> Option<Step> {
+        let start = match &raw.time {
+            Some(time) => self.time(time),
+            None => Some(Rational::from(u32::try_from(index).unwrap_or(u32::MAX))),
+        };
+        let (name, arguments) = raw.words.split_first()?;
+        let schema = self.schema(name);
+        let arguments: Vec<_> = arguments.iter().map(|word| self.object(word)).collect();
+        let duration = raw.duration.as_ref().map(|word| self.time(word));
+        let schema = schema?;
+        let arguments = arguments.into_iter().collect::<Option<Vec<_>>>()?;
+        let action = match self.task.instantiate(schema, &arguments) {
+            Ok(action) => action,
+            Err(error) => {
+                let end = raw.words.last().map_or(name.range.end, |w| w.range.end);
+                let expected = self.signature(schema);
+                self.report
+                    .error(span(&(name.range.start..end)), error.to_string())
+                    .help(format!("expected `{expected}`"));
+                return None;
+            }
+        };
+        let duration = match (action.durative(), duration) {
+            (Some(_), Some(duration)) => Some(duration?),
+            (Some(_), None) => match self.only_duration(schema, &arguments) {
+                Ok(duration) => Some(duration),
+                Err(why) => {
+                    self.report
+                        .error(
+                            span(&name.range),
+                            format!("`{}` has no duration here", name.text),
+                        )
+                        .label(why)
+                        .help("write it behind the action: `[10.000]`");
+                    return None;
+                }
+            },
+            (None, duration) => {
+                let (numerator, denominator) = NEGLIGIBLE;
+                let negligible = Rational::new(numerator, denominator);
+                if duration.flatten().is_some_and(|d| d > negligible) {
+                    self.report.warning(
+                        span(&name.range),
+                        format!("`{}` takes no time: its duration is ignored", name.text),
+                    );
+                }
+                None
+            }
+        };
+        Some(Step {
+            start: start?,
+            action,
+            duration,
+        })
+    }
+
+    fn only_duration(&self, schema: SchemaId, arguments: &[ObjectId]) -> Result<Rational, String> {
+        let schema = &self.task.problem().schemas[schema.index()];
+        let changing = self
+            .changing
+            .get_or_init(|| changing_functions(self.task.problem()));
+        only_duration(self.task, schema, arguments, changing)
+    }
+
+    /// A time or duration, not before 0.
+    fn time(&mut self, word: &Word) -> Option<Rational> {
+        match word.text.parse::<Rational>() {
+            Ok(time) if !time.is_negative() => Some(time),
+            Ok(_) => {
+                self.report
+                    .error(span(&word.range), "a negative time")
+                    .help("times and durations are at least 0");
+                None
+            }
+            Err(error) => {
+                self.report.error(span(&word.range), error.to_string());
+                None
+            }
+        }
+    }
+
+    fn schema(&mut self, word: &Word) -> Option<SchemaId> {
+        let name = word.text.to_ascii_lowercase();
+        let found = self.schemas.get(&name).copied();
+        if found.is_none() {
+            let near = nearest(&name, self.schemas.keys().map(String::as_str));
+            self.report
+                .error(span(&word.range), format!("unknown action `{}`", word.text))
+                .help("the domain has no action of this name")
+                .suggest(near);
+        }
+        found
+    }
+
+    fn object(&mut self, word: &Word) -> Option<ObjectId> {
+        let name = word.text.to_ascii_lowercase();
+        let found = self.objects.get(&name).copied();
+        if found.is_none() {
+            let near = nearest(&name, self.objects.keys().map(String::as_str));
+            self.report
+                .error(span(&word.range), format!("unknown object `{}`", word.text))
+                .help("neither the domain nor the problem has an object of this name")
+                .suggest(near);
+        }
+        found
+    }
+
+    /// `(name ?x - type …)`
+    fn signature(&self, schema: SchemaId) -> String {
+        let problem = self.task.problem();
+        let schema = &problem.schemas[schema.index()];
+        let mut text = format!("({}", schema.name);
+        for parameter in &schema.parameters {
+            let types: Vec<_> = parameter
+                .types
+                .iter()
+                .map(|ty| problem.types[ty.index()].name.as_str())
+                .collect();
+            text.push_str(&format!(" {} - {}", parameter.name, types.join(" or ")));
+        }
+        text.push(')');
+        text
+    }
+}
+
+fn is_timed(line: &Line) -> bool {
+    match line {
+        Line::Steps(steps) => steps.iter().any(|step| step.time.is_some()),
+        Line::Broken(..) => true,
+        Line::Blank | Line::Separator | Line::Noise => false,
+    }
+}
+
+fn span(range: &Range<usize>) -> Span {
+    Span {
+        file: FileId::Domain,
+        start: range.start,
+        end: range.end,
+    }
+}
