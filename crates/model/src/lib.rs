@@ -11,12 +11,13 @@
 //! 3. [`Task`]: a problem with its table of ground facts and fluents; instantiates schemas on
 //!    demand ([`Task::instantiate`]).
 //! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
-//! 5. `validate`: the judge. PDDL 2.1 semantics alone; it shares no code with
+//! 5. [`validate()`]: the judge. PDDL 2.1 semantics alone; it shares no code with
 //!    networks, encodings or solvers, because every other claim is attacked with it.
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
 
+mod describe;
 mod domains;
 pub mod ground;
 mod instantiate;
@@ -26,9 +27,11 @@ pub mod problem;
 pub mod reachability;
 mod simplify;
 mod task;
+pub mod validate;
 
 pub use interference::Footprint;
 pub use plan::{Step, TimeTriggeredPlan};
 pub use problem::Problem;
 pub use simplify::Constants;
 pub use task::{GroundRule, InstantiateError, State, Task, TimedHappening};
+pub use validate::{Verdict, validate};

@@ -198,9 +198,8 @@ impl<'a> Relaxation<'a> {
             (Value::Number(left), Value::Number(right)) => {
                 comparison.holds(&left, &right) == wanted
             }
-            // A comparison with what has no value does not hold; whether its negation does is
-            // left to the judge.
-            (Value::Undefined, _) | (_, Value::Undefined) => !wanted,
+            // To read what has no value is a mistake, whatever is made of the answer.
+            (Value::Undefined, _) | (_, Value::Undefined) => false,
             _ => true,
         }
     }

@@ -215,7 +215,7 @@ impl Possible {
         wanted: bool,
     ) -> bool {
         if !self.is_defined(task, left) || !self.is_defined(task, right) {
-            return !wanted;
+            return false;
         }
         match (self.value(task, left), self.value(task, right)) {
             (Some(left), Some(right)) => comparison.holds(&left, &right) == wanted,

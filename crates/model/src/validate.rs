@@ -1,0 +1,244 @@
+//! The judge: whether a time-triggered plan is valid, and if not, why not.
+//!
+//! The definition is PDDL 2.1's (Fox & Long 2003), with timed initial literals and fluents,
+//! derived facts, and continuous effects whose values are polynomials in time. All arithmetic is
+//! exact. Nothing is shared with networks, encodings or solvers: every claim that the rest of the
+//! project makes about a plan can be attacked with this module alone.
+//!
+//! - All that happens at one time forms a *group*. The conditions of its happenings, the guards
+//!   of conditional effects and the values of effects read the same state: the one on arrival,
+//!   after continuous change and before any effect of the group. Deletions come before additions.
+//! - Over-all conditions hold at every moment strictly between start and end. At the time of a
+//!   happening group in between, the state after the group counts.
+//! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
+//!   [`Settings::epsilon`] apart. Timed initials take part, but not against each other.
+//! - The goal holds after the last happening of the plan's actions. Timed initials after that do
+//!   not count.
+//!
+//! A part of a condition that says nothing (it reads a fluent without a value, divides by zero)
+//! is a violation, unless the other parts decide whatever it would say.
+//!
+//! ```
+//! use elbowroom_model::validate::{Settings, Verdict, validate};
+//! use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
+//!
+//! let task = Task::new(Problem::default());
+//! match validate(&task, &TimeTriggeredPlan::default(), &Settings::default()) {
+//!     Verdict::Valid(report) => assert_eq!(report.makespan.to_string(), "0"),
+//!     Verdict::Invalid(violation) => println!("invalid: {violation}"),
+//!     Verdict::Undecided(undecided) => println!("cannot tell: {undecided}"),
+//! }
+//! ```
+
+mod derived;
+mod display;
+mod effects;
+mod explain;
+mod interference;
+mod judge;
+mod margin;
+mod piece;
+mod polynomial;
+mod reading;
+mod state;
+mod stop;
+mod timeline;
+mod violation;
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+pub use margin::Margin;
+pub use violation::{
+    ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
+};
+
+use crate::ground::{Body, Condition};
+use crate::plan::TimeTriggeredPlan;
+use crate::problem::Comparison;
+use crate::task::{State, Task};
+
+/// How strictly to judge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// How far apart interfering happenings must be. `None`: they only must not fall into one
+    /// group, which is what VAL asks for.
+    pub epsilon: Option<Rational>,
+    /// VAL's `-t`. Happenings no more than a tenth of it after the first of their group belong to
+    /// that group, and happen at its time; durations may miss their bounds by it (an equation by
+    /// less than it).
+    pub tolerance: Rational,
+    /// By how much comparisons of numbers may fail, strict ones by less. VAL allows a
+    /// ten-thousandth, whatever its `-t`.
+    pub slack: Rational,
+}
+
+impl Default for Settings {
+    /// As exact as can be: tolerance 0, and interfering happenings 0.001 apart.
+    fn default() -> Self {
+        Self {
+            epsilon: Some(Rational::new(1, 1000)),
+            tolerance: Rational::ZERO,
+            slack: Rational::ZERO,
+        }
+    }
+}
+
+impl Settings {
+    /// What VAL does when called with `-t tolerance`.
+    pub fn like_val(tolerance: Rational) -> Self {
+        Self {
+            epsilon: None,
+            tolerance,
+            slack: Rational::new(1, 10_000),
+        }
+    }
+
+    /// How much later than the first of its group a happening can be.
+    fn group_width(&self) -> Rational {
+        &self.tolerance / Rational::from(10)
+    }
+
+    /// Whether a duration satisfies a bound.
+    fn allows(&self, comparison: Comparison, duration: &Rational, bound: &Rational) -> bool {
+        let gap = (duration - bound).abs();
+        comparison.holds(duration, bound)
+            || match comparison {
+                Comparison::Less | Comparison::Greater => false,
+                Comparison::AtMost | Comparison::AtLeast => gap <= self.tolerance,
+                Comparison::Equal => gap < self.tolerance,
+            }
+    }
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// The plan works.
+    Valid(Report),
+    /// The plan does not work; this is the first thing that is wrong.
+    Invalid(Violation),
+    /// The judge cannot tell.
+    Undecided(Undecided),
+}
+
+impl Verdict {
+    /// Whether the plan works.
+    pub fn is_valid(&self) -> bool {
+        matches!(self, Self::Valid(_))
+    }
+
+    /// What is wrong, if something is.
+    pub fn violation(&self) -> Option<&Violation> {
+        match self {
+            Self::Invalid(violation) => Some(violation),
+            _ => None,
+        }
+    }
+}
+
+/// Where a valid plan leads, and how narrowly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The time of the last happening of the plan's actions.
+    pub makespan: Rational,
+    /// The state then. Derived facts are not listed.
+    pub state: State,
+    /// For each comparison that some action, or the goal, needs by itself (not as part of a
+    /// disjunction), how close it came to failing: by step, the goal's last.
+    pub margins: Vec<Margin>,
+}
+
+/// Judges a plan. The plan's actions must have been instantiated from this task.
+pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> Verdict {
+    let Some(derivation) = derived::Derivation::of(task) else {
+        return Verdict::Undecided(Undecided {
+            time: None,
+            difficulty: Difficulty::Unstratified,
+        });
+    };
+    if let Some(violation) = malformed_step(plan) {
+        return Verdict::Invalid(violation);
+    }
+    let groups = timeline::timeline(task, plan, settings);
+    let mut judge = judge::Judge {
+        task,
+        plan,
+        settings,
+        derivation,
+        now: state::Now::initial(task),
+        derived: OnceCell::new(),
+        running: BTreeMap::new(),
+        since: BTreeMap::new(),
+        margins: margin::Margins::default(),
+    };
+    match judge.run(&groups) {
+        Ok(()) => Verdict::Valid(Report {
+            makespan: plan.makespan(),
+            state: judge.now.to_state(),
+            margins: margins(task, plan, judge.margins),
+        }),
+        Err(stop::Stop::Violation(violation)) => Verdict::Invalid(*violation),
+        Err(stop::Stop::Undecided(undecided)) => Verdict::Undecided(*undecided),
+    }
+}
+
+/// The first step whose times make no sense by themselves.
+fn malformed_step(plan: &TimeTriggeredPlan) -> Option<Violation> {
+    plan.steps.iter().enumerate().find_map(|(position, step)| {
+        let mistake = match (&step.action.body, &step.duration) {
+            _ if step.start.is_negative() => Mistake::TooEarly,
+            (Body::Durative(_), None) => Mistake::NoDuration,
+            (Body::Durative(_), Some(duration)) if duration.is_negative() => {
+                Mistake::NegativeDuration(duration.clone())
+            }
+            _ => return None,
+        };
+        Some(Violation {
+            time: step.start.clone(),
+            action: Some(ActionInstance::of(plan, position)),
+            mistake,
+        })
+    })
+}
+
+fn margins(task: &Task, plan: &TimeTriggeredPlan, margins: margin::Margins) -> Vec<Margin> {
+    let (goal, steps): (Vec<_>, Vec<_>) = margins
+        .into_entries()
+        .partition(|((step, _, _), _)| step.is_none());
+    let mut listed = Vec::new();
+    for ((step, when, index), (margin, time)) in steps.into_iter().chain(goal) {
+        let condition = match step {
+            None => task.goal(),
+            Some(position) => match condition_of(&plan.steps[position].action.body, when) {
+                Some(condition) => condition,
+                None => continue,
+            },
+        };
+        let conjunct = condition.conjuncts()[index];
+        listed.push(Margin {
+            action: step.map(|position| ActionInstance::of(plan, position)),
+            when,
+            condition: task.describe_condition(conjunct),
+            margin,
+            time,
+            is_strict: margin::Demand::of(conjunct).is_some_and(|demand| demand.is_strict),
+        });
+    }
+    listed
+}
+
+fn condition_of(body: &Body, when: When) -> Option<&Condition> {
+    match (body, when) {
+        (Body::Instantaneous(snap), When::Now) => Some(&snap.condition),
+        (Body::Durative(body), When::Start) => Some(&body.start.condition),
+        (Body::Durative(body), When::OverAll) => Some(&body.over_all),
+        (Body::Durative(body), When::End) => Some(&body.end.condition),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;

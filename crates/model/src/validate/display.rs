@@ -1,0 +1,224 @@
+//! What the judge says, in words.
+
+use std::fmt;
+
+use elbowroom_num::Rational;
+
+use super::violation::{
+    ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
+};
+use crate::describe::decimal;
+
+/// A time as planners print it, with at least three decimals where that is exact.
+pub(super) fn clock(time: &Rational) -> String {
+    let exact = decimal(time);
+    if exact.contains('/') {
+        return format!("about {}", time.to_decimal(6));
+    }
+    match exact.split_once('.') {
+        None => format!("{exact}.000"),
+        Some((whole, part)) => format!("{whole}.{part:0<3}"),
+    }
+}
+
+impl fmt::Display for ActionInstance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl fmt::Display for Occurrence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.action, self.point) {
+            (Some(action), Point::Start) => write!(f, "the start of {action}")?,
+            (Some(action), Point::End) => write!(f, "the end of {action}")?,
+            (Some(action), _) => write!(f, "{action}")?,
+            (None, _) => write!(f, "a timed initial")?,
+        }
+        write!(f, " at {}", clock(&self.time))
+    }
+}
+
+impl fmt::Display for When {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Now => "precondition",
+            Self::Start => "at start",
+            Self::OverAll => "over all",
+            Self::End => "at end",
+            Self::Goal => "goal",
+        })
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Mistake::Condition {
+            is_after, is_exact, ..
+        } = &self.mistake
+        {
+            let after = if *is_after { "just after" } else { "at" };
+            if *is_exact {
+                write!(f, "{after} {}: ", clock(&self.time))?;
+            } else {
+                write!(f, "{after} about {}: ", self.time.to_decimal(6))?;
+            }
+        } else {
+            write!(f, "at {}: ", clock(&self.time))?;
+        }
+        if let Some(action) = &self.action {
+            write!(f, "{action} ")?;
+        }
+        write!(f, "{}", self.mistake)
+    }
+}
+
+impl fmt::Display for Mistake {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooEarly => write!(f, "starts before time 0"),
+            Self::NoDuration => write!(f, "has no duration"),
+            Self::NegativeDuration(duration) => {
+                write!(f, "has the duration {}, below 0", decimal(duration))
+            }
+            Self::Duration {
+                duration,
+                comparison,
+                bound,
+                value,
+                ..
+            } => {
+                let (duration, number) = (decimal(duration), decimal(value));
+                write!(
+                    f,
+                    "takes {duration}, but its duration must be {} ",
+                    comparison.symbol()
+                )?;
+                if *bound == number {
+                    write!(f, "{number}")
+                } else {
+                    write!(f, "{bound} = {number}")
+                }
+            }
+            Self::Condition {
+                when,
+                condition,
+                reasons,
+                ..
+            } => {
+                match when {
+                    When::Goal => write!(f, "the goal {condition} does not hold")?,
+                    When::Now => write!(f, "needs {condition}")?,
+                    _ => write!(f, "needs {condition} {when}")?,
+                }
+                for (position, reason) in reasons.iter().enumerate() {
+                    write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
+                }
+                Ok(())
+            }
+            Self::Interference {
+                first,
+                second,
+                over,
+                separation,
+            } => {
+                write!(
+                    f,
+                    "interferes: {first} and {second} both concern {over} and must "
+                )?;
+                match separation {
+                    Some(least) => write!(f, "be at least {} apart", decimal(least)),
+                    None => write!(f, "not happen at the same time"),
+                }
+            }
+            Self::Conflict { fluent } => write!(f, "gives {fluent} several values at once"),
+            Self::Undefined { fluent, within } => {
+                write!(f, "reads {fluent}, which has no value, in {within}")
+            }
+            Self::DivisionByZero { divisor, within } => {
+                write!(f, "divides by {divisor}, which is 0, in {within}")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fact {
+                fact,
+                is_true,
+                since,
+            } => {
+                write!(f, "{fact} is {is_true}")?;
+                match since {
+                    Some(occurrence) => write!(f, " since {occurrence}"),
+                    None => Ok(()),
+                }
+            }
+            Self::Comparison {
+                comparison,
+                values,
+                left,
+                right,
+                is_true,
+            } => {
+                if values.is_empty() {
+                    write!(f, "{comparison} is {is_true}")?;
+                }
+                for (position, (name, value)) in values.iter().enumerate() {
+                    let separator = if position == 0 { "" } else { ", " };
+                    write!(f, "{separator}{name} = {}", decimal(value))?;
+                }
+                let gap = (left - right).abs();
+                match (is_true, gap.is_zero()) {
+                    (false, false) => write!(f, ", short by {}", decimal(&gap)),
+                    (false, true) => write!(f, ", not strictly so"),
+                    (true, _) => write!(f, ", so that {comparison} is true"),
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Undecided {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(time) = &self.time {
+            write!(f, "at {}: ", clock(time))?;
+        }
+        write!(f, "{}", self.difficulty)
+    }
+}
+
+impl fmt::Display for Difficulty {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Open { unknown, within } => {
+                write!(
+                    f,
+                    "{unknown} is left open and read by {within}: give it a value"
+                )
+            }
+            Self::Nonlinear { fluent } => write!(
+                f,
+                "nonlinear change: the rate of {fluent} depends on {fluent} itself, so its value \
+                 is no polynomial in time"
+            ),
+            Self::Quotient { divisor, within } => {
+                write!(
+                    f,
+                    "nonlinear change: {within} divides by {divisor}, which changes with time"
+                )
+            }
+            Self::Misplaced { expression, within } => {
+                write!(f, "{expression} means nothing in {within}")
+            }
+            Self::ContinuousGuard { fluent } => write!(
+                f,
+                "a continuous effect on {fluent} depends on an over-all condition, whose truth \
+                 lies in the future"
+            ),
+            Self::Unstratified => write!(f, "a derived fact depends on its own negation"),
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! What a happening group changes.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use super::judge::Judge;
+use super::state::Rate;
+use super::stop::{Place, Stop};
+use super::timeline::{Group, What};
+use super::violation::{Mistake, When};
+use crate::ground::{Change, Effect, FactId, FluentId};
+use crate::problem::UpdateOperator;
+
+/// All that a group changes, read off before anything changes.
+#[derive(Default)]
+struct Changes<'a> {
+    deletes: Vec<(FactId, What<'a>)>,
+    adds: Vec<(FactId, What<'a>)>,
+    updates: BTreeMap<FluentId, Vec<Update<'a>>>,
+}
+
+struct Update<'a> {
+    operator: UpdateOperator,
+    value: Rational,
+    what: What<'a>,
+}
+
+/// The continuous effects now at work.
+pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
+    let mut rates = Vec::new();
+    for (&position, running) in &judge.running {
+        let (step, body) = judge.durative(position);
+        for (effect, _) in body
+            .continuous
+            .iter()
+            .zip(&running.continuous)
+            .filter(|(_, on)| **on)
+        {
+            rates.push(Rate {
+                fluent: effect.fluent,
+                per_time: &effect.rate,
+                duration: step.duration.as_ref(),
+            });
+        }
+    }
+    rates
+}
+
+impl<'a> Judge<'a> {
+    /// Carries out the effects of a group: all read the state on arrival, deletions come before
+    /// additions, and what ends stops running.
+    pub(super) fn apply(&mut self, group: &Group<'a>) -> Result<(), Stop> {
+        let mut changes = Changes::default();
+        for happening in &group.happenings {
+            self.collect(happening.what, &group.time, &mut changes)?;
+        }
+        for (fluent, updates) in &changes.updates {
+            self.update(*fluent, updates, &group.time)?;
+        }
+        let facts = changes.deletes.iter().map(|change| (change, false));
+        for (&(fact, what), truth) in facts.chain(changes.adds.iter().map(|add| (add, true))) {
+            let old = std::mem::replace(&mut self.now.facts[fact.index()], truth);
+            if old != truth {
+                self.since.insert(fact, (group.time.clone(), what));
+            }
+        }
+        self.derived.take();
+        for happening in &group.happenings {
+            if let What::End(position) = happening.what {
+                self.running.remove(&position);
+            }
+        }
+        Ok(())
+    }
+
+    fn collect(
+        &self,
+        what: What<'a>,
+        time: &Rational,
+        changes: &mut Changes<'a>,
+    ) -> Result<(), Stop> {
+        if let What::Timed(timed) = what {
+            for change in &timed.changes {
+                self.note(change, what, time, changes)?;
+            }
+        }
+        let Some(snap) = self.snap(what) else {
+            return Ok(());
+        };
+        for (index, effect) in snap.effects.iter().enumerate() {
+            if self.takes_place(effect, index, what, time)? {
+                self.note(&effect.change, what, time, changes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn takes_place(
+        &self,
+        effect: &Effect,
+        index: usize,
+        what: What<'a>,
+        time: &Rational,
+    ) -> Result<bool, Stop> {
+        if effect.guard.is_trivial() {
+            return Ok(true);
+        }
+        if let What::End(position) = what
+            && self
+                .running
+                .get(&position)
+                .is_some_and(|running| !running.end_guards[index])
+        {
+            return Ok(false);
+        }
+        let place = Place::condition(time, what.step(), When::Now, &effect.guard.now);
+        self.reads(&effect.guard.now, what.step())
+            .map_err(|fault| self.stop(fault, &place))
+    }
+
+    fn note(
+        &self,
+        change: &Change,
+        what: What<'a>,
+        time: &Rational,
+        changes: &mut Changes<'a>,
+    ) -> Result<(), Stop> {
+        match change {
+            Change::Add(fact) => changes.adds.push((*fact, what)),
+            Change::Delete(fact) => changes.deletes.push((*fact, what)),
+            Change::Update {
+                operator,
+                fluent,
+                value,
+            } => {
+                let place = Place::effect(time, what.step(), value);
+                let value = self
+                    .reading(what.step())
+                    .value(value)
+                    .map_err(|fault| self.stop(fault, &place))?;
+                let update = Update {
+                    operator: *operator,
+                    value,
+                    what,
+                };
+                changes.updates.entry(*fluent).or_default().push(update);
+            }
+        }
+        Ok(())
+    }
+
+    /// Several updates of one fluent must all be increases and decreases.
+    fn update(
+        &mut self,
+        fluent: FluentId,
+        updates: &[Update<'a>],
+        time: &Rational,
+    ) -> Result<(), Stop> {
+        let name = || self.task.fluent_name(fluent);
+        let violates =
+            |update: &Update<'a>, mistake| Err(self.violation(time, update.what.step(), mistake));
+        let mut value = self.now.values[fluent.index()].clone();
+        for update in updates {
+            if updates.len() > 1 && !update.operator.is_additive() {
+                return violates(update, Mistake::Conflict { fluent: name() });
+            }
+            let within = || format!("its effect {} {}", update.operator.name(), name());
+            value = match (update.operator, value) {
+                (UpdateOperator::Assign, _) => Some(update.value.clone()),
+                (_, None) => {
+                    let mistake = Mistake::Undefined {
+                        fluent: name(),
+                        within: within(),
+                    };
+                    return violates(update, mistake);
+                }
+                (UpdateOperator::Increase, Some(old)) => Some(old + &update.value),
+                (UpdateOperator::Decrease, Some(old)) => Some(old - &update.value),
+                (UpdateOperator::ScaleUp, Some(old)) => Some(old * &update.value),
+                (UpdateOperator::ScaleDown, Some(old)) => {
+                    let Some(quotient) = old.checked_div(&update.value) else {
+                        let divisor = "its value".to_owned();
+                        let mistake = Mistake::DivisionByZero {
+                            divisor,
+                            within: within(),
+                        };
+                        return violates(update, mistake);
+                    };
+                    Some(quotient)
+                }
+            };
+        }
+        self.now.values[fluent.index()] = value;
+        Ok(())
+    }
+}

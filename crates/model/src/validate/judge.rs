@@ -1,0 +1,329 @@
+//! The plan is carried out, happening group by happening group.
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use super::derived::{Derivation, Derived};
+use super::explain::Witness;
+use super::margin::{Demand, Margins};
+use super::piece::{Piece, mentions_derived};
+use super::reading::{Fault, Moment, holds};
+use super::state::{Motion, Now, Reading};
+use super::stop::{Place, Stop};
+use super::timeline::{Group, What};
+use super::violation::{Mistake, When};
+use super::{Settings, interference};
+use crate::ground::{Condition, DurativeBody, FactId, SnapAction};
+use crate::plan::{Step, TimeTriggeredPlan};
+use crate::task::Task;
+
+/// The course of events up to some moment.
+pub(super) struct Judge<'a> {
+    pub(super) task: &'a Task,
+    pub(super) plan: &'a TimeTriggeredPlan,
+    pub(super) settings: &'a Settings,
+    pub(super) derivation: Derivation<'a>,
+    pub(super) now: Now,
+    /// The derived facts that hold in `now`, once something has asked for them.
+    pub(super) derived: OnceCell<Derived>,
+    /// Steps that have started and not ended.
+    pub(super) running: BTreeMap<usize, Running>,
+    /// What last changed each fact: time and happening.
+    pub(super) since: BTreeMap<FactId, (Rational, What<'a>)>,
+    pub(super) margins: Margins,
+}
+
+/// A durative action under way.
+#[derive(Clone, Debug)]
+pub(super) struct Running {
+    /// Whether no happening group has passed since it started.
+    pub(super) is_new: bool,
+    /// For each end effect, whether its guard may still come true.
+    pub(super) end_guards: Vec<bool>,
+    /// For each continuous effect, whether it takes place.
+    pub(super) continuous: Vec<bool>,
+}
+
+impl<'a> Judge<'a> {
+    /// Lives through all groups, then looks at the goal.
+    pub(super) fn run(&mut self, groups: &[Group<'a>]) -> Result<(), Stop> {
+        for (position, group) in groups.iter().enumerate() {
+            if let Some(before) = position.checked_sub(1) {
+                self.pass(&groups[before].time, &group.time)?;
+            }
+            self.arrive(group)?;
+            interference::check(self, &groups[..=position])?;
+            self.apply(group)?;
+        }
+        let end = groups
+            .last()
+            .map(|group| group.time.clone())
+            .unwrap_or_default();
+        self.require(self.task.goal(), When::Goal, None, &end)
+    }
+
+    /// From just after the group at `from` to the arrival at the next one.
+    fn pass(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
+        let rates = super::effects::rates(self);
+        let motion = Motion::from(&self.now, &rates)
+            .map_err(|fault| self.stop(fault, &Place::rates(from)))?;
+        let length = to - from;
+        self.watch_over_all(from, &motion, &length)?;
+        motion.carry(&mut self.now, &length);
+        self.derived.take();
+        for running in self.running.values_mut() {
+            running.is_new = false;
+        }
+        Ok(())
+    }
+
+    /// Checks the over-all conditions of running actions, and the over-all guards of their
+    /// effects, at every moment from the group at `from` until `length` later.
+    fn watch_over_all(
+        &mut self,
+        from: &Rational,
+        motion: &Motion,
+        length: &Rational,
+    ) -> Result<(), Stop> {
+        let mut running = std::mem::take(&mut self.running);
+        let mut margins = std::mem::take(&mut self.margins);
+        let piece = Piece {
+            now: &self.now,
+            motion,
+            length,
+            derivation: &self.derivation,
+            slack: &self.settings.slack,
+        };
+        for (&position, state) in &mut running {
+            let (step, body) = self.durative(position);
+            let duration = step.duration.as_ref();
+            for (index, conjunct) in body.over_all.conjuncts().into_iter().enumerate() {
+                let place = Place::condition(from, Some(position), When::OverAll, conjunct);
+                let broken = piece
+                    .first_break(conjunct, duration, !state.is_new)
+                    .map_err(|fault| self.stop(fault, &place))?;
+                if let Some(broken) = broken {
+                    let mut then = self.now.clone();
+                    motion.carry(&mut then, &broken.witness);
+                    return Err(self.fails(&place, &then, Some(&broken)));
+                }
+                if let Some(demand) = Demand::of(conjunct) {
+                    let key = (Some(position), When::OverAll, index);
+                    margins.watch(key, &demand, &piece, duration, from);
+                }
+            }
+            for (effect, flag) in body.end.effects.iter().zip(&mut state.end_guards) {
+                let guard = &effect.guard.over_all;
+                if *flag && !guard.is_trivial() {
+                    let place = Place::condition(from, Some(position), When::OverAll, guard);
+                    let broken = piece
+                        .first_break(guard, duration, !state.is_new)
+                        .map_err(|fault| self.stop(fault, &place))?;
+                    *flag = broken.is_none();
+                }
+            }
+        }
+        self.running = running;
+        self.margins = margins;
+        Ok(())
+    }
+
+    /// Checks the conditions of all happenings of a group, all in the same state.
+    fn arrive(&mut self, group: &Group<'a>) -> Result<(), Stop> {
+        for happening in &group.happenings {
+            let time = &group.time;
+            match happening.what {
+                What::Timed(_) => {}
+                What::Instant(position) => {
+                    let crate::ground::Body::Instantaneous(snap) =
+                        &self.plan.steps[position].action.body
+                    else {
+                        continue;
+                    };
+                    self.require(&snap.condition, When::Now, Some(position), time)?;
+                }
+                What::Start(position) => {
+                    let (_, body) = self.durative(position);
+                    self.check_duration(position, false, time)?;
+                    self.require(&body.start.condition, When::Start, Some(position), time)?;
+                    let running = self.begin(position, time)?;
+                    self.running.insert(position, running);
+                }
+                What::End(position) => {
+                    let (_, body) = self.durative(position);
+                    self.check_duration(position, true, time)?;
+                    self.require(&body.end.condition, When::End, Some(position), time)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads, at its start, which effects an action may have.
+    fn begin(&self, position: usize, time: &Rational) -> Result<Running, Stop> {
+        let (_, body) = self.durative(position);
+        let read = |guard: &Condition| {
+            let place = Place::condition(time, Some(position), When::Start, guard);
+            self.reads(guard, Some(position))
+                .map_err(|fault| self.stop(fault, &place))
+        };
+        let mut running = Running {
+            is_new: true,
+            end_guards: Vec::new(),
+            continuous: Vec::new(),
+        };
+        for effect in &body.end.effects {
+            running.end_guards.push(read(&effect.guard.at_start)?);
+        }
+        for effect in &body.continuous {
+            if !effect.guard.over_all.is_trivial() {
+                return Err(Stop::continuous_guard(self.task, time, effect.fluent));
+            }
+            running.continuous.push(read(&effect.guard.at_start)?);
+        }
+        Ok(running)
+    }
+
+    fn check_duration(&self, position: usize, at_end: bool, time: &Rational) -> Result<(), Stop> {
+        let (step, body) = self.durative(position);
+        let duration = step.duration.clone().unwrap_or_default();
+        for constraint in body
+            .duration
+            .iter()
+            .filter(|constraint| constraint.at_end == at_end)
+        {
+            let value = self
+                .reading(Some(position))
+                .value(&constraint.bound)
+                .map_err(|fault| self.stop(fault, &Place::bound(time, position, constraint)))?;
+            if !self
+                .settings
+                .allows(constraint.comparison, &duration, &value)
+            {
+                let mistake = Mistake::Duration {
+                    duration,
+                    comparison: constraint.comparison,
+                    bound: self.task.describe_expression(&constraint.bound),
+                    value,
+                };
+                return Err(self.violation(time, Some(position), mistake));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks a condition in the current state, conjunct by conjunct.
+    fn require(
+        &mut self,
+        condition: &Condition,
+        when: When,
+        step: Option<usize>,
+        time: &Rational,
+    ) -> Result<(), Stop> {
+        for (index, conjunct) in condition.conjuncts().into_iter().enumerate() {
+            let place = Place::condition(time, step, when, conjunct);
+            match self.reads(conjunct, step) {
+                Ok(true) => {}
+                Ok(false) => return Err(self.fails(&place, &self.now, None)),
+                Err(fault) => return Err(self.stop(fault, &place)),
+            }
+            if let Some(demand) = Demand::of(conjunct) {
+                let mut margins = std::mem::take(&mut self.margins);
+                margins.read((step, when, index), &demand, &self.reading(step), time);
+                self.margins = margins;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a condition of a step, or the goal, holds in the current state.
+    pub(super) fn reads(&self, condition: &Condition, step: Option<usize>) -> Result<bool, Fault> {
+        let current = (&self.now, &self.derived);
+        self.with_moment(condition, current, step, &|_, moment| {
+            holds(condition, moment)
+        })
+    }
+
+    /// Numbers in the current state as a step reads them.
+    pub(super) fn reading(&self, step: Option<usize>) -> Reading<'_> {
+        self.reading_of(&self.now, step)
+    }
+
+    fn reading_of<'b>(&'b self, now: &'b Now, step: Option<usize>) -> Reading<'b> {
+        let duration = step.and_then(|position| self.plan.steps[position].duration.as_ref());
+        Reading {
+            now,
+            duration,
+            slack: &self.settings.slack,
+        }
+    }
+
+    /// Hands `look` the moment `now`, with its derived facts if the condition needs them.
+    fn with_moment<T>(
+        &self,
+        condition: &Condition,
+        (now, derived): (&Now, &OnceCell<Derived>),
+        step: Option<usize>,
+        look: &dyn Fn(&Reading<'_>, &dyn Moment) -> T,
+    ) -> T {
+        let reading = self.reading_of(now, step);
+        if mentions_derived(condition, &self.derivation) {
+            // Rules know no `?duration`.
+            let derive = || self.derivation.derive(&self.reading_of(now, None));
+            let derived = derived.get_or_init(derive);
+            look(&reading, &self.derivation.on_top_of(&reading, derived))
+        } else {
+            look(&reading, &reading)
+        }
+    }
+
+    /// The reasons why a condition is false in `now`.
+    pub(super) fn explain(
+        &self,
+        condition: &Condition,
+        now: &Now,
+        step: Option<usize>,
+    ) -> Vec<super::violation::Reason> {
+        self.with_moment(
+            condition,
+            (now, &OnceCell::new()),
+            step,
+            &|reading, moment| {
+                let since = |fact| {
+                    let (time, what) = self.since.get(&fact)?;
+                    Some(self.occurrence(*what, time))
+                };
+                Witness {
+                    task: self.task,
+                    reading,
+                    moment,
+                    since: &since,
+                }
+                .reasons(condition)
+            },
+        )
+    }
+
+    /// The step and its durative body; only asked for steps that have one.
+    pub(super) fn durative(&self, position: usize) -> (&'a Step, &'a DurativeBody) {
+        let step = &self.plan.steps[position];
+        (
+            step,
+            step.action
+                .durative()
+                .expect("only durative actions start and end"),
+        )
+    }
+
+    /// The effects of a happening of the plan; `None` for timed initials.
+    pub(super) fn snap(&self, what: What<'a>) -> Option<&'a SnapAction> {
+        let action = &self.plan.steps[what.step()?].action;
+        match (&action.body, what) {
+            (crate::ground::Body::Instantaneous(snap), _) => Some(snap),
+            (crate::ground::Body::Durative(body), What::End(_)) => Some(&body.end),
+            (crate::ground::Body::Durative(body), _) => Some(&body.start),
+        }
+    }
+}

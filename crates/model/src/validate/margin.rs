@@ -1,0 +1,157 @@
+//! How far a valid plan is from violating each of its numeric conditions.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use super::piece::Piece;
+use super::polynomial::Polynomial;
+use super::state::Reading;
+use super::violation::{ActionInstance, When};
+use crate::ground::{Condition, Expression};
+use crate::problem::Comparison;
+
+/// How close one comparison of one action, or of the goal, came to failing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    /// The action; `None` for the goal.
+    pub action: Option<ActionInstance>,
+    /// Which of its conditions.
+    pub when: When,
+    /// The comparison as PDDL writes it.
+    pub condition: String,
+    /// By how much the greater side exceeded the smaller one at the tightest moment; 0 for
+    /// equations. For over-all conditions the limit at the ends counts.
+    pub margin: Rational,
+    /// That moment.
+    pub time: Rational,
+    /// Whether a margin of 0 would be a violation.
+    pub is_strict: bool,
+}
+
+/// A comparison that must hold, with the side that must not be smaller first.
+pub(super) struct Demand<'a> {
+    pub(super) greater: &'a Expression,
+    pub(super) smaller: &'a Expression,
+    pub(super) is_strict: bool,
+    pub(super) is_equation: bool,
+}
+
+impl<'a> Demand<'a> {
+    /// The demand that a conjunct makes; `None` if it is not a comparison, negated or not.
+    pub(super) fn of(conjunct: &'a Condition) -> Option<Self> {
+        let (comparison, left, right) = match conjunct {
+            Condition::Compare(comparison, left, right) => (*comparison, left, right),
+            Condition::Not(part) => match &**part {
+                Condition::Compare(comparison, left, right) => {
+                    (opposite(*comparison)?, left, right)
+                }
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let (greater, smaller) = match comparison {
+            Comparison::Less | Comparison::AtMost => (right, left),
+            _ => (left, right),
+        };
+        Some(Self {
+            greater,
+            smaller,
+            is_strict: matches!(comparison, Comparison::Less | Comparison::Greater),
+            is_equation: comparison == Comparison::Equal,
+        })
+    }
+}
+
+/// The comparison that holds when this one does not; `!=` has none.
+fn opposite(comparison: Comparison) -> Option<Comparison> {
+    match comparison {
+        Comparison::Less => Some(Comparison::AtLeast),
+        Comparison::AtMost => Some(Comparison::Greater),
+        Comparison::AtLeast => Some(Comparison::Less),
+        Comparison::Greater => Some(Comparison::AtMost),
+        Comparison::Equal => None,
+    }
+}
+
+/// Step (none: the goal), kind, and position among the conjuncts.
+type Key = (Option<usize>, When, usize);
+
+/// The tightest margins met so far.
+#[derive(Debug, Default)]
+pub(super) struct Margins(BTreeMap<Key, (Rational, Rational)>);
+
+impl Margins {
+    /// Notes the margin of a demand that is read once, at `time`.
+    pub(super) fn read(
+        &mut self,
+        key: Key,
+        demand: &Demand<'_>,
+        reading: &Reading<'_>,
+        time: &Rational,
+    ) {
+        if let (Ok(greater), Ok(smaller)) =
+            (reading.value(demand.greater), reading.value(demand.smaller))
+        {
+            let gap = if demand.is_equation {
+                Rational::ZERO
+            } else {
+                greater - smaller
+            };
+            self.note(key, gap, time.clone());
+        }
+    }
+
+    /// Notes the tightest margin of a demand throughout a piece that began at `time`.
+    pub(super) fn watch(
+        &mut self,
+        key: Key,
+        demand: &Demand<'_>,
+        piece: &Piece<'_>,
+        duration: Option<&Rational>,
+        time: &Rational,
+    ) {
+        if let Ok(gap) = piece.difference(demand.greater, demand.smaller, duration) {
+            let gap = if demand.is_equation {
+                gap.minus(&gap)
+            } else {
+                gap
+            };
+            for offset in extremes(&gap, piece.length) {
+                self.note(key, gap.at(&offset), time + offset);
+            }
+        }
+    }
+
+    fn note(&mut self, key: Key, margin: Rational, time: Rational) {
+        let entry = self
+            .0
+            .entry(key)
+            .or_insert_with(|| (margin.clone(), time.clone()));
+        if margin < entry.0 {
+            *entry = (margin, time);
+        }
+    }
+
+    /// All margins with their keys, in the order of the plan's steps, the goal first.
+    pub(super) fn into_entries(self) -> impl Iterator<Item = (Key, (Rational, Rational))> {
+        self.0.into_iter()
+    }
+}
+
+/// Where a polynomial on `[0, length]` may have its minimum; beyond the second degree, within a
+/// millionth of there.
+fn extremes(polynomial: &Polynomial, length: &Rational) -> Vec<Rational> {
+    let mut offsets = vec![Rational::ZERO];
+    if polynomial.degree() > 0 {
+        let derivative = polynomial.derivative();
+        for root in derivative.roots_within(length) {
+            let narrow = derivative
+                .square_free()
+                .narrowed(&root, &Rational::new(1, 1_000_000));
+            offsets.push(narrow.lower().clone());
+        }
+        offsets.push(length.clone());
+    }
+    offsets
+}

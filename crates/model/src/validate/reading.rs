@@ -1,0 +1,165 @@
+//! What a condition or an expression says at one moment.
+
+use elbowroom_num::Rational;
+
+use super::polynomial::Polynomial;
+use crate::ground::{Condition, Expression, FactId, FluentId};
+use crate::problem::{Comparison, Unknown};
+
+/// Why a condition or an expression says nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Fault {
+    /// It reads a fluent that has no value.
+    Undefined(FluentId),
+    /// It divides by zero; this is the divisor.
+    DivisionByZero(Expression),
+    /// It depends on a number left open.
+    Open(Unknown),
+    /// It mentions `?duration` where there is no action, or `total-time`.
+    Misplaced(Expression),
+    /// It divides by something that changes continuously.
+    Quotient(Expression),
+    /// It reads a fluent whose rate of change depends, in the end, on the fluent itself.
+    Circular(FluentId),
+}
+
+/// A moment at which conditions are read.
+pub(super) trait Moment {
+    /// Whether a fact, basic or derived, is true.
+    fn fact(&self, fact: FactId) -> Result<bool, Fault>;
+
+    /// Whether `left comparison right`.
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, Fault>;
+}
+
+/// Whether the condition holds. A part that says nothing does not matter where the other parts
+/// decide: `(or (p) (> (undefined) 0))` holds if `(p)` does.
+pub(super) fn holds(condition: &Condition, moment: &dyn Moment) -> Result<bool, Fault> {
+    match condition {
+        Condition::Fact(fact) => moment.fact(*fact),
+        Condition::Compare(comparison, left, right) => moment.compare(*comparison, left, right),
+        Condition::Not(part) => holds(part, moment).map(|value| !value),
+        Condition::And(parts) => combine(parts, moment, false),
+        Condition::Or(parts) => combine(parts, moment, true),
+    }
+}
+
+/// `decisive` if one part is, its opposite if no part is, else the first fault.
+fn combine(parts: &[Condition], moment: &dyn Moment, decisive: bool) -> Result<bool, Fault> {
+    let mut fault = None;
+    for part in parts {
+        match holds(part, moment) {
+            Ok(value) if value == decisive => return Ok(decisive),
+            Ok(_) => {}
+            Err(new) => fault = fault.or(Some(new)),
+        }
+    }
+    fault.map_or(Ok(!decisive), Err)
+}
+
+/// Numbers, or numbers that change with time.
+pub(super) trait Quantity: Sized + Clone {
+    fn constant(value: &Rational) -> Self;
+    fn plus(&self, other: &Self) -> Self;
+    fn minus(&self, other: &Self) -> Self;
+    fn times(&self, other: &Self) -> Self;
+    /// `divisor` is what `other` was computed from, for the fault.
+    fn over(&self, other: &Self, divisor: &Expression) -> Result<Self, Fault>;
+}
+
+impl Quantity for Rational {
+    fn constant(value: &Rational) -> Self {
+        value.clone()
+    }
+    fn plus(&self, other: &Self) -> Self {
+        self + other
+    }
+    fn minus(&self, other: &Self) -> Self {
+        self - other
+    }
+    fn times(&self, other: &Self) -> Self {
+        self * other
+    }
+    fn over(&self, other: &Self, divisor: &Expression) -> Result<Self, Fault> {
+        self.checked_div(other)
+            .ok_or_else(|| Fault::DivisionByZero(divisor.clone()))
+    }
+}
+
+impl Quantity for Polynomial {
+    fn constant(value: &Rational) -> Self {
+        Self::constant(value.clone())
+    }
+    fn plus(&self, other: &Self) -> Self {
+        Self::plus(self, other)
+    }
+    fn minus(&self, other: &Self) -> Self {
+        Self::minus(self, other)
+    }
+    fn times(&self, other: &Self) -> Self {
+        Self::times(self, other)
+    }
+    fn over(&self, other: &Self, divisor: &Expression) -> Result<Self, Fault> {
+        let Some(value) = other.as_constant() else {
+            return Err(Fault::Quotient(divisor.clone()));
+        };
+        let factor = value
+            .reciprocal()
+            .ok_or_else(|| Fault::DivisionByZero(divisor.clone()))?;
+        Ok(self.scaled(&factor))
+    }
+}
+
+/// The value of an expression whose fluents have the values that `fluent` gives.
+pub(super) fn evaluate<Q: Quantity>(
+    expression: &Expression,
+    duration: Option<&Rational>,
+    fluent: &dyn Fn(FluentId) -> Result<Q, Fault>,
+) -> Result<Q, Fault> {
+    let value = |part: &Expression| evaluate(part, duration, fluent);
+    match expression {
+        Expression::Constant(value) => Ok(Q::constant(value)),
+        Expression::Fluent(id) => fluent(*id),
+        Expression::Duration => match duration {
+            Some(duration) => Ok(Q::constant(duration)),
+            None => Err(Fault::Misplaced(expression.clone())),
+        },
+        Expression::TotalTime => Err(Fault::Misplaced(expression.clone())),
+        Expression::Unknown(unknown) => Err(Fault::Open(*unknown)),
+        Expression::Add(parts) => {
+            let mut total = Q::constant(&Rational::ZERO);
+            for part in parts {
+                total = total.plus(&value(part)?);
+            }
+            Ok(total)
+        }
+        Expression::Multiply(parts) => {
+            let mut product = Q::constant(&Rational::ONE);
+            for part in parts {
+                product = product.times(&value(part)?);
+            }
+            Ok(product)
+        }
+        Expression::Subtract(left, right) => Ok(value(left)?.minus(&value(right)?)),
+        Expression::Divide(left, right) => value(left)?.over(&value(right)?, right),
+        Expression::Negate(part) => Ok(Q::constant(&Rational::ZERO).minus(&value(part)?)),
+    }
+}
+
+/// Whether `difference comparison 0`, given the signs of `difference + slack` and
+/// `difference - slack`; see [`Settings::slack`](super::Settings::slack).
+pub(super) fn compare_signs(comparison: Comparison, raised: i32, lowered: i32) -> bool {
+    match comparison {
+        Comparison::Less => lowered < 0,
+        Comparison::AtMost => lowered <= 0,
+        Comparison::AtLeast => raised >= 0,
+        Comparison::Greater => raised > 0,
+        // Without slack both signs are the same.
+        Comparison::Equal => raised >= 0 && lowered <= 0,
+    }
+}

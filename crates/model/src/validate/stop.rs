@@ -1,0 +1,181 @@
+//! Where and why the judge stops before the end of the plan.
+
+use elbowroom_num::Rational;
+
+use super::judge::Judge;
+use super::piece::Break;
+use super::reading::Fault;
+use super::state::Now;
+use super::timeline::What;
+use super::violation::{
+    ActionInstance, Difficulty, Mistake, Occurrence, Point, Undecided, Violation, When,
+};
+use crate::ground::{Condition, DurationConstraint, Expression, FluentId};
+use crate::task::Task;
+
+/// The end of the matter; boxed, because nearly all calls return nothing of the kind.
+#[derive(Debug)]
+pub(super) enum Stop {
+    Violation(Box<Violation>),
+    Undecided(Box<Undecided>),
+}
+
+impl Stop {
+    pub(super) fn continuous_guard(task: &Task, time: &Rational, fluent: FluentId) -> Self {
+        Self::Undecided(Box::new(Undecided {
+            time: Some(time.clone()),
+            difficulty: Difficulty::ContinuousGuard {
+                fluent: task.fluent_name(fluent),
+            },
+        }))
+    }
+}
+
+/// What is being read, and when.
+pub(super) struct Place<'a> {
+    time: &'a Rational,
+    step: Option<usize>,
+    subject: Subject<'a>,
+}
+
+enum Subject<'a> {
+    Condition(When, &'a Condition),
+    Bound(&'a DurationConstraint),
+    Value(&'a Expression),
+    Rates,
+}
+
+impl<'a> Place<'a> {
+    pub(super) fn condition(
+        time: &'a Rational,
+        step: Option<usize>,
+        when: When,
+        condition: &'a Condition,
+    ) -> Self {
+        Self {
+            time,
+            step,
+            subject: Subject::Condition(when, condition),
+        }
+    }
+
+    pub(super) fn bound(time: &'a Rational, step: usize, bound: &'a DurationConstraint) -> Self {
+        Self {
+            time,
+            step: Some(step),
+            subject: Subject::Bound(bound),
+        }
+    }
+
+    pub(super) fn effect(time: &'a Rational, step: Option<usize>, value: &'a Expression) -> Self {
+        Self {
+            time,
+            step,
+            subject: Subject::Value(value),
+        }
+    }
+
+    pub(super) fn rates(time: &'a Rational) -> Self {
+        Self {
+            time,
+            step: None,
+            subject: Subject::Rates,
+        }
+    }
+}
+
+impl<'a> Judge<'a> {
+    /// The violation that a step, or the goal, commits.
+    pub(super) fn violation(&self, time: &Rational, step: Option<usize>, mistake: Mistake) -> Stop {
+        let action = step.map(|position| self.instance(position));
+        Stop::Violation(Box::new(Violation {
+            time: time.clone(),
+            action,
+            mistake,
+        }))
+    }
+
+    pub(super) fn instance(&self, position: usize) -> ActionInstance {
+        ActionInstance::of(self.plan, position)
+    }
+
+    pub(super) fn occurrence(&self, what: What<'a>, time: &Rational) -> Occurrence {
+        Occurrence {
+            time: time.clone(),
+            point: match what {
+                What::Start(_) => Point::Start,
+                What::End(_) => Point::End,
+                What::Instant(_) => Point::Instant,
+                What::Timed(_) => Point::Timed,
+            },
+            action: what.step().map(|position| self.instance(position)),
+        }
+    }
+
+    /// The violation that the condition at `place` is false in the state `then`; for over-all
+    /// conditions, from the moment that `broken` says.
+    pub(super) fn fails(&self, place: &Place<'_>, then: &Now, broken: Option<&Break>) -> Stop {
+        let Subject::Condition(when, condition) = place.subject else {
+            unreachable!("only conditions fail");
+        };
+        let time = match broken {
+            Some(broken) => place.time + &broken.at,
+            None => place.time.clone(),
+        };
+        let mistake = Mistake::Condition {
+            when,
+            condition: self.task.describe_condition(condition),
+            is_after: broken.is_some_and(|broken| broken.is_after),
+            is_exact: broken.is_none_or(|broken| broken.is_exact),
+            reasons: self.explain(condition, then, place.step),
+        };
+        self.violation(&time, place.step, mistake)
+    }
+
+    /// What follows from something that cannot be read.
+    pub(super) fn stop(&self, fault: Fault, place: &Place<'_>) -> Stop {
+        let within = match place.subject {
+            Subject::Condition(_, condition) => self.task.describe_condition(condition),
+            Subject::Bound(bound) => format!(
+                "the duration bound {}",
+                self.task.describe_expression(&bound.bound)
+            ),
+            Subject::Value(value) => format!(
+                "the effect's value {}",
+                self.task.describe_expression(value)
+            ),
+            Subject::Rates => "a rate of continuous change".to_owned(),
+        };
+        let difficulty = match fault {
+            Fault::Undefined(fluent) => {
+                let fluent = self.task.fluent_name(fluent);
+                let mistake = Mistake::Undefined { fluent, within };
+                return self.violation(place.time, place.step, mistake);
+            }
+            Fault::DivisionByZero(divisor) => {
+                let divisor = self.task.describe_expression(&divisor);
+                let mistake = Mistake::DivisionByZero { divisor, within };
+                return self.violation(place.time, place.step, mistake);
+            }
+            Fault::Open(unknown) => Difficulty::Open {
+                unknown: self.task.describe_unknown(unknown),
+                within,
+            },
+            Fault::Misplaced(expression) => Difficulty::Misplaced {
+                expression: self.task.describe_expression(&expression),
+                within,
+            },
+            Fault::Quotient(divisor) => Difficulty::Quotient {
+                divisor: self.task.describe_expression(&divisor),
+                within,
+            },
+            Fault::Circular(fluent) => Difficulty::Nonlinear {
+                fluent: self.task.fluent_name(fluent),
+            },
+        };
+        Stop::Undecided(Box::new(Undecided {
+            time: Some(place.time.clone()),
+            difficulty,
+        }))
+    }
+}

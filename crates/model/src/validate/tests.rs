@@ -1,0 +1,12 @@
+//! Each sentence of the definition of a valid plan, as a small plan.
+
+mod conditions;
+mod continuous;
+mod durations;
+mod effects;
+mod explanations;
+mod forms;
+mod groups;
+mod pieces;
+mod polynomials;
+mod world;

@@ -1,0 +1,188 @@
+//! When conditions are read.
+
+use super::world::World;
+
+#[test]
+fn a_plan_whose_actions_do_what_the_goal_asks_is_valid() {
+    let world = World::new("(p)").instant("go", "(p)", "(q)").goal("(q)");
+    assert_eq!(world.judge("1: go"), "valid");
+}
+
+#[test]
+fn the_empty_plan_is_valid_if_the_goal_holds_already() {
+    assert_eq!(World::new("(p)").goal("(p)").judge(""), "valid");
+    assert_eq!(
+        World::new("").goal("(p)").judge(""),
+        "at 0.000: the goal (p) does not hold: (p) is false"
+    );
+}
+
+#[test]
+fn a_start_condition_reads_the_state_before_any_effect_at_that_time() {
+    let world = World::new("").durative("a", &[("start", "(p)"), ("start effect", "(p)")]);
+    assert_eq!(
+        world.judge("1: a [2]"),
+        "at 1.000: (a) needs (p) at start: (p) is false"
+    );
+}
+
+#[test]
+fn an_end_condition_reads_the_state_before_the_effects_of_the_end() {
+    let world = World::new("").durative("a", &[("end", "(p)"), ("end effect", "(p)")]);
+    assert_eq!(
+        world.judge("1: a [2]"),
+        "at 3.000: (a) needs (p) at end: (p) is false"
+    );
+}
+
+#[test]
+fn an_end_condition_may_rest_on_the_start_effect() {
+    let world = World::new("").durative("a", &[("end", "(p)"), ("start effect", "(p)")]);
+    assert_eq!(world.judge("1: a [2]"), "valid");
+}
+
+#[test]
+fn an_over_all_condition_need_not_hold_before_the_start_effect_nor_after_the_end_effect() {
+    let world = World::new("").durative(
+        "a",
+        &[
+            ("over all", "(p)"),
+            ("start effect", "(p)"),
+            ("end effect", "(not (p))"),
+        ],
+    );
+    assert_eq!(world.judge("1: a [2]"), "valid");
+}
+
+#[test]
+fn an_over_all_condition_breaks_where_another_action_deletes_it() {
+    let world = World::new("(p)")
+        .durative("a", &[("over all", "(p)")])
+        .instant("spoil", "", "(not (p))");
+    assert_eq!(
+        world.judge("0: a [10]\n4: spoil"),
+        "at 4.000: (a) needs (p) over all: (p) is false since (spoil) at 4.000"
+    );
+    assert_eq!(world.judge("0: a [10]\n10: spoil"), "valid");
+    assert_eq!(
+        world.judge("1: a [10]\n1: spoil"),
+        "just after 1.000: (a) needs (p) over all: (p) is false since (spoil) at 1.000"
+    );
+}
+
+#[test]
+fn an_over_all_condition_of_an_action_without_duration_is_never_read() {
+    let world = World::new("").durative("a", &[("over all", "(p)")]);
+    assert_eq!(world.judge("1: a [0]"), "valid");
+}
+
+#[test]
+fn a_negative_condition_needs_the_fact_to_be_false() {
+    let world = World::new("(p)")
+        .instant("go", "(not (p))", "")
+        .instant("undo", "", "(not (p))");
+    assert_eq!(
+        world.judge("1: go"),
+        "at 1.000: (go) needs (not (p)): (p) is true"
+    );
+    assert_eq!(world.judge("1: undo\n2: go"), "valid");
+}
+
+#[test]
+fn one_disjunct_is_enough_and_all_are_blamed() {
+    let world = World::new("(p) (= x 3)").instant("go", "(or (q) (>= x 5))", "");
+    assert_eq!(
+        world.judge("1: go"),
+        "at 1.000: (go) needs (or (q) (>= (x) 5)): (q) is false; (x) = 3, short by 2"
+    );
+    let world = World::new("(q) (= x 3)").instant("go", "(or (q) (>= x 5))", "");
+    assert_eq!(world.judge("1: go"), "valid");
+}
+
+#[test]
+fn derived_facts_follow_from_their_rules() {
+    let world = World::new("(link)")
+        .rule("near", "(link)")
+        .rule("linked", "(near)")
+        .rule("apart", "(not (linked))")
+        .instant("cut", "(linked)", "(not (link))")
+        .instant("go", "(apart)", "");
+    assert_eq!(world.judge("1: cut\n2: go"), "valid");
+    assert_eq!(
+        world.judge("2: go"),
+        "at 2.000: (go) needs (apart): (apart) is false"
+    );
+}
+
+#[test]
+fn derived_facts_that_support_only_each_other_are_false() {
+    let world = World::new("")
+        .rule("a", "(b)")
+        .rule("b", "(a)")
+        .goal("(not (a))");
+    assert_eq!(world.judge(""), "valid");
+}
+
+#[test]
+fn a_derived_fact_that_depends_on_its_own_negation_cannot_be_judged() {
+    let world = World::new("")
+        .rule("a", "(not (b))")
+        .rule("b", "(a)")
+        .goal("(a)");
+    assert_eq!(
+        world.judge(""),
+        "undecided: a derived fact depends on its own negation"
+    );
+}
+
+#[test]
+fn the_goal_is_read_after_the_last_happening_of_the_plan() {
+    let world = World::new("(p)")
+        .timed("5", "(not (p))")
+        .instant("go", "", "")
+        .goal("(p)");
+    assert_eq!(world.judge("4: go"), "valid");
+    assert_eq!(
+        world.judge("6: go"),
+        "at 6.000: the goal (p) does not hold: (p) is false since a timed initial at 5.000"
+    );
+}
+
+#[test]
+fn a_fluent_without_a_value_is_named() {
+    let world = World::new("")
+        .instant("go", "(> x 0)", "")
+        .instant("more", "", "(increase x 1)");
+    assert_eq!(
+        world.judge("1: go"),
+        "at 1.000: (go) reads (x), which has no value, in (> (x) 0)"
+    );
+    assert_eq!(
+        world.judge("1: more"),
+        "at 1.000: (more) reads (x), which has no value, in its effect increase (x)"
+    );
+}
+
+#[test]
+fn a_fluent_without_a_value_does_not_matter_where_the_rest_decides() {
+    let world = World::new("(p)").instant("go", "(or (> x 0) (p))", "");
+    assert_eq!(world.judge("1: go"), "valid");
+}
+
+#[test]
+fn a_division_by_zero_is_named() {
+    let world = World::new("(= x 0)").instant("go", "(> (/ 1 x) 0)", "");
+    assert_eq!(
+        world.judge("1: go"),
+        "at 1.000: (go) divides by (x), which is 0, in (> (/ 1 (x)) 0)"
+    );
+}
+
+#[test]
+fn a_number_left_open_cannot_be_judged() {
+    let world = World::new("(= x 0)").instant("go", "(> x ?open)", "");
+    assert_eq!(
+        world.judge("1: go"),
+        "undecided: at 1.000: ?parameter0 is left open and read by (> (x) ?parameter0): give it a value"
+    );
+}

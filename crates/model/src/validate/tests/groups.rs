@@ -1,0 +1,111 @@
+//! Happenings at the same time, or nearly so.
+
+use super::world::{World, number};
+use crate::validate::Settings;
+
+fn handover() -> World {
+    World::new("")
+        .instant("give", "", "(p)")
+        .instant("take", "(p)", "(q)")
+        .goal("(q)")
+}
+
+#[test]
+fn interfering_happenings_keep_epsilon_apart() {
+    assert_eq!(handover().judge("1: give\n1.001: take"), "valid");
+    assert_eq!(
+        handover().judge("1: give\n1.0009: take"),
+        "at 1.0009: (take) interferes: (give) at 1.000 and (take) at 1.0009 both concern (p) \
+         and must be at least 0.001 apart"
+    );
+}
+
+#[test]
+fn what_happens_at_the_same_time_does_not_see_each_other() {
+    assert_eq!(
+        handover().judge("1: give\n1: take"),
+        "at 1.000: (take) needs (p): (p) is false"
+    );
+}
+
+#[test]
+fn interfering_happenings_at_the_same_time_are_refused_even_when_both_could_happen() {
+    let world = World::new("(p)")
+        .instant("use", "(p)", "")
+        .instant("spoil", "", "(not (p))");
+    assert_eq!(
+        world.judge("1: use\n1: spoil"),
+        "at 1.000: (spoil) interferes: (use) at 1.000 and (spoil) at 1.000 both concern (p) and \
+         must be at least 0.001 apart"
+    );
+}
+
+#[test]
+fn happenings_that_do_not_interfere_may_coincide() {
+    let world = World::new("(p)")
+        .instant("use", "(p)", "(q)")
+        .instant("reuse", "(p)", "(q)");
+    assert_eq!(world.judge("1: use\n1: reuse"), "valid");
+}
+
+#[test]
+fn the_start_and_the_end_of_one_action_keep_their_distance_too() {
+    let world =
+        World::new("").durative("a", &[("start effect", "(p)"), ("end effect", "(not (p))")]);
+    assert_eq!(world.judge("1: a [0.001]"), "valid");
+    assert_ne!(world.judge("1: a [0.0005]"), "valid");
+}
+
+#[test]
+fn a_timed_initial_interferes_with_actions_and_not_with_other_timed_initials() {
+    let world = World::new("")
+        .timed("5", "(p)")
+        .timed("5.0001", "(not (p))")
+        .timed("9", "(p)")
+        .instant("use", "(p)", "");
+    assert_eq!(world.judge("10: use"), "valid");
+    assert_eq!(
+        world.judge("9.0001: use"),
+        "at 9.0001: (use) interferes: a timed initial at 9.000 and (use) at 9.0001 both concern \
+         (p) and must be at least 0.001 apart"
+    );
+}
+
+#[test]
+fn without_epsilon_interfering_happenings_only_must_not_coincide() {
+    let world = handover().settings(Settings {
+        epsilon: None,
+        ..Settings::default()
+    });
+    assert_eq!(world.judge("1: give\n1.0000001: take"), "valid");
+    let world = World::new("(p)")
+        .instant("use", "(p)", "")
+        .instant("spoil", "", "(not (p))")
+        .settings(Settings {
+            epsilon: None,
+            ..Settings::default()
+        });
+    assert!(
+        world
+            .judge("1: use\n1: spoil")
+            .ends_with("must not happen at the same time")
+    );
+}
+
+#[test]
+fn the_tolerance_merges_what_is_within_a_tenth_of_it_after_the_first() {
+    let world = handover().settings(Settings::like_val(number("0.01")));
+    assert_eq!(
+        world.judge("1: give\n1.001: take"),
+        "at 1.000: (take) needs (p): (p) is false"
+    );
+    assert_eq!(world.judge("1: give\n1.0011: take"), "valid");
+}
+
+#[test]
+fn a_group_does_not_grow_beyond_a_tenth_of_the_tolerance_after_its_first_happening() {
+    let world = handover()
+        .instant("idle", "", "")
+        .settings(Settings::like_val(number("0.01")));
+    assert_eq!(world.judge("1: idle\n1.0008: give\n1.0016: take"), "valid");
+}

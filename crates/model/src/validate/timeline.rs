@@ -1,0 +1,111 @@
+//! A plan and a task's timed initials as one sequence of happening groups.
+
+use elbowroom_num::Rational;
+
+use super::Settings;
+use crate::ground::Body;
+use crate::interference::Footprint;
+use crate::plan::TimeTriggeredPlan;
+use crate::task::{Task, TimedHappening};
+
+/// What a happening is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum What<'a> {
+    /// The start of the plan's step of this position.
+    Start(usize),
+    /// The end of that step.
+    End(usize),
+    /// That step, which takes no time.
+    Instant(usize),
+    /// Timed initial literals and fluents.
+    Timed(&'a TimedHappening),
+}
+
+impl What<'_> {
+    /// The position of the step it belongs to.
+    pub(super) fn step(&self) -> Option<usize> {
+        match self {
+            Self::Start(step) | Self::End(step) | Self::Instant(step) => Some(*step),
+            Self::Timed(_) => None,
+        }
+    }
+}
+
+/// Something that happens, when, and what it reads and writes.
+#[derive(Clone, Debug)]
+pub(super) struct Happening<'a> {
+    pub(super) what: What<'a>,
+    pub(super) time: Rational,
+    pub(super) footprint: Footprint,
+}
+
+/// All that happens at one time.
+#[derive(Clone, Debug)]
+pub(super) struct Group<'a> {
+    pub(super) time: Rational,
+    pub(super) happenings: Vec<Happening<'a>>,
+}
+
+/// All happenings by time; those that the tolerance does not tell apart form one group.
+///
+/// Timed initials after the last happening of the plan are left out.
+pub(super) fn timeline<'a>(
+    task: &'a Task,
+    plan: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> Vec<Group<'a>> {
+    let mut happenings = Vec::new();
+    for (position, step) in plan.steps.iter().enumerate() {
+        let footprint = Footprint::of_start(task, &step.action);
+        let time = step.start.clone();
+        if let (Body::Durative(_), Some(duration)) = (&step.action.body, &step.duration) {
+            let end = &time + duration;
+            happenings.push(Happening {
+                what: What::Start(position),
+                time,
+                footprint,
+            });
+            let footprint = Footprint::of_end(task, &step.action);
+            happenings.push(Happening {
+                what: What::End(position),
+                time: end,
+                footprint,
+            });
+        } else {
+            happenings.push(Happening {
+                what: What::Instant(position),
+                time,
+                footprint,
+            });
+        }
+    }
+    let last = happenings
+        .iter()
+        .map(|happening| &happening.time)
+        .max()
+        .cloned();
+    for timed in task.timed() {
+        happenings.push(Happening {
+            what: What::Timed(timed),
+            time: timed.time.clone(),
+            footprint: Footprint::of_timed(timed),
+        });
+    }
+    happenings.sort_by(|a, b| a.time.cmp(&b.time));
+
+    let width = settings.group_width();
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    for happening in happenings {
+        match groups.last_mut() {
+            Some(group) if happening.time <= &group.time + &width => {
+                group.happenings.push(happening);
+            }
+            _ => groups.push(Group {
+                time: happening.time.clone(),
+                happenings: vec![happening],
+            }),
+        }
+    }
+    groups.retain(|group| last.as_ref().is_some_and(|last| group.time <= *last));
+    groups
+}

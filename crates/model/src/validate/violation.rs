@@ -1,0 +1,219 @@
+//! Why a plan is not valid, or why that cannot be decided.
+
+use elbowroom_num::Rational;
+
+use crate::plan::TimeTriggeredPlan;
+use crate::problem::Comparison;
+
+/// The first thing that is wrong with a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// When.
+    pub time: Rational,
+    /// The action to blame; `None` for the goal.
+    pub action: Option<ActionInstance>,
+    /// What is wrong.
+    pub mistake: Mistake,
+}
+
+/// One action of a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActionInstance {
+    /// Its position in the plan's list of steps.
+    pub step: usize,
+    /// `(name arg …)`
+    pub name: String,
+    /// When it starts, or happens.
+    pub start: Rational,
+}
+
+impl ActionInstance {
+    pub(super) fn of(plan: &TimeTriggeredPlan, position: usize) -> Self {
+        let step = &plan.steps[position];
+        Self {
+            step: position,
+            name: step.action.name.clone(),
+            start: step.start.clone(),
+        }
+    }
+}
+
+/// What can be wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mistake {
+    /// An action starts before time 0.
+    TooEarly,
+    /// A durative action has no duration.
+    NoDuration,
+    /// A duration is below 0.
+    NegativeDuration(Rational),
+    /// A duration does not satisfy the domain.
+    Duration {
+        /// The duration in the plan.
+        duration: Rational,
+        /// How it should compare to the bound.
+        comparison: Comparison,
+        /// The bound as PDDL writes it.
+        bound: String,
+        /// The bound's value.
+        value: Rational,
+    },
+    /// A condition does not hold.
+    Condition {
+        /// Which kind.
+        when: When,
+        /// As PDDL writes it.
+        condition: String,
+        /// Whether it still holds at the time given, and fails right after it.
+        is_after: bool,
+        /// Whether the time given is exact; else it is within a millionth below the true one,
+        /// which is irrational.
+        is_exact: bool,
+        /// What makes it false.
+        reasons: Vec<Reason>,
+    },
+    /// Two happenings that interfere are too close to each other.
+    Interference {
+        /// The earlier one.
+        first: Occurrence,
+        /// The later one.
+        second: Occurrence,
+        /// The fact or fluent over which they interfere.
+        over: String,
+        /// How far apart they would have to be; `None`: not at the same time.
+        separation: Option<Rational>,
+    },
+    /// One happening gives a fluent several values at once.
+    Conflict {
+        /// The fluent.
+        fluent: String,
+    },
+    /// A fluent is read that has no value.
+    Undefined {
+        /// The fluent.
+        fluent: String,
+        /// The condition, effect or bound that reads it.
+        within: String,
+    },
+    /// A number is divided by zero.
+    DivisionByZero {
+        /// The divisor.
+        divisor: String,
+        /// The condition, effect or bound that divides.
+        within: String,
+    },
+}
+
+/// Which condition of an action, or the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum When {
+    /// Of an instantaneous action.
+    Now,
+    /// At start.
+    Start,
+    /// Over all.
+    OverAll,
+    /// At end.
+    End,
+    /// The goal.
+    Goal,
+}
+
+/// Why a condition is false: one of its parts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reason {
+    /// A fact does not have the truth it should have.
+    Fact {
+        /// The fact.
+        fact: String,
+        /// Its truth.
+        is_true: bool,
+        /// What last made it so; `None` if it has been so from the beginning, or is derived.
+        since: Option<Occurrence>,
+    },
+    /// A comparison does not have the truth it should have.
+    Comparison {
+        /// The comparison.
+        comparison: String,
+        /// The values of the fluents (and of `?duration`) in it.
+        values: Vec<(String, Rational)>,
+        /// The value of its left side.
+        left: Rational,
+        /// The value of its right side.
+        right: Rational,
+        /// Its truth.
+        is_true: bool,
+    },
+}
+
+/// Something that happens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occurrence {
+    /// When.
+    pub time: Rational,
+    /// What of the action it is.
+    pub point: Point,
+    /// The action; `None` for timed initials.
+    pub action: Option<ActionInstance>,
+}
+
+/// What of an action a happening is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Point {
+    /// The start of a durative action.
+    Start,
+    /// The end of a durative action.
+    End,
+    /// An action that takes no time.
+    Instant,
+    /// No action: timed initial literals and fluents.
+    Timed,
+}
+
+/// Why it cannot be decided whether a plan is valid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Undecided {
+    /// When the difficulty arises; `None` if before anything happens.
+    pub time: Option<Rational>,
+    /// The difficulty.
+    pub difficulty: Difficulty,
+}
+
+/// What keeps the judge from judging.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Difficulty {
+    /// A number is left open.
+    Open {
+        /// Its name.
+        unknown: String,
+        /// Where it is read.
+        within: String,
+    },
+    /// A fluent's rate of change depends on the fluent itself, so that its value is no
+    /// polynomial in time.
+    Nonlinear {
+        /// The fluent.
+        fluent: String,
+    },
+    /// A number is divided by one that changes continuously.
+    Quotient {
+        /// The divisor.
+        divisor: String,
+        /// Where.
+        within: String,
+    },
+    /// `?duration` or `total-time` stands where it means nothing.
+    Misplaced {
+        /// Which of the two.
+        expression: String,
+        /// Where.
+        within: String,
+    },
+    /// A continuous effect depends on an over-all condition, whose truth lies in the future.
+    ContinuousGuard {
+        /// The fluent that the effect changes.
+        fluent: String,
+    },
+    /// A derived fact depends on its own negation.
+    Unstratified,
+}
