@@ -15,6 +15,7 @@ pub mod linear;
 mod network;
 pub mod obligations;
 mod parameter;
+pub mod parametrize;
 pub mod reduction;
 pub mod soundness;
 mod stn_plan;
