@@ -22,16 +22,15 @@ mod term;
 mod timed;
 mod typed_list;
 
-use std::rc::Rc;
-
 use elbowroom_model::Problem;
 use elbowroom_model::problem::TypeId;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::lower::names::Names;
 use crate::lower::sections::Sections;
+use crate::lower::typed_list::TypeNames;
 use crate::report::Report;
-use crate::source::{FileId, Source, Span};
+use crate::source::{FileId, Source};
 use crate::syntax;
 
 /// Reads a planning problem from the texts of its domain and problem files.
@@ -71,7 +70,7 @@ struct Reader {
     /// How much text was copied because it stands around more than one effect.
     copied: usize,
     /// The types resolved last.
-    resolved_types: Option<(Rc<[(String, Span)]>, Vec<TypeId>)>,
+    resolved_types: Option<(TypeNames, Vec<TypeId>)>,
 }
 
 impl Reader {

@@ -9,15 +9,16 @@
 //! - [`format`]: STN plan files.
 
 mod decoupled;
+pub mod deorder;
 mod durations;
 pub mod format;
 pub mod linear;
 mod network;
 pub mod obligations;
 mod parameter;
+pub mod parametrize;
 pub mod reduction;
 pub mod soundness;
-pub mod parametrize;
 mod stn_plan;
 mod suggestion;
 #[cfg(test)]

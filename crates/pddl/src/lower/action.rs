@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::problem::{Body, Schema, SchemaId};
+use elbowroom_model::problem::{Body, Condition, Schema, SchemaId};
 
 use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::effect::{Around, Effects, Moment};
 use crate::lower::scope::Scope;
 use crate::lower::sections::Section;
+use crate::lower::timed::Timed;
 use crate::source::Span;
 use crate::suggest::nearest;
 use crate::syntax::Node;
@@ -152,7 +153,7 @@ impl Reader {
     fn instantaneous_body(&mut self, fields: &Fields, scope: &mut Scope) -> Body {
         let condition = match fields.get(":precondition") {
             Some((_, Some(node))) => self.condition(node, scope),
-            _ => elbowroom_model::problem::Condition::TRUE,
+            _ => Condition::TRUE,
         };
         let effects = self.effects(fields, Moment::Instant, scope);
         Body::Instantaneous {
@@ -174,7 +175,7 @@ impl Reader {
         }
         let condition = match fields.get(":condition") {
             Some((_, Some(node))) => self.timed_condition(node, scope),
-            _ => crate::lower::timed::Timed::default(),
+            _ => Timed::default(),
         };
         let effects = self.effects(fields, Moment::Unspecified, scope);
         Body::Durative {

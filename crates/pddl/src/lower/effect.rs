@@ -147,6 +147,10 @@ impl Reader {
         around: &Around,
         effects: &mut Effects,
     ) {
+        if head == "change" {
+            self.object_change(node, parts);
+            return;
+        }
         let operator = operator(head);
         if moment == Moment::Unspecified {
             match operator {
@@ -309,6 +313,19 @@ impl Reader {
             }
         }
         Some(guard)
+    }
+
+    /// `(change (f …) object)`, an assignment to an object fluent.
+    fn object_change(&mut self, node: &Node, parts: &[Node]) {
+        let is_refused = parts
+            .first()
+            .and_then(Node::form)
+            .is_some_and(|(head, _)| self.names.object_functions.contains(head.as_ref()));
+        if !is_refused {
+            self.report
+                .error(node.head_span(), "`change` is not an effect")
+                .suggest(Some("assign"));
+        }
     }
 
     fn wrong_update(&mut self, operator: UpdateOperator, node: &Node) {

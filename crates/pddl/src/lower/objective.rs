@@ -23,7 +23,7 @@ const SECTIONS: &[&str] = &[
 impl Reader {
     /// Reads a problem, after its domain.
     pub(super) fn problem(&mut self, sections: &Sections) {
-        self.problem.name = sections.name.to_owned();
+        sections.name.clone_into(&mut self.problem.name);
         self.domain_name(sections);
         for section in sections.all(":requirements") {
             self.requirements(section);
