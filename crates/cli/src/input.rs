@@ -51,7 +51,9 @@ pub(crate) fn parametrized_plan(
         .collect::<Result<Vec<_>, _>>()
         .map_err(|error| Failure::new(error, ""))?;
     let text = source(path, "plan")?;
-    let is_stn_file = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("stn"))
+    let is_stn_file = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("stn"))
         || PlanKind::of_text(text.text()) == PlanKind::Stn;
     if is_stn_file {
         let plan = format::read(text.text().as_bytes(), task)
@@ -102,18 +104,28 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             output::tell(&format!("reading the {what} from standard input"));
         }
         let mut bytes = Vec::new();
-        let read = io::stdin().lock().take(LARGEST_FILE).read_to_end(&mut bytes);
+        let read = io::stdin()
+            .lock()
+            .take(LARGEST_FILE)
+            .read_to_end(&mut bytes);
         return match read {
             Ok(_) => Ok(Source::from_bytes("standard input", &bytes)),
             Err(error) => Err(Failure::new(
-                format!("cannot read the {what} from standard input: {}", plain(&error)),
+                format!(
+                    "cannot read the {what} from standard input: {}",
+                    plain(&error)
+                ),
                 "",
             )),
         };
     }
     let refused = |error: &io::Error| {
         Failure::new(
-            format!("cannot read the {what} {}: {}", path.display(), plain(error)),
+            format!(
+                "cannot read the {what} {}: {}",
+                path.display(),
+                plain(error)
+            ),
             advice(path, error),
         )
     };
@@ -132,7 +144,9 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
 fn advice(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let parent = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
             match parent {
                 Some(folder) if !folder.is_dir() => {
                     format!("there is no folder {}", folder.display())

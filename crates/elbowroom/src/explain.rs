@@ -69,7 +69,9 @@ impl<'a> Explainer<'a> {
     pub fn no_schedule(&self, valuation: &[Rational]) -> Explanation {
         let conflict = conflict::find(self, valuation);
         Explanation {
-            reason: conflict.as_ref().map_or_else(String::new, |c| c.reason.clone()),
+            reason: conflict
+                .as_ref()
+                .map_or_else(String::new, |c| c.reason.clone()),
             shortfall: conflict.map(|conflict| conflict.excess),
             valuation: valuation.to_vec(),
             schedule: None,
@@ -157,9 +159,9 @@ impl<'a> Explainer<'a> {
         let epsilon = self.epsilon.to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
         match (kind(first), kind(second)) {
-            (Node::Start(start), Node::End(end)) if start == end => format!(
-                "an action whose start and end interfere takes at least {epsilon}"
-            ),
+            (Node::Start(start), Node::End(end)) if start == end => {
+                format!("an action whose start and end interfere takes at least {epsilon}")
+            }
             (_, Node::Timed(index)) => self.deadline(*first, index),
             (Node::Timed(index), _) => format!(
                 "{} must come {epsilon} after {} at {}",

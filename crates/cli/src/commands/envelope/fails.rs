@@ -24,7 +24,10 @@ pub(super) fn at_nominal(
     objection: &Objection,
 ) -> Answer {
     let point = DecoupledEnvelope::point(&subject.plan.nominal());
-    print(subject, &subject.explainer.objection(oracle, &point, objection))
+    print(
+        subject,
+        &subject.explainer.objection(oracle, &point, objection),
+    )
 }
 
 fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
@@ -50,10 +53,18 @@ fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
 pub(super) fn what(explanation: &Explanation) -> String {
     match &explanation.shortfall {
         Some(shortfall) if !shortfall.is_zero() && explanation.schedule.is_none() => {
-            format!("{}: too late by {}", explanation.reason, number::nearest(shortfall))
+            format!(
+                "{}: too late by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
         }
         Some(shortfall) if !shortfall.is_zero() => {
-            format!("{}: short by {}", explanation.reason, number::nearest(shortfall))
+            format!(
+                "{}: short by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
         }
         _ => explanation.reason.clone(),
     }

@@ -97,12 +97,13 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
         Err(objection) => return fails::at_nominal(subject, &oracle, &objection),
     };
     if subject.arguments.sharpen && stop == Stop::Converged {
-        envelope = sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
+        envelope =
+            sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
     }
     let seconds = watch.seconds();
     let checks = oracle.checks();
-    let found = limits(&mut oracle, &envelope, &subject.arguments.precision)
-        .map_err(|r| refused(&r))?;
+    let found =
+        limits(&mut oracle, &envelope, &subject.arguments.precision).map_err(|r| refused(&r))?;
     drop(progress);
     let outcome = Outcome {
         limits: in_words(subject, &found),
@@ -167,7 +168,8 @@ impl Watch {
     }
 
     fn is_late(&self) -> bool {
-        self.limit.is_some_and(|limit| self.clock.elapsed() >= limit)
+        self.limit
+            .is_some_and(|limit| self.clock.elapsed() >= limit)
     }
 
     fn flow(&self) -> ControlFlow<()> {

@@ -121,7 +121,8 @@ fn course(subject: &Subject<'_>, outcome: &Outcome) -> String {
             number::nearest(&subject.arguments.precision)
         ),
         Stop::CheckLimit | Stop::TimeLimit => {
-            "The time limit came before the search was done; the intervals could be wider".to_owned()
+            "The time limit came before the search was done; the intervals could be wider"
+                .to_owned()
         }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
