@@ -86,6 +86,14 @@ impl Reader {
                     let arguments = Self::objects_only(&fluent.arguments)?;
                     return Some(TimedChange::Assign(fluent.function, arguments, value));
                 }
+                // Generated problems list what is false, too; saying so about a predicate that
+                // the domain has not got is true.
+                ("not", [atom]) if self.is_undeclared(atom) => {
+                    self.report
+                        .warning(atom.span, format!("unknown predicate `{}`", atom.quote()))
+                        .label("ignored: it is false anyway");
+                    return None;
+                }
                 ("not", [atom]) => {
                     let (predicate, arguments) = self.initial_fact(atom, &scope)?;
                     return Some(TimedChange::Delete(predicate, arguments));
@@ -102,6 +110,11 @@ impl Reader {
         }
         self.not_initial(node);
         None
+    }
+
+    fn is_undeclared(&self, atom: &Node) -> bool {
+        atom.form()
+            .is_some_and(|(head, _)| !self.names.predicates.contains_key(head.as_ref()))
     }
 
     fn initial_fact(&mut self, node: &Node, scope: &Scope) -> Option<(PredicateId, Vec<ObjectId>)> {
