@@ -274,7 +274,7 @@ impl Task {
     }
 
     /// Calls `action` once for each way to append objects for `variables` to the binding.
-    fn for_all(
+    pub(crate) fn for_all(
         &mut self,
         variables: &[Variable],
         binding: &mut Vec<ObjectId>,

@@ -18,16 +18,20 @@
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
 
 mod describe;
+mod domains;
 pub mod ground;
 mod instantiate;
 mod interference;
 mod plan;
 pub mod problem;
+pub mod reachability;
+mod simplify;
 mod task;
 pub mod validate;
 
 pub use interference::Footprint;
 pub use plan::{Step, TimeTriggeredPlan};
 pub use problem::Problem;
+pub use simplify::Constants;
 pub use task::{GroundRule, InstantiateError, State, Task, TimedHappening};
 pub use validate::{Verdict, validate};

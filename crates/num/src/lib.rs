@@ -7,6 +7,7 @@
 //! - [`Rational`]: an exact fraction.
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
+//! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
 //!
 //! No planning word occurs in this crate.
 //!
@@ -23,6 +24,7 @@
 mod delta;
 mod interval;
 mod rational;
+pub mod simplex;
 
 pub use delta::Delta;
 pub use interval::{End, Interval};

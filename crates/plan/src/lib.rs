@@ -6,11 +6,25 @@
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
 //! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
+//! - [`format`]: STN plan files.
 
 mod decoupled;
+mod durations;
+pub mod format;
+pub mod linear;
+mod network;
+pub mod obligations;
 mod parameter;
+pub mod parametrize;
+pub mod reduction;
+pub mod soundness;
 mod stn_plan;
+mod suggestion;
+#[cfg(test)]
+mod testing;
+mod unknowns;
 
 pub use decoupled::DecoupledEnvelope;
+pub use network::{Schedule, network_node};
 pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::FluentId;
+use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::{Interval, Rational};
 
 use crate::stn_plan::{InstanceId, StnPlan};
@@ -43,7 +43,8 @@ pub struct Parameter {
 /// Which quantity a parameter stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
-    /// The duration of an action instance. The domain's duration constraints no longer bind it.
+    /// The duration of an action instance. The domain's duration constraints no longer bind it,
+    /// and its action in the plan no longer lists them.
     Duration(InstanceId),
     /// A constant in an action instance: an effect, a condition, a rate.
     Constant(InstanceId),
@@ -66,18 +67,35 @@ pub struct ParametrizedPlan {
     pub parameters: Vec<Parameter>,
     /// Initial values that are parameters.
     pub initial: BTreeMap<FluentId, ParameterId>,
+    /// What must hold at the end: the task's goal, with the domain's unknowns as parameters.
+    pub goal: Condition,
 }
 
 /// A value for each parameter, by position.
 pub type Valuation = Vec<Rational>;
 
+impl ParameterKind {
+    /// The values such a quantity can take when nobody says otherwise, given its nominal value:
+    /// times spent and amounts consumed keep their sign.
+    pub fn natural_range(self, nominal: &Rational) -> Interval {
+        match self {
+            Self::Bound | Self::Initial(_) => Interval::EVERYTHING,
+            Self::Constant(_) | Self::Domain if nominal.is_negative() => {
+                Interval::at_most(Rational::ZERO)
+            }
+            _ => Interval::at_least(Rational::ZERO),
+        }
+    }
+}
+
 impl ParametrizedPlan {
     /// A plan in which nothing is left open.
-    pub fn closed(plan: StnPlan) -> Self {
+    pub fn closed(task: &Task, plan: StnPlan) -> Self {
         Self {
             plan,
             parameters: Vec::new(),
             initial: BTreeMap::new(),
+            goal: task.goal().clone(),
         }
     }
 

@@ -166,6 +166,14 @@ impl StnPlan {
         &self.instances[id.index()]
     }
 
+    /// Takes the domain's duration constraints from the instance, because something else decides
+    /// how long it takes.
+    pub fn free_duration(&mut self, id: InstanceId) {
+        if let Body::Durative(body) = &mut self.instances[id.index()].action.body {
+            body.duration.clear();
+        }
+    }
+
     /// The node at which the instance starts, or happens.
     pub fn start(&self, id: InstanceId) -> NodeId {
         self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))

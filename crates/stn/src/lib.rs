@@ -1,1 +1,66 @@
-//! Elbowroom: temporal networks.
+//! Temporal networks: time points, bounds on their differences, and what follows from them.
+//!
+//! A simple temporal network (Dechter, Meiri & Pearl 1991) is a set of constraints
+//! `to - from <= bound`. Drawn as edges `from --bound--> to`, everything one may want to know is
+//! a question about shortest paths: the network is consistent unless it has a cycle of negative
+//! length, and the tightest bound on `b - a` that follows is the distance from `a` to `b`.
+//!
+//! What flows in is a [`Network`]; it may contradict itself. [`Network::consistency`] answers
+//! with a [`Schedule`] or with a [`NegativeCycle`], and [`ConsistentNetwork`] is a network
+//! together with the schedule that proves it consistent. That proof makes every later question
+//! cheap, because it turns all edges non-negative for Dijkstra's algorithm:
+//!
+//! - [`ConsistentNetwork::add`] tightens, or refuses and says why; [`ConsistentNetwork::undo_to`]
+//!   takes back;
+//! - [`ConsistentNetwork::windows`], [`ConsistentNetwork::earliest_schedule`],
+//!   [`ConsistentNetwork::latest_schedule`]: when each point may and can happen;
+//! - [`ConsistentNetwork::shortest_paths_from`] and its kin: implied bounds, with the
+//!   constraints that imply them;
+//! - [`ConsistentNetwork::implied`]: the constraints one can leave out;
+//! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks.
+//!
+//! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
+//! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a
+//! [`Weight`] too. Every answer is exact, and the same on each run.
+//!
+//! This crate knows no actions, and nothing of plans.
+//!
+//! ```
+//! use elbowroom_num::Rational;
+//! use elbowroom_stn::{ConsistentNetwork, Constraint};
+//!
+//! let mut network = ConsistentNetwork::new();
+//! let zero = network.add_node();
+//! let arrival = network.add_node();
+//! let minutes = |n: i64| Rational::from(n);
+//! network.add(Constraint::at_least(zero, arrival, minutes(10)))?;
+//! network.add(Constraint::at_most(zero, arrival, minutes(30)))?;
+//! let windows = network.windows(zero);
+//! assert_eq!(windows[arrival].earliest, Some(minutes(10)));
+//! assert_eq!(windows[arrival].latest, Some(minutes(30)));
+//!
+//! let refused = network.add(Constraint::at_most(zero, arrival, minutes(5)));
+//! assert_eq!(refused.unwrap_err().total, minutes(-5));
+//! # Ok::<(), elbowroom_stn::NegativeCycle>(())
+//! ```
+
+mod consistency;
+mod consistent;
+mod implied;
+mod minimal;
+mod network;
+mod paths;
+mod schedule;
+#[cfg(feature = "testing")]
+pub mod testing;
+mod weight;
+mod windows;
+
+pub use consistency::NegativeCycle;
+pub use consistent::{Checkpoint, ConsistentNetwork};
+pub use minimal::Minimal;
+pub use network::{Constraint, ConstraintId, Network, NodeId};
+pub use paths::{Direction, ShortestPaths};
+pub use schedule::Schedule;
+pub use weight::Weight;
+pub use windows::{Window, Windows};

@@ -1,0 +1,144 @@
+//! Which end moves next, and how far.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::reduction::{BoxEnd, Side};
+use elbowroom_plan::{ParameterId, ParametrizedPlan};
+
+/// How steps change after a success.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Growth {
+    /// They double until both directions of the parameter have been refused for the first time,
+    /// as in the authors' code.
+    #[default]
+    Doubling,
+    /// They stay, as in the paper.
+    Constant,
+}
+
+/// The open directions and step sizes (Θ and Δ of Algorithm 1).
+///
+/// One function both decides to go on and picks the end, so lines 6 and 7 of the algorithm, which
+/// test different bounds, cannot disagree.
+#[derive(Clone, Debug)]
+pub(crate) struct Frontier {
+    growth: Growth,
+    precision: Rational,
+    parameters: Vec<Progress>,
+    /// Where the round robin stands.
+    next: usize,
+}
+
+/// One parameter's part of the frontier.
+#[derive(Clone, Debug)]
+struct Progress {
+    step: Rational,
+    /// Open directions with the present step: lower, upper.
+    is_open: [bool; 2],
+    /// Directions in which nothing is left to gain: lower, upper.
+    is_done: [bool; 2],
+    /// Whether both directions have been refused at least once.
+    has_halved: bool,
+}
+
+impl Frontier {
+    /// All directions open; steps as in the authors' code, `max(nominal, 1) · weight`, but at
+    /// least the precision.
+    pub(crate) fn new(plan: &ParametrizedPlan, precision: &Rational, growth: Growth) -> Self {
+        let parameters = plan
+            .parameters
+            .iter()
+            .map(|parameter| {
+                let scale = parameter.nominal.abs().max(Rational::ONE);
+                Progress {
+                    step: (&scale * &parameter.weight).max(precision.clone()),
+                    is_open: [true; 2],
+                    is_done: [false; 2],
+                    has_halved: false,
+                }
+            })
+            .collect();
+        Self {
+            growth,
+            precision: precision.clone(),
+            parameters,
+            next: 0,
+        }
+    }
+
+    /// The next end to move and by how much; `None` when every step is below the precision.
+    ///
+    /// Round robin over the parameters, the upper end first. While some step is at least the
+    /// precision, those down to half of it take part as well, as in the authors' code.
+    pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
+        let unfinished = |progress: &Progress| progress.is_done != [true; 2];
+        let go_on = self
+            .parameters
+            .iter()
+            .any(|progress| unfinished(progress) && progress.step >= self.precision);
+        if !go_on {
+            return None;
+        }
+        let least = &self.precision * &Rational::new(1, 2);
+        let count = self.parameters.len();
+        for offset in 0..count {
+            let index = (self.next + offset) % count;
+            let progress = &self.parameters[index];
+            if progress.step < least {
+                continue;
+            }
+            for side in [Side::Upper, Side::Lower] {
+                let place = position(side);
+                if progress.is_open[place] && !progress.is_done[place] {
+                    self.next = index + 1;
+                    let end = BoxEnd {
+                        parameter: ParameterId::from(index),
+                        side,
+                    };
+                    return Some((end, progress.step.clone()));
+                }
+            }
+        }
+        None
+    }
+
+    /// The end was moved.
+    pub(crate) fn accept(&mut self, end: BoxEnd) {
+        let progress = &mut self.parameters[end.parameter.index()];
+        if self.growth == Growth::Doubling && !progress.has_halved {
+            progress.step = &progress.step + &progress.step;
+        }
+    }
+
+    /// The end could not be moved: the direction closes; when both have, the step is halved and
+    /// they open again.
+    pub(crate) fn reject(&mut self, end: BoxEnd) {
+        let progress = &mut self.parameters[end.parameter.index()];
+        progress.is_open[position(end.side)] = false;
+        progress.reopen_if_closed();
+    }
+
+    /// The end can go no further whatever the step: it is infinite, or at the border of its range.
+    pub(crate) fn finish(&mut self, end: BoxEnd) {
+        let progress = &mut self.parameters[end.parameter.index()];
+        progress.is_done[position(end.side)] = true;
+        progress.reopen_if_closed();
+    }
+}
+
+impl Progress {
+    fn reopen_if_closed(&mut self) {
+        let is_closed = (0..2).all(|place| !self.is_open[place] || self.is_done[place]);
+        if is_closed {
+            self.step = &self.step * &Rational::new(1, 2);
+            self.is_open = [true; 2];
+            self.has_halved = true;
+        }
+    }
+}
+
+fn position(side: Side) -> usize {
+    match side {
+        Side::Lower => 0,
+        Side::Upper => 1,
+    }
+}

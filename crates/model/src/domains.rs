@@ -1,0 +1,45 @@
+//! Which objects a variable ranges over.
+
+use std::borrow::Cow;
+
+use crate::problem::{ObjectId, Problem, TypeId};
+
+/// The objects of each type, subtypes included, in order of declaration.
+#[derive(Clone, Debug)]
+pub(crate) struct Domains {
+    by_type: Vec<Vec<ObjectId>>,
+}
+
+impl Domains {
+    pub(crate) fn of(problem: &Problem) -> Self {
+        let by_type = (0..problem.types.len())
+            .map(|index| problem.objects_of(&[TypeId::from(index)]).collect())
+            .collect();
+        Self { by_type }
+    }
+
+    /// The objects of any of the types, in order of declaration.
+    pub(crate) fn objects(&self, types: &[TypeId]) -> Cow<'_, [ObjectId]> {
+        match types {
+            [] => Cow::Borrowed(&[]),
+            [only] => Cow::Borrowed(&self.by_type[only.index()]),
+            several => {
+                let mut union: Vec<ObjectId> = several
+                    .iter()
+                    .flat_map(|id| &self.by_type[id.index()])
+                    .copied()
+                    .collect();
+                union.sort_unstable();
+                union.dedup();
+                Cow::Owned(union)
+            }
+        }
+    }
+
+    /// Whether the object is of any of the types.
+    pub(crate) fn contains(&self, types: &[TypeId], object: ObjectId) -> bool {
+        types
+            .iter()
+            .any(|id| self.by_type[id.index()].binary_search(&object).is_ok())
+    }
+}

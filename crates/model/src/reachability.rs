@@ -1,0 +1,225 @@
+//! Grounding by reachability: the ground actions that can occur in a plan when deletions are
+//! ignored.
+//!
+//! In: a [`Task`]. Out: a [`Grounding`], with every action that some valid plan contains, and
+//! usually few others.
+//!
+//! An instantaneous action is reached when its condition is possible; a durative action starts
+//! when its condition at start and its duration are, and is reached when the conditions over all
+//! and at end are possible too, which may take what its own start or other actions bring about.
+//! A condition is possible when each fact that it reads has the truth value asked for at some
+//! time, by the initial state, timed initials or reached actions; comparisons of numbers that
+//! nothing reached changes are evaluated, others count as possible. An action that can start but
+//! never end occurs in no valid plan, so what its start brought about is taken back, and all is
+//! done again without it.
+//!
+//! Instances are found by joining the atoms of conditions with the facts reached so far, as a
+//! Datalog engine does (Helmert, "Concise finite-domain representations for PDDL planning tasks",
+//! AIJ 173, 2009, section 6), one reached fact after the other; what cannot be joined, such as
+//! negations, universal quantifiers and numbers, is tested for each binding.
+
+mod constants;
+mod effects;
+mod event;
+mod fixpoint;
+mod hash;
+mod join;
+mod reached;
+mod relaxation;
+mod rule;
+#[cfg(test)]
+mod tests;
+mod value;
+mod variables;
+mod waiting;
+mod writes;
+
+use std::collections::BTreeSet;
+
+use crate::ground::{Action, Condition, FactId};
+use crate::problem::{self, ObjectId, Problem, SchemaId, TimedChange};
+use crate::task::{GroundRule, Task};
+
+use constants::{Memory, Unwritten};
+use event::Symbol;
+use fixpoint::{Arguments, Reachable, fixpoint};
+use relaxation::Relaxation;
+
+/// When to give up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The most ground actions.
+    pub action_limit: usize,
+    /// The most matches of an atom with a fact, tries of an effect and the like: bounds the time
+    /// where few of many combinations are possible. Some ten million take a second.
+    pub step_limit: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            action_limit: 1_000_000,
+            step_limit: 500_000_000,
+        }
+    }
+}
+
+/// How grounding ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// All that can be reached was found.
+    Complete(Grounding),
+    /// One of the [`Settings`]' limits was reached.
+    LimitReached,
+}
+
+/// What can be reached.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grounding {
+    /// The actions, by schema and arguments, without conditions that hold at all times and without
+    /// conditional effects that never happen.
+    pub actions: Vec<Action>,
+    /// The facts that are true at some time, derived ones included.
+    pub facts: BTreeSet<FactId>,
+    /// The rules of the derived facts among them, simplified like the actions.
+    pub rules: Vec<GroundRule>,
+    /// The goal, simplified like the actions.
+    pub goal: Condition,
+    /// The conjuncts of the goal, as written, that no plan can make true.
+    pub unreachable_goals: Vec<Condition>,
+    /// How many steps it took; see [`Settings::step_limit`].
+    pub steps: u64,
+}
+
+/// Finds all ground actions that can be reached, and enters the facts and fluents that they
+/// mention into the task's table.
+pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
+    let problem = task.problem.clone();
+    let mut steps = settings.step_limit;
+    let Some(reachable) = reach(&problem, settings, &mut steps) else {
+        return Answer::LimitReached;
+    };
+    let facts = enter_facts(task, &reachable.relaxation);
+    let mut memory = Memory::default();
+    let actions = actions(task, &reachable, &mut memory);
+    let mut constants = Unwritten {
+        task,
+        relaxation: &reachable.relaxation,
+        memory: &mut memory,
+    };
+    let rules = task.rules.iter().filter(|rule| facts.contains(&rule.head));
+    let rules = rules.map(|rule| GroundRule {
+        head: rule.head,
+        body: rule.body.clone().simplified(&mut constants),
+    });
+    let rules = rules.filter(|rule| !rule.body.is_contradiction()).collect();
+    let goal = task.goal.clone().simplified(&mut constants);
+    let mut unreachable_goals = Vec::new();
+    let goals = &problem.goal;
+    find_unreachable(
+        task,
+        &reachable.relaxation,
+        goals,
+        &mut Vec::new(),
+        &mut unreachable_goals,
+    );
+    Answer::Complete(Grounding {
+        actions,
+        facts,
+        rules,
+        goal,
+        unreachable_goals,
+        steps: settings.step_limit - steps,
+    })
+}
+
+/// The fixpoint in which all that starts can also end.
+fn reach<'a>(problem: &'a Problem, settings: &Settings, steps: &mut u64) -> Option<Reachable<'a>> {
+    let read = writes::read(problem);
+    let mut banned: Vec<BTreeSet<Arguments>> = vec![BTreeSet::new(); problem.schemas.len()];
+    loop {
+        let mut relaxation = Relaxation::initially(problem);
+        let rules = rule::rules_of(&relaxation, |schema| writes::is_start_silent(schema, &read));
+        add_timed(&mut relaxation);
+        let reachable = fixpoint(relaxation, &rules, &banned, settings, steps)?;
+        let mut can_all_end = true;
+        for (index, instances) in reachable.instances.iter().enumerate() {
+            for (arguments, &can_end) in instances.iter().zip(&reachable.can_end[index]) {
+                if !can_end {
+                    banned[index].insert(arguments.clone());
+                    can_all_end = false;
+                }
+            }
+        }
+        if can_all_end {
+            return Some(reachable);
+        }
+    }
+}
+
+fn add_timed(relaxation: &mut Relaxation) {
+    for timed in &relaxation.problem.timed {
+        let (symbol, arguments) = match &timed.change {
+            TimedChange::Add(predicate, arguments) => (Symbol::True(*predicate), arguments),
+            TimedChange::Delete(predicate, arguments) => (Symbol::False(*predicate), arguments),
+            TimedChange::Assign(function, arguments, _) => (Symbol::Changed(*function), arguments),
+        };
+        relaxation.reached.insert(symbol, arguments);
+    }
+}
+
+fn enter_facts(task: &mut Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
+    let facts = relaxation.reached.facts();
+    facts
+        .map(|(predicate, arguments)| task.fact(predicate, arguments.to_vec()))
+        .collect()
+}
+
+/// The reached instances as actions, by schema and arguments.
+fn actions(task: &mut Task, reachable: &Reachable, memory: &mut Memory) -> Vec<Action> {
+    let mut actions = Vec::new();
+    for (index, instances) in reachable.instances.iter().enumerate() {
+        let mut instances: Vec<&[ObjectId]> = instances.iter().map(|a| &**a).collect();
+        instances.sort_unstable();
+        for arguments in instances {
+            let action = task
+                .instantiate(SchemaId::from(index), arguments)
+                .expect("variables range over objects of their types");
+            let action = action.simplified(&mut Unwritten {
+                task,
+                relaxation: &reachable.relaxation,
+                memory,
+            });
+            if !action.is_contradiction() {
+                actions.push(action);
+            }
+        }
+    }
+    actions
+}
+
+/// Collects the conjuncts of the condition that are not possible.
+fn find_unreachable(
+    task: &mut Task,
+    relaxation: &Relaxation,
+    condition: &problem::Condition,
+    binding: &mut Vec<ObjectId>,
+    found: &mut Vec<Condition>,
+) {
+    if relaxation.is_possible(condition, true, binding, &mut Vec::new()) {
+        return;
+    }
+    match condition {
+        problem::Condition::And(parts) => {
+            for part in parts {
+                find_unreachable(task, relaxation, part, binding, found);
+            }
+        }
+        problem::Condition::Forall(variables, part) => {
+            task.for_all(variables, binding, &mut |task, binding| {
+                find_unreachable(task, relaxation, part, binding, found);
+            });
+        }
+        other => found.push(task.ground_condition(other, binding)),
+    }
+}

@@ -1,0 +1,58 @@
+//! What no reached action and no timed initial writes.
+
+use elbowroom_num::Rational;
+
+use crate::ground::{FactId, FluentId};
+use crate::simplify::Constants;
+use crate::task::Task;
+
+use super::relaxation::Relaxation;
+use super::value::Value;
+
+/// Answers given before, by position of the fact or fluent.
+#[derive(Default)]
+pub(super) struct Memory {
+    facts: Vec<Option<Option<bool>>>,
+    fluents: Vec<Option<Option<Rational>>>,
+}
+
+/// The facts and fluents of a task that no reached event writes.
+///
+/// A fact that is only ever made true when it is so already is not among them: whoever writes it
+/// may not do so at the moment at which it is read.
+pub(super) struct Unwritten<'u> {
+    pub(super) task: &'u Task,
+    pub(super) relaxation: &'u Relaxation<'u>,
+    pub(super) memory: &'u mut Memory,
+}
+
+impl Constants for Unwritten<'_> {
+    fn truth(&mut self, fact: FactId) -> Option<bool> {
+        *remembered(&mut self.memory.facts, fact.index(), || {
+            let (predicate, arguments) = self.task.facts.get_index(fact.index())?;
+            // A derived fact changes with those that its rules mention.
+            if self.task.problem.predicates[predicate.index()].is_derived {
+                return None;
+            }
+            self.relaxation.reached.constant(*predicate, arguments)
+        })
+    }
+
+    fn value(&mut self, fluent: FluentId) -> Option<Rational> {
+        remembered(&mut self.memory.fluents, fluent.index(), || {
+            let (function, arguments) = self.task.fluents.get_index(fluent.index())?;
+            match self.relaxation.constant(*function, arguments) {
+                Value::Number(value) => Some(value),
+                Value::Varies | Value::Undefined => None,
+            }
+        })
+        .clone()
+    }
+}
+
+fn remembered<T>(memory: &mut Vec<Option<T>>, position: usize, find: impl FnOnce() -> T) -> &T {
+    if memory.len() <= position {
+        memory.resize_with(position + 1, || None);
+    }
+    memory[position].get_or_insert_with(find)
+}

@@ -1,0 +1,286 @@
+//! The least fixpoint: what can start, what can end, and what that brings about, until nothing is
+//! new.
+//!
+//! Each event is taken up once, in the order in which it was reached. It triggers the joins of the
+//! rules that it matches, and wakes what was waiting for it: a binding whose tests were not yet
+//! possible, a started action that could not yet end, a conditional effect.
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+
+use crate::problem::{Body, ObjectId, PredicateId, SchemaId};
+
+use super::Settings;
+use super::effects::List;
+use super::event::{Event, Symbol};
+use super::hash::Set;
+use super::join::{Trigger, join};
+use super::relaxation::Relaxation;
+use super::rule::{Head, Rule};
+use super::waiting::{Pending, Ticket, WaitingRoom};
+
+/// The objects for a schema's parameters.
+pub(super) type Arguments = Box<[ObjectId]>;
+
+/// What was reached.
+pub(super) struct Reachable<'a> {
+    pub(super) relaxation: Relaxation<'a>,
+    /// The arguments with which each schema can start.
+    pub(super) instances: Vec<Set<Arguments>>,
+    /// For each of these instances, whether it can also end.
+    pub(super) can_end: Vec<Vec<bool>>,
+}
+
+/// Runs to the fixpoint, without the `banned` instances (for each schema). `None` if a limit was
+/// reached.
+pub(super) fn fixpoint<'a>(
+    relaxation: Relaxation<'a>,
+    rules: &[Rule<'a>],
+    banned: &[BTreeSet<Arguments>],
+    settings: &Settings,
+    steps: &mut u64,
+) -> Option<Reachable<'a>> {
+    let mut fixpoint = Fixpoint::new(relaxation, rules, banned, settings, steps);
+    match fixpoint.run() {
+        ControlFlow::Continue(()) => Some(fixpoint.reachable),
+        ControlFlow::Break(()) => None,
+    }
+}
+
+/// The fixpoint on its way. Its methods break when a limit is reached.
+pub(super) struct Fixpoint<'f, 'a> {
+    reachable: Reachable<'a>,
+    rules: &'f [Rule<'a>],
+    banned: &'f [BTreeSet<Arguments>],
+    /// How many instances may still be found.
+    room: usize,
+    steps: &'f mut u64,
+    /// For each predicate, the rules' atoms that match its facts, static ones aside.
+    triggers: Vec<Vec<(usize, usize)>>,
+    waiting: WaitingRoom,
+}
+
+impl<'f, 'a> Fixpoint<'f, 'a> {
+    fn new(
+        relaxation: Relaxation<'a>,
+        rules: &'f [Rule<'a>],
+        banned: &'f [BTreeSet<Arguments>],
+        settings: &Settings,
+        steps: &'f mut u64,
+    ) -> Self {
+        let mut triggers = vec![Vec::new(); relaxation.problem.predicates.len()];
+        for (index, rule) in rules.iter().enumerate() {
+            for (position, atom) in rule.atoms.iter().enumerate() {
+                if !atom.is_static {
+                    triggers[atom.predicate.index()].push((index, position));
+                }
+            }
+        }
+        let schema_count = relaxation.problem.schemas.len();
+        Self {
+            reachable: Reachable {
+                relaxation,
+                instances: vec![Set::default(); schema_count],
+                can_end: vec![Vec::new(); schema_count],
+            },
+            rules,
+            banned,
+            room: settings.action_limit,
+            steps,
+            triggers,
+            waiting: WaitingRoom::new(settings.action_limit),
+        }
+    }
+
+    fn run(&mut self) -> ControlFlow<()> {
+        for (index, rule) in self.rules.iter().enumerate() {
+            if rule.atoms.iter().all(|atom| atom.is_static) {
+                self.apply(index, None)?;
+            }
+        }
+        let mut position = 0;
+        while let Some(event) = self.reachable.relaxation.reached.get(position) {
+            let symbol = event.symbol;
+            for ticket in self.waiting.wake(event) {
+                self.retry(ticket)?;
+            }
+            if let Symbol::True(predicate) = symbol {
+                self.trigger(predicate, position)?;
+            }
+            position += 1;
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn trigger(&mut self, predicate: PredicateId, position: usize) -> ControlFlow<()> {
+        let event = u32::try_from(position).expect("fewer than 2^32 events");
+        for index in 0..self.triggers[predicate.index()].len() {
+            let (rule, atom) = self.triggers[predicate.index()][index];
+            self.apply(rule, Some(Trigger { atom, event }))?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Draws the new conclusions of a rule.
+    fn apply(&mut self, index: usize, trigger: Option<Trigger>) -> ControlFlow<()> {
+        let rule = &self.rules[index];
+        let mut possible: Set<Arguments> = Set::default();
+        let mut impossible: Vec<(Arguments, Vec<Event>)> = Vec::new();
+        let mut own = Vec::new();
+        let (reachable, banned, room) = (&self.reachable, self.banned, self.room);
+        let relaxation = &reachable.relaxation;
+        join(rule, relaxation, trigger, self.steps, &mut |binding| {
+            let arguments = &binding[..rule.parameter_count];
+            if possible.contains(arguments) || !reachable.is_new(rule.head, arguments, banned) {
+                return ControlFlow::Continue(());
+            }
+            let mut blockers = Vec::new();
+            if rule.are_tests_possible(relaxation, binding, &mut own, &mut blockers) {
+                possible.insert(arguments.into());
+            } else if !blockers.is_empty() {
+                impossible.push((binding.into(), blockers));
+            }
+            if possible.len() + impossible.len() > room {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        })?;
+        for (binding, blockers) in impossible {
+            self.wait(blockers, || Pending::Binding(index, binding))?;
+        }
+        for arguments in possible {
+            self.conclude(rule.head, arguments)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn conclude(&mut self, head: Head, arguments: Arguments) -> ControlFlow<()> {
+        match head {
+            Head::Derived(predicate) => {
+                self.bring_about(Symbol::True(predicate), &arguments);
+                ControlFlow::Continue(())
+            }
+            Head::Start { schema, and_end } => self.start(schema, arguments, and_end),
+        }
+    }
+
+    fn start(&mut self, schema: SchemaId, arguments: Arguments, and_end: bool) -> ControlFlow<()> {
+        let mut binding = arguments.to_vec();
+        let (index, is_new) = self.reachable.instances[schema.index()].insert_full(arguments);
+        if !is_new {
+            return ControlFlow::Continue(());
+        }
+        if self.room == 0 {
+            return ControlFlow::Break(());
+        }
+        self.room -= 1;
+        self.reachable.can_end[schema.index()].push(false);
+        self.apply_effects(schema, List::Start, &mut binding)?;
+        self.apply_effects(schema, List::Continuous, &mut binding)?;
+        if and_end {
+            return self.end(schema, index);
+        }
+        let blockers = self.try_to_end(schema, index)?;
+        self.wait(blockers, || Pending::End(schema, index))
+    }
+
+    /// Ends the instance if that is possible. Else answers what it waits for.
+    fn try_to_end(&mut self, schema: SchemaId, index: usize) -> ControlFlow<(), Vec<Event>> {
+        let relaxation = &self.reachable.relaxation;
+        let mut binding = self.reachable.instances[schema.index()][index].to_vec();
+        let mut blockers = Vec::new();
+        let can_end = match &relaxation.problem.schemas[schema.index()].body {
+            Body::Instantaneous { .. } => true,
+            Body::Durative {
+                duration,
+                over_all,
+                at_end,
+                ..
+            } => {
+                relaxation.is_possible(over_all, true, &mut binding, &mut blockers)
+                    && relaxation.is_possible(at_end, true, &mut binding, &mut blockers)
+                    && relaxation.is_duration_possible(duration, true, &binding, &mut blockers)
+            }
+        };
+        if can_end {
+            self.end(schema, index)?;
+        }
+        ControlFlow::Continue(blockers)
+    }
+
+    fn end(&mut self, schema: SchemaId, index: usize) -> ControlFlow<()> {
+        self.reachable.can_end[schema.index()][index] = true;
+        let mut binding = self.reachable.instances[schema.index()][index].to_vec();
+        self.apply_effects(schema, List::End, &mut binding)
+    }
+
+    /// Tries again what waited for an event that was reached just now.
+    fn retry(&mut self, ticket: Ticket) -> ControlFlow<()> {
+        self.count_step()?;
+        let Some(pending) = self.waiting.get(ticket).cloned() else {
+            return ControlFlow::Continue(());
+        };
+        let blockers = match &pending {
+            Pending::Binding(rule, binding) => self.try_binding(*rule, binding)?,
+            Pending::End(schema, index) => self.try_to_end(*schema, *index)?,
+            Pending::Effect(id, binding) => self.try_effect(*id, &mut binding.to_vec())?,
+        };
+        self.waiting.go_on(ticket, blockers);
+        ControlFlow::Continue(())
+    }
+
+    /// Draws a rule's conclusion if its tests are possible. Else answers what it waits for.
+    fn try_binding(&mut self, rule: usize, binding: &[ObjectId]) -> ControlFlow<(), Vec<Event>> {
+        let rule = &self.rules[rule];
+        let arguments = &binding[..rule.parameter_count];
+        let mut blockers = Vec::new();
+        let relaxation = &self.reachable.relaxation;
+        if self.reachable.is_new(rule.head, arguments, self.banned)
+            && rule.are_tests_possible(relaxation, binding, &mut Vec::new(), &mut blockers)
+        {
+            self.conclude(rule.head, arguments.into())?;
+        }
+        ControlFlow::Continue(blockers)
+    }
+
+    /// Lets what is impossible wait for one of the blockers.
+    pub(super) fn wait(
+        &mut self,
+        blockers: Vec<Event>,
+        pending: impl FnOnce() -> Pending,
+    ) -> ControlFlow<()> {
+        if blockers.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        self.waiting.enter(pending(), blockers)
+    }
+
+    pub(super) fn relaxation(&self) -> &Relaxation<'a> {
+        &self.reachable.relaxation
+    }
+
+    pub(super) fn bring_about(&mut self, symbol: Symbol, arguments: &[ObjectId]) {
+        self.reachable.relaxation.reached.insert(symbol, arguments);
+    }
+
+    pub(super) fn count_step(&mut self) -> ControlFlow<()> {
+        match self.steps.checked_sub(1) {
+            Some(left) => *self.steps = left,
+            None => return ControlFlow::Break(()),
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl Reachable<'_> {
+    /// Whether the conclusion is neither banned nor drawn already.
+    fn is_new(&self, head: Head, arguments: &[ObjectId], banned: &[BTreeSet<Arguments>]) -> bool {
+        match head {
+            Head::Derived(predicate) => !self.relaxation.reached.is_ever_true(predicate, arguments),
+            Head::Start { schema, .. } => {
+                !self.instances[schema.index()].contains(arguments)
+                    && !banned[schema.index()].contains(arguments)
+            }
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Numbers of which it is known that they never change.
+
+use elbowroom_num::Rational;
+
+use crate::problem::{Expression, Fluent};
+
+/// What is known of an expression without knowing the time.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    /// This number, always.
+    Number(Rational),
+    /// It may change, or depends on what the problem leaves open.
+    Varies,
+    /// None, as some part of it never gets a value.
+    Undefined,
+}
+
+impl Value {
+    /// The value of an expression, given that of its fluents.
+    pub(super) fn of(expression: &Expression, fluent: &mut impl FnMut(&Fluent) -> Self) -> Self {
+        match expression {
+            Expression::Constant(value) => Self::Number(value.clone()),
+            Expression::Fluent(leaf) => fluent(leaf),
+            Expression::Duration | Expression::TotalTime | Expression::Unknown(_) => Self::Varies,
+            Expression::Add(parts) => {
+                let zero = Self::Number(Rational::ZERO);
+                parts.iter().fold(zero, |total, part| {
+                    total.combine(Self::of(part, fluent), |a, b| Some(a + b))
+                })
+            }
+            Expression::Multiply(parts) => {
+                let one = Self::Number(Rational::ONE);
+                parts.iter().fold(one, |product, part| {
+                    product.combine(Self::of(part, fluent), |a, b| Some(a * b))
+                })
+            }
+            Expression::Subtract(left, right) => {
+                Self::of(left, fluent).combine(Self::of(right, fluent), |a, b| Some(a - b))
+            }
+            Expression::Divide(left, right) => {
+                Self::of(left, fluent).combine(Self::of(right, fluent), Rational::checked_div)
+            }
+            Expression::Negate(part) => {
+                let zero = Self::Number(Rational::ZERO);
+                zero.combine(Self::of(part, fluent), |a, b| Some(a - b))
+            }
+        }
+    }
+
+    fn combine(
+        self,
+        other: Self,
+        operation: impl FnOnce(&Rational, &Rational) -> Option<Rational>,
+    ) -> Self {
+        match (self, other) {
+            (Self::Undefined, _) | (_, Self::Undefined) => Self::Undefined,
+            (Self::Varies, _) | (_, Self::Varies) => Self::Varies,
+            (Self::Number(left), Self::Number(right)) => {
+                operation(&left, &right).map_or(Self::Undefined, Self::Number)
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Which variables a condition reads.
+
+use crate::problem::{Condition, Expression, Term};
+
+/// Marks each variable read; variables of inner quantifiers lie beyond the end of `read`.
+pub(super) fn of_condition(condition: &Condition, read: &mut [bool]) {
+    match condition {
+        Condition::Atom(atom) => of_terms(&atom.arguments, read),
+        Condition::Equal(left, right) => of_terms(&[*left, *right], read),
+        Condition::Compare(_, left, right) => {
+            of_expression(left, read);
+            of_expression(right, read);
+        }
+        Condition::Not(part) | Condition::Forall(_, part) | Condition::Exists(_, part) => {
+            of_condition(part, read);
+        }
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                of_condition(part, read);
+            }
+        }
+    }
+}
+
+/// Marks each variable read.
+pub(super) fn of_expression(expression: &Expression, read: &mut [bool]) {
+    match expression {
+        Expression::Fluent(fluent) => of_terms(&fluent.arguments, read),
+        Expression::Constant(_)
+        | Expression::Duration
+        | Expression::TotalTime
+        | Expression::Unknown(_) => {}
+        Expression::Add(parts) | Expression::Multiply(parts) => {
+            for part in parts {
+                of_expression(part, read);
+            }
+        }
+        Expression::Subtract(left, right) | Expression::Divide(left, right) => {
+            of_expression(left, read);
+            of_expression(right, read);
+        }
+        Expression::Negate(part) => of_expression(part, read),
+    }
+}
+
+fn of_terms(terms: &[Term], read: &mut [bool]) {
+    for term in terms {
+        if let Term::Variable(position) = *term
+            && let Some(is_read) = read.get_mut(position)
+        {
+            *is_read = true;
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Conditions, expressions and actions without the parts that are the same in every state.
+
+use elbowroom_num::Rational;
+
+use crate::ground::{
+    Action, Body, Change, Condition, Effect, Expression, FactId, FluentId, Guard, SnapAction,
+};
+
+/// What is known to be the same in every state.
+pub trait Constants {
+    /// The fact's truth, if it never changes.
+    fn truth(&mut self, fact: FactId) -> Option<bool>;
+
+    /// The fluent's value, if it has one and never changes.
+    fn value(&mut self, fluent: FluentId) -> Option<Rational>;
+}
+
+impl Condition {
+    /// Whether this is the empty disjunction.
+    pub fn is_contradiction(&self) -> bool {
+        matches!(self, Self::Or(parts) if parts.is_empty())
+    }
+
+    /// An equivalent condition in which nothing constant is left: [`Condition::TRUE`],
+    /// [`Condition::FALSE`], or one that contains neither. Nested conjunctions and disjunctions
+    /// are flattened.
+    #[must_use]
+    pub fn simplified(self, constants: &mut impl Constants) -> Self {
+        match self {
+            Self::Fact(fact) => constants.truth(fact).map_or(Self::Fact(fact), Self::always),
+            Self::Compare(comparison, left, right) => {
+                let left = left.simplified(constants);
+                let right = right.simplified(constants);
+                match (&left, &right) {
+                    (Expression::Constant(left), Expression::Constant(right)) => {
+                        Self::always(comparison.holds(left, right))
+                    }
+                    _ => Self::Compare(comparison, left, right),
+                }
+            }
+            Self::Not(part) => match part.simplified(constants) {
+                Self::Not(part) => *part,
+                part if part.is_trivial() => Self::FALSE,
+                part if part.is_contradiction() => Self::TRUE,
+                part => Self::Not(Box::new(part)),
+            },
+            Self::And(parts) => {
+                let mut left = Vec::with_capacity(parts.len());
+                for part in parts {
+                    match part.simplified(constants) {
+                        Self::And(parts) => left.extend(parts),
+                        part if part.is_contradiction() => return Self::FALSE,
+                        part => left.push(part),
+                    }
+                }
+                only(&mut left).unwrap_or(Self::And(left))
+            }
+            Self::Or(parts) => {
+                let mut left = Vec::with_capacity(parts.len());
+                for part in parts {
+                    match part.simplified(constants) {
+                        Self::Or(parts) => left.extend(parts),
+                        part if part.is_trivial() => return Self::TRUE,
+                        part => left.push(part),
+                    }
+                }
+                only(&mut left).unwrap_or(Self::Or(left))
+            }
+        }
+    }
+
+    fn always(truth: bool) -> Self {
+        if truth { Self::TRUE } else { Self::FALSE }
+    }
+}
+
+/// The only part, if there is just one.
+fn only(parts: &mut Vec<Condition>) -> Option<Condition> {
+    if parts.len() == 1 { parts.pop() } else { None }
+}
+
+impl Expression {
+    /// The same expression with constant parts evaluated, except where they have no value.
+    #[must_use]
+    pub fn simplified(self, constants: &mut impl Constants) -> Self {
+        let mut each = |parts: Vec<Self>| -> Vec<Self> {
+            let parts = parts.into_iter();
+            parts.map(|part| part.simplified(constants)).collect()
+        };
+        let simplified = match self {
+            Self::Fluent(fluent) => match constants.value(fluent) {
+                Some(value) => Self::Constant(value),
+                None => Self::Fluent(fluent),
+            },
+            Self::Constant(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => return self,
+            Self::Add(parts) => Self::Add(each(parts)),
+            Self::Multiply(parts) => Self::Multiply(each(parts)),
+            Self::Subtract(left, right) => Self::Subtract(
+                Box::new(left.simplified(constants)),
+                Box::new(right.simplified(constants)),
+            ),
+            Self::Divide(left, right) => Self::Divide(
+                Box::new(left.simplified(constants)),
+                Box::new(right.simplified(constants)),
+            ),
+            Self::Negate(part) => Self::Negate(Box::new(part.simplified(constants))),
+        };
+        match simplified.evaluate_constants() {
+            Some(value) => Self::Constant(value),
+            None => simplified,
+        }
+    }
+
+    /// The value, if no leaf but numbers occurs; looks at the operands only, not below them.
+    fn evaluate_constants(&self) -> Option<Rational> {
+        let is_constant = |part: &Self| matches!(part, Self::Constant(_));
+        let are_constant = match self {
+            Self::Add(parts) | Self::Multiply(parts) => parts.iter().all(is_constant),
+            Self::Subtract(left, right) | Self::Divide(left, right) => {
+                is_constant(left) && is_constant(right)
+            }
+            Self::Negate(part) => is_constant(part),
+            _ => false,
+        };
+        if are_constant {
+            self.evaluate(&mut |_| None)
+        } else {
+            None
+        }
+    }
+}
+
+impl Action {
+    /// The same action with conditions and expressions simplified, and without the conditional
+    /// effects that never happen.
+    #[must_use]
+    pub fn simplified(mut self, constants: &mut impl Constants) -> Self {
+        match &mut self.body {
+            Body::Instantaneous(snap) => snap.simplify(constants),
+            Body::Durative(body) => {
+                for constraint in &mut body.duration {
+                    simplify_expression(&mut constraint.bound, constants);
+                }
+                body.start.simplify(constants);
+                simplify_condition(&mut body.over_all, constants);
+                body.end.simplify(constants);
+                body.continuous.retain_mut(|effect| {
+                    simplify_expression(&mut effect.rate, constants);
+                    effect.guard.simplify(constants);
+                    !effect.guard.is_contradiction()
+                });
+            }
+        }
+        self
+    }
+
+    /// Whether some condition of the action is the empty disjunction.
+    pub fn is_contradiction(&self) -> bool {
+        match &self.body {
+            Body::Instantaneous(snap) => snap.condition.is_contradiction(),
+            Body::Durative(body) => [&body.start.condition, &body.over_all, &body.end.condition]
+                .into_iter()
+                .any(Condition::is_contradiction),
+        }
+    }
+}
+
+impl SnapAction {
+    fn simplify(&mut self, constants: &mut impl Constants) {
+        simplify_condition(&mut self.condition, constants);
+        self.effects.retain_mut(|effect| {
+            effect.simplify(constants);
+            !effect.guard.is_contradiction()
+        });
+    }
+}
+
+impl Effect {
+    fn simplify(&mut self, constants: &mut impl Constants) {
+        self.guard.simplify(constants);
+        if let Change::Update { value, .. } = &mut self.change {
+            simplify_expression(value, constants);
+        }
+    }
+}
+
+impl Guard {
+    fn simplify(&mut self, constants: &mut impl Constants) {
+        simplify_condition(&mut self.at_start, constants);
+        simplify_condition(&mut self.over_all, constants);
+        simplify_condition(&mut self.now, constants);
+    }
+
+    fn is_contradiction(&self) -> bool {
+        [&self.at_start, &self.over_all, &self.now]
+            .into_iter()
+            .any(Condition::is_contradiction)
+    }
+}
+
+fn simplify_condition(condition: &mut Condition, constants: &mut impl Constants) {
+    *condition = std::mem::replace(condition, Condition::TRUE).simplified(constants);
+}
+
+fn simplify_expression(expression: &mut Expression, constants: &mut impl Constants) {
+    *expression = std::mem::replace(expression, Expression::Duration).simplified(constants);
+}

@@ -1,0 +1,51 @@
+//! Rational values from values with infinitesimals.
+
+use super::{Simplex, VariableId};
+use crate::{Delta, Rational};
+
+impl Simplex {
+    /// The variable's value in the assignment. After a successful [`Simplex::check`] all bounds
+    /// hold in the assignment.
+    pub fn value(&self, variable: VariableId) -> &Delta {
+        &self.variables[variable.index()].value
+    }
+
+    /// Rational values of all variables that satisfy all bounds, strict ones strictly; to be
+    /// asked for after a successful [`Simplex::check`].
+    pub fn model(&self) -> Vec<Rational> {
+        let delta = self.small_enough_delta();
+        let variables = self.variables.iter();
+        variables
+            .map(|variable| at(&variable.value, &delta))
+            .collect()
+    }
+
+    /// A positive rational that may stand for δ: whatever bound holds for the infinitesimal, holds
+    /// for this number (Dutertre & de Moura, section 5).
+    fn small_enough_delta(&self) -> Rational {
+        let mut delta = Rational::ONE;
+        for variable in &self.variables {
+            if let Some(lower) = &variable.lower {
+                narrow(&mut delta, &lower.value, &variable.value);
+            }
+            if let Some(upper) = &variable.upper {
+                narrow(&mut delta, &variable.value, &upper.value);
+            }
+        }
+        delta
+    }
+}
+
+/// Makes `delta` so small that `less <= more` stays true when it is put in for δ.
+fn narrow(delta: &mut Rational, less: &Delta, more: &Delta) {
+    if less.real < more.real && less.infinitesimal > more.infinitesimal {
+        let room = &more.real - &less.real;
+        let rate = &less.infinitesimal - &more.infinitesimal;
+        *delta = std::mem::take(delta).min(room / rate);
+    }
+}
+
+/// `value` with `delta` put in for δ.
+fn at(value: &Delta, delta: &Rational) -> Rational {
+    &value.real + &value.infinitesimal * delta
+}

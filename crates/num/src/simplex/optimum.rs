@@ -1,0 +1,106 @@
+//! Optima over the feasible set: the primal simplex with bounded variables.
+
+use super::{Combination, Infeasible, Simplex, VariableId};
+use crate::{Delta, Rational};
+
+/// The best value of an objective.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Optimum {
+    /// There are values better than any number.
+    Unbounded,
+    /// No value is better. If it has an infinitesimal part, values come arbitrarily near to the
+    /// rational part, without reaching it.
+    Value(Delta),
+}
+
+/// How far a variable can go before some variable meets a bound.
+enum Limit {
+    None,
+    /// By so far; then it meets its own other bound.
+    Own(Delta),
+    /// By so far; then the basic variable comes to its bound.
+    Basic(VariableId, Delta),
+}
+
+impl Simplex {
+    /// The largest value of `Σ coefficient · variable`. The assignment is left at the optimum, or
+    /// where it was found that there is none.
+    ///
+    /// # Errors
+    /// Bounds that contradict each other.
+    pub fn maximize(&mut self, objective: &Combination) -> Result<Optimum, Infeasible> {
+        self.check()?;
+        // The objective as a variable without bounds never leaves the basis, so its row can go
+        // again afterwards.
+        let value = self.define(objective);
+        let optimum = loop {
+            let Some((entering, rises)) = self.improving(value) else {
+                break Optimum::Value(self.variables[value.index()].value.clone());
+            };
+            match self.limit(entering, rises) {
+                Limit::None => break Optimum::Unbounded,
+                Limit::Own(target) => self.set_value(entering, target),
+                Limit::Basic(basic, target) => self.pivot_and_update(basic, entering, target),
+            }
+        };
+        self.tableau.remove_newest();
+        self.variables.pop();
+        Ok(optimum)
+    }
+
+    /// The least value of `Σ coefficient · variable`; like [`Simplex::maximize`].
+    ///
+    /// # Errors
+    /// Bounds that contradict each other.
+    pub fn minimize(&mut self, objective: &Combination) -> Result<Optimum, Infeasible> {
+        let negated: Vec<_> = objective.iter().map(|(v, c)| (*v, -c)).collect();
+        Ok(match self.maximize(&negated)? {
+            Optimum::Unbounded => Optimum::Unbounded,
+            Optimum::Value(value) => Optimum::Value(-&value),
+        })
+    }
+
+    /// The first variable whose move makes `objective` rise, and whether it has to rise itself.
+    fn improving(&self, objective: VariableId) -> Option<(VariableId, bool)> {
+        let row = self.tableau.row(objective).iter();
+        let mut suitable = row.filter(|(other, factor)| self.can_move(**other, factor, true));
+        suitable
+            .next()
+            .map(|(other, factor)| (*other, factor.is_positive()))
+    }
+
+    /// The ratio test. Of several basic variables that stop the move at once, the first one
+    /// (Bland's rule, here and in `improving`: no circles).
+    fn limit(&self, entering: VariableId, rises: bool) -> Limit {
+        let own = &self.variables[entering.index()];
+        let other_bound = if rises { &own.upper } else { &own.lower };
+        let mut nearest: Option<Delta> = None;
+        let mut limit = Limit::None;
+        if let Some(bound) = other_bound {
+            nearest = Some(distance(&bound.value, &own.value));
+            limit = Limit::Own(bound.value.clone());
+        }
+        for (basic, coefficient) in self.tableau.column(entering) {
+            let variable = &self.variables[basic.index()];
+            let follows_up = coefficient.is_positive() == rises;
+            let bound = if follows_up {
+                &variable.upper
+            } else {
+                &variable.lower
+            };
+            let Some(bound) = bound else { continue };
+            let room = distance(&bound.value, &variable.value);
+            let steps = room.scaled(&(&Rational::ONE / &coefficient.abs()));
+            if nearest.as_ref().is_none_or(|nearest| steps < *nearest) {
+                nearest = Some(steps);
+                limit = Limit::Basic(basic, bound.value.clone());
+            }
+        }
+        limit
+    }
+}
+
+/// `|a - b|`.
+fn distance(a: &Delta, b: &Delta) -> Delta {
+    if a > b { a - b } else { b - a }
+}

@@ -1,0 +1,179 @@
+//! What the parameters of an STN plan file stand for, and their values and ranges.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_num::{End, Interval, Rational};
+
+use super::nominal::{self, Draft};
+use super::syntax::{File, Limit, ParameterItem};
+use super::tokens::{Mistakes, Span};
+use crate::parameter::{Parameter, ParameterId, ParameterKind};
+use crate::stn_plan::{Bound, Constraint, InstanceId, Node, StnPlan};
+use crate::unknowns::{self, OpenNumber};
+
+/// What each declared parameter stands for, judging by the constraints in which it occurs.
+pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {
+    let kind = |index: usize| {
+        let id = ParameterId::from(index);
+        let duration = used[index]
+            .iter()
+            .find_map(|&constraint| duration_of(plan, &plan.constraints[constraint], id));
+        duration.map_or(ParameterKind::Bound, ParameterKind::Duration)
+    };
+    (0..used.len()).map(kind).collect()
+}
+
+/// The instance whose duration the constraint sets to the parameter.
+fn duration_of(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> Option<InstanceId> {
+    if constraint.lower != Bound::Parameter(id) || constraint.upper != Bound::Parameter(id) {
+        return None;
+    }
+    match (
+        plan.nodes[constraint.from.index()],
+        plan.nodes[constraint.to.index()],
+    ) {
+        (Node::Start(from), Node::End(to)) if from == to => Some(from),
+        _ => None,
+    }
+}
+
+/// Takes the domain's duration constraints from all instances whose duration is a parameter, also
+/// where one parameter is the duration of several.
+pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
+    let free: Vec<InstanceId> = plan
+        .constraints
+        .iter()
+        .filter_map(|constraint| match constraint.lower {
+            Bound::Parameter(id) if matches!(kinds[id.index()], ParameterKind::Duration(_)) => {
+                duration_of(plan, constraint, id)
+            }
+            _ => None,
+        })
+        .collect();
+    for id in free {
+        plan.free_duration(id);
+    }
+}
+
+/// The parameter of each number that the domain leaves open and the file or the plan mentions.
+pub(super) fn open_numbers(
+    file: &File<'_>,
+    task: &Task,
+    plan: &StnPlan,
+    mistakes: &mut Mistakes,
+) -> BTreeMap<OpenNumber, ParameterId> {
+    let nowhere = Span { start: 0, end: 0 };
+    if unknowns::occur_in_rules(task) {
+        let message = "a derived predicate depends on `:synth-parameters`, which is not supported";
+        mistakes.add(nowhere, message, None);
+    }
+    let mut declared = BTreeMap::new();
+    for number in unknowns::possible(task, plan) {
+        let name = number.name(task, plan);
+        let position = file
+            .parameters
+            .iter()
+            .position(|item| item.name.text.eq_ignore_ascii_case(&name));
+        declared.extend(position.map(|position| (number, ParameterId::from(position))));
+    }
+    for number in unknowns::mentioned(task, plan) {
+        if !declared.contains_key(&number) {
+            let name = number.name(task, plan);
+            let message = format!("the domain leaves `{name}` open");
+            let expected = format!("add `parameter {name} default VALUE;`");
+            mistakes.add(nowhere, message, expected);
+        }
+    }
+    declared
+}
+
+pub(super) fn parameters(
+    file: &File<'_>,
+    task: &mut Task,
+    plan: &StnPlan,
+    mut kinds: Vec<ParameterKind>,
+    open: &BTreeMap<OpenNumber, ParameterId>,
+    mistakes: &mut Mistakes,
+) -> Option<Vec<Parameter>> {
+    for (number, id) in open {
+        if kinds[id.index()] == ParameterKind::Bound {
+            kinds[id.index()] = number.kind();
+        }
+    }
+    let drafts: Vec<Draft> = file
+        .parameters
+        .iter()
+        .zip(kinds)
+        .map(|(item, kind)| {
+            let sign = item.default.clone().unwrap_or_default();
+            Draft {
+                kind,
+                nominal: item.default.clone(),
+                range: range(item, kind.natural_range(&sign)),
+            }
+        })
+        .collect();
+    for (item, draft) in file.parameters.iter().zip(&drafts) {
+        check_default(item, draft, mistakes);
+    }
+    if !mistakes.is_empty() {
+        return None;
+    }
+    let nominal = nominal::find(task, plan, &drafts);
+    let mut parameters = Vec::with_capacity(drafts.len());
+    for ((item, draft), nominal) in file.parameters.iter().zip(drafts).zip(nominal) {
+        let Some(nominal) = nominal else {
+            let message = format!("no nominal value of `{}` can be found", item.name.text);
+            mistakes.add(item.name.span, message, "give `default`".to_owned());
+            continue;
+        };
+        parameters.push(Parameter {
+            name: item.name.text.to_owned(),
+            kind: draft.kind,
+            nominal,
+            weight: item.weight.clone().unwrap_or(Rational::ONE),
+            range: draft.range,
+        });
+    }
+    mistakes.is_empty().then_some(parameters)
+}
+
+/// The range that `lb` and `ub` give, each side on its own, or else the natural one.
+fn range(item: &ParameterItem<'_>, natural: Interval) -> Interval {
+    let end = |limit: &Option<Limit>, natural: End| match limit {
+        Some(Limit::Number(number)) => End::Closed(number.clone()),
+        Some(_) => End::Infinite,
+        None => natural,
+    };
+    Interval {
+        lower: end(&item.lower, natural.lower),
+        upper: end(&item.upper, natural.upper),
+    }
+}
+
+fn check_default(item: &ParameterItem<'_>, draft: &Draft, mistakes: &mut Mistakes) {
+    let name = item.name;
+    if item
+        .weight
+        .as_ref()
+        .is_some_and(|weight| !weight.is_positive())
+    {
+        let message = format!("the weight of `{}` must be positive", name.text);
+        mistakes.add(name.span, message, None);
+    }
+    if draft.range.is_empty() {
+        let message = format!("the range {} of `{}` is empty", draft.range, name.text);
+        mistakes.add(name.span, message, "change `lb` or `ub`".to_owned());
+    } else if let Some(default) = draft.nominal.as_ref().filter(|d| !draft.range.contains(d)) {
+        let message = format!(
+            "the default {default} of `{}` is not in its range {}",
+            name.text, draft.range
+        );
+        mistakes.add(
+            name.span,
+            message,
+            "change `default`, `lb` or `ub`".to_owned(),
+        );
+    }
+}

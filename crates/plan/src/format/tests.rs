@@ -1,0 +1,410 @@
+use elbowroom_num::{Interval, Rational};
+use proptest::prelude::*;
+
+use super::{FormatErrors, WriteError, read, write};
+use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason, StnPlan};
+use crate::testing::{number, rover};
+
+const PAPER: &str = "
+    # The running example, with one of everything.
+    parameter dur_1 weight 1/2 default 12 lb 0 ub 500;  parameter gap default 1;
+    parameter ?s default 1.5;
+    durative-action instance n0 : (NAVIGATE);
+    durative-action instance cs1:(collect s1);   # objects compare without case
+    action instance b : (beep);
+    c: n0.end - n0.start in [dur_1, dur_1];
+    c: cs1.start-n0.end in [ gap , +inf];
+    c: b - .zero in [1 / 3, 40];
+    c: b - cs1.end in [-inf, -.5]";
+
+fn parsed(text: &str) -> ParametrizedPlan {
+    read(text.as_bytes(), &mut rover()).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+fn refused(text: &str) -> String {
+    let errors: FormatErrors = read(text.as_bytes(), &mut rover()).unwrap_err();
+    errors.to_string()
+}
+
+#[test]
+fn everything_the_format_has_is_read() {
+    let plan = parsed(PAPER);
+    let labels: Vec<_> = plan.plan.instances.iter().map(|i| &i.label[..]).collect();
+    assert_eq!(labels, ["n0", "cs1", "b"]);
+    assert_eq!(plan.plan.instances[1].action.name, "(collect S1)");
+    let kinds: Vec<_> = plan.parameters.iter().map(|p| p.kind).collect();
+    let duration = ParameterKind::Duration(InstanceId(0));
+    assert_eq!(
+        kinds,
+        [duration, ParameterKind::Bound, ParameterKind::Domain]
+    );
+    assert_eq!(plan.parameters[0].weight, number("1/2"));
+    assert_eq!(plan.parameters[0].range.to_string(), "[0, 500]");
+    assert_eq!(plan.parameters[1].range, Interval::EVERYTHING);
+    assert_eq!(plan.parameters[2].range.to_string(), "[0, inf)");
+    let last = plan.plan.constraints.last().unwrap();
+    assert_eq!(last.lower, Bound::Infinite);
+    assert_eq!(last.upper, Bound::Finite(number("-1/2")));
+}
+
+#[test]
+fn a_free_duration_is_no_longer_bound_by_the_domain() {
+    let plan = parsed(PAPER);
+    let durations = |index: usize| {
+        plan.plan.instances[index]
+            .action
+            .durative()
+            .unwrap()
+            .duration
+            .len()
+    };
+    assert_eq!((durations(0), durations(1)), (0, 1));
+}
+
+#[test]
+fn the_domains_open_number_becomes_the_parameter() {
+    let plan = parsed(PAPER);
+    let navigate = plan.plan.instances[0].action.durative().unwrap();
+    assert_eq!(
+        format!("{:?}", navigate.continuous[0].rate),
+        "Unknown(Parameter(2))"
+    );
+}
+
+#[test]
+fn an_actions_open_number_is_one_per_instance() {
+    let plan = parsed(
+        "durative-action instance a : (refuel s1); durative-action instance b : (refuel s2);
+         parameter a.?r default 4; parameter B.?R default 5;",
+    );
+    let rate = |index: usize| {
+        format!(
+            "{:?}",
+            plan.plan.instances[index]
+                .action
+                .durative()
+                .unwrap()
+                .end
+                .effects[0]
+                .change
+        )
+    };
+    assert!(rate(0).contains("Parameter(0)"), "{}", rate(0));
+    assert!(rate(1).contains("Parameter(1)"), "{}", rate(1));
+    assert_eq!(
+        plan.parameters[1].kind,
+        ParameterKind::Constant(InstanceId(1))
+    );
+}
+
+#[test]
+fn nominal_values_come_from_the_domain_or_from_the_earliest_schedule() {
+    let plan = parsed(
+        "durative-action instance cs : (collect s1); durative-action instance ct : (collect s2);
+         parameter dur; parameter free lb 3; parameter gap;
+         c: cs.end - cs.start in [dur, dur];
+         c: ct.start - cs.end in [gap, gap];
+         c: ct.start - .zero in [20, inf];
+         c: ct.end - .zero in [free, 60];",
+    );
+    let nominal: Vec<_> = plan.nominal().iter().map(ToString::to_string).collect();
+    // The collection takes 15 from the initial state; what follows starts at 20, and no sooner.
+    assert_eq!(nominal, ["15", "3", "5"]);
+}
+
+#[test]
+fn several_mistakes_are_reported_in_one_run() {
+    let text = "
+parameter p wieght 3;
+durative-action instance n0 : (navigat);
+durative-action instance n1 : (collect s3)
+action instance n2 : (collect s1);
+c: n1.start - n0.end on [0, inf];
+parameter q default;
+c: n1.end - n1.start in [5, inf;
+@@@ what;
+";
+    assert_eq!(
+        refused(text),
+        "\
+line 2, column 13: `wieght` is not expected here: expected `weight`, `default`, `lb`, `ub` or `;`
+line 3, column 32: the domain has no action `navigat`: did you mean `navigate`?
+line 4, column 40: the problem has no object `s3`: did you mean `S1`?
+line 4, column 43: this item does not end: expected `;`
+line 5, column 23: `collect` takes time: write `durative-action instance`
+line 6, column 22: `on` is not expected here: expected `in`
+line 7, column 20: `;` is not expected here: expected a number such as 12.5 or 25/2
+line 8, column 32: `;` is not expected here: expected `]`
+line 9, column 1: `@@@` is not expected here: expected `parameter`, `durative-action instance`, \
+`action instance` or `c:`"
+    );
+}
+
+#[test]
+fn a_mistake_shows_its_line() {
+    let errors = read(
+        b"# \xff is no UTF-8\naction instance b : (beeep);",
+        &mut rover(),
+    )
+    .unwrap_err();
+    let error = &errors.errors[0];
+    assert_eq!((error.line, error.column, error.length), (2, 22, 5));
+    assert_eq!(error.excerpt, "action instance b : (beeep);");
+}
+
+#[test]
+fn names_of_the_file_are_checked_and_near_ones_offered() {
+    let text = "
+action instance b : (beep); action instance b : (beep); durative-action instance n : (collect s1);
+parameter speed default 1; parameter speed default 2; parameter 7 default 1;
+c: n - b.end in [sped, inf];
+c: m.start - .zero in [inf, inf];";
+    assert_eq!(
+        refused(text),
+        "\
+line 2, column 45: two instances are labelled `b`: labels must differ
+line 3, column 38: two parameters are called `speed`: names must differ
+line 3, column 65: `7` cannot be a parameter's name: choose another name
+line 4, column 4: there is no time point `n`: `n` takes time: write `n.start` or `n.end`
+line 4, column 8: there is no time point `b.end`: `b` is instantaneous: write `b`
+line 4, column 18: there is no parameter `sped`: did you mean `speed`?
+line 5, column 4: there is no time point `m.start`: did you mean `n.start`?
+line 5, column 24: this infinity is on the wrong side: nothing could satisfy it"
+    );
+}
+
+#[test]
+fn open_numbers_of_the_domain_need_a_value() {
+    let navigate = "durative-action instance n0 : (navigate);";
+    assert_eq!(
+        refused(navigate),
+        "line 1, column 1: the domain leaves `?s` open: add `parameter ?s default VALUE;`"
+    );
+    assert_eq!(
+        refused(&format!("parameter ?s;{navigate}")),
+        "line 1, column 11: no nominal value of `?s` can be found: give `default`"
+    );
+    assert_eq!(
+        refused(&format!("parameter ?s default 3 ub 2;{navigate}")),
+        "line 1, column 11: the default 3 of `?s` is not in its range [0, 2]: \
+         change `default`, `lb` or `ub`"
+    );
+}
+
+#[test]
+fn what_is_written_is_what_was_read() {
+    let task = rover();
+    let plan = parsed(PAPER);
+    let text = write(&task, &plan).unwrap();
+    assert_eq!(
+        text,
+        "\
+parameter dur_1 weight 0.5 default 12 ub 500;
+parameter gap default 1;
+parameter ?s default 1.5;
+durative-action instance n0 : (navigate);
+durative-action instance cs1 : (collect S1);
+action instance b : (beep);
+c: n0.end - n0.start in [dur_1, dur_1];
+c: cs1.start - n0.end in [gap, inf];
+c: b - .zero in [1/3, 40];
+c: b - cs1.end in [-inf, -0.5];
+"
+    );
+    assert_eq!(parsed(&text), plan);
+}
+
+#[test]
+fn timed_initials_are_written_as_absolute_times() {
+    let mut task = rover();
+    let mut plan = parsed("action instance a : (beep); action instance b : (beep);").plan;
+    let (zero, a, b, timed) = (NodeId(0), NodeId(1), NodeId(2), NodeId(3));
+    let mut add = |from, to, lower: &str, upper: Option<&str>| {
+        plan.constraints.push(Constraint {
+            from,
+            to,
+            lower: Bound::Finite(number(lower)),
+            upper: upper.map_or(Bound::Infinite, |upper| Bound::Finite(number(upper))),
+            reason: Reason::Interference,
+        });
+    };
+    add(zero, a, "0", Some("99"));
+    add(a, timed, "0.001", None);
+    add(timed, b, "0.001", Some("7"));
+    add(zero, timed, "3", None);
+    let text = write(&task, &ParametrizedPlan::closed(&task, plan)).unwrap();
+    assert_eq!(
+        text,
+        "\
+action instance a : (beep);
+action instance b : (beep);
+c: a - .zero in [0, 99];
+c: b - .zero in [100.001, 107];
+"
+    );
+    let again = read(text.as_bytes(), &mut task).unwrap();
+    assert_eq!(write(&task, &again).unwrap(), text);
+}
+
+#[test]
+fn what_the_format_cannot_say_is_refused() {
+    let task = rover();
+    let mut plan = parsed("action instance a : (beep);");
+    plan.parameters.push(Parameter {
+        name: "deadline".to_owned(),
+        kind: ParameterKind::Timed(0),
+        nominal: Rational::from(100),
+        weight: Rational::ONE,
+        range: Interval::EVERYTHING,
+    });
+    let names = vec!["deadline".to_owned()];
+    assert_eq!(
+        write(&task, &plan),
+        Err(WriteError::NotExpressible { names })
+    );
+    plan.parameters.clear();
+    plan.plan.instances[0].label = "a b".to_owned();
+    let name = "a b".to_owned();
+    assert_eq!(write(&task, &plan), Err(WriteError::Name { name }));
+}
+
+/// Plans that files can express, as reading them gives them.
+fn plans() -> impl Strategy<Value = ParametrizedPlan> {
+    let action = prop_oneof!["navigate", "beep", "collect s1", "collect s2", "refuel s1"];
+    let rational = || (-2000_i64..2000, 1_i64..12).prop_map(|(n, d)| Rational::new(n, d));
+    let bound = || prop_oneof![Just(None), rational().prop_map(Some)];
+    let constraint = (
+        any::<prop::sample::Index>(),
+        any::<prop::sample::Index>(),
+        bound(),
+        bound(),
+    );
+    let parameter = (
+        rational(),
+        1_i64..9,
+        bound(),
+        bound(),
+        any::<prop::sample::Index>(),
+    );
+    (
+        prop::collection::vec(action, 0..8),
+        prop::collection::vec(constraint, 0..20),
+        prop::collection::vec(parameter, 0..5),
+    )
+        .prop_map(|(actions, constraints, parameters)| build(&actions, constraints, parameters))
+}
+
+type Pick = prop::sample::Index;
+type PickedConstraint = (Pick, Pick, Option<Rational>, Option<Rational>);
+type PickedParameter = (Rational, i64, Option<Rational>, Option<Rational>, Pick);
+
+fn build(
+    actions: &[String],
+    constraints: Vec<PickedConstraint>,
+    parameters: Vec<PickedParameter>,
+) -> ParametrizedPlan {
+    let mut task = rover();
+    let mut lines = vec!["parameter ?s default 2;".to_owned()];
+    for (index, action) in actions.iter().enumerate() {
+        let keyword = if action == "beep" {
+            "action"
+        } else {
+            "durative-action"
+        };
+        lines.push(format!("{keyword} instance n{index} : ({action});"));
+        if action.starts_with("refuel") {
+            lines.push(format!("parameter n{index}.?r default -{index};"));
+        }
+    }
+    let text = lines.concat();
+    let mut plan = read(text.as_bytes(), &mut task).unwrap_or_else(|errors| panic!("{errors}"));
+    // All nodes but the timed initials, which files do not mention.
+    let nodes = plan.plan.nodes.len() - 1;
+    plan.plan.constraints.extend(given(nodes, constraints));
+    for (index, (nominal, weight, lower, upper, place)) in parameters.into_iter().enumerate() {
+        let id = ParameterId::from(plan.parameters.len());
+        let mut kind = ParameterKind::Bound;
+        if let Some(instance) = duration_place(&plan.plan, place) {
+            kind = ParameterKind::Duration(instance);
+            plan.plan.free_duration(instance);
+            plan.plan.constraints.push(Constraint {
+                from: plan.plan.start(instance),
+                to: plan.plan.end(instance),
+                lower: Bound::Parameter(id),
+                upper: Bound::Parameter(id),
+                reason: Reason::Given,
+            });
+        }
+        let nominal = if kind == ParameterKind::Bound {
+            nominal
+        } else {
+            nominal.abs()
+        };
+        let mut range = kind.natural_range(&nominal);
+        let both = [(lower, &mut range.lower), (upper, &mut range.upper)];
+        for (factor, (distance, end)) in [-1, 1].into_iter().zip(both) {
+            if let Some(distance) = distance {
+                let value = &nominal + Rational::from(factor) * distance.abs();
+                *end = elbowroom_num::End::Closed(value);
+            }
+        }
+        plan.parameters.push(Parameter {
+            name: format!("p_{index}.x-?"),
+            kind,
+            nominal,
+            weight: Rational::new(weight, 2),
+            range,
+        });
+    }
+    plan
+}
+
+fn duration_place(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
+    let durative = |instance: &Instance| instance.action.durative().is_some();
+    let all: Vec<_> = (0..plan.instances.len())
+        .filter(|&index| durative(&plan.instances[index]))
+        .collect();
+    (!all.is_empty()).then(|| InstanceId::from(*place.get(&all)))
+}
+
+/// At most one numeric constraint per pair, as the writer merges them.
+fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
+    let mut seen = std::collections::BTreeSet::new();
+    let bound = |value: Option<Rational>| value.map_or(Bound::Infinite, Bound::Finite);
+    constraints
+        .into_iter()
+        .map(|(from, to, lower, upper)| Constraint {
+            from: NodeId::from(from.index(nodes)),
+            to: NodeId::from(to.index(nodes)),
+            lower: bound(lower),
+            upper: bound(upper),
+            reason: Reason::Given,
+        })
+        .filter(|constraint| seen.insert((constraint.from, constraint.to)))
+        .collect()
+}
+
+proptest! {
+    #[test]
+    fn writing_and_reading_gives_the_plan_back(plan in plans()) {
+        let text = write(&rover(), &plan).unwrap();
+        prop_assert_eq!(parsed(&text), plan);
+    }
+
+    #[test]
+    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = read(&bytes, &mut rover());
+    }
+
+    #[test]
+    fn no_broken_file_makes_the_reader_panic(
+        cut in any::<prop::sample::Index>(),
+        other in any::<prop::sample::Index>(),
+        junk in "[ -~\\n;:é]{0,4}",
+    ) {
+        let (a, b) = (cut.index(PAPER.len()), other.index(PAPER.len()));
+        let text = format!("{}{junk}{}", &PAPER[..a.min(b)], &PAPER[a.max(b)..]);
+        let _ = read(text.as_bytes(), &mut rover());
+    }
+}

@@ -1,0 +1,101 @@
+//! From a plan to its temporal network, and from a schedule back to a plan with fixed times.
+
+use elbowroom_model::ground::{Body, Expression};
+use elbowroom_model::problem::Unknown;
+use elbowroom_model::{Step, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_stn::Network;
+
+use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
+
+/// A time for each node of an [`StnPlan`], by position.
+pub type Schedule = Vec<Rational>;
+
+/// The node's namesake in [`StnPlan::network`].
+pub fn network_node(node: NodeId) -> elbowroom_stn::NodeId {
+    elbowroom_stn::NodeId(node.0)
+}
+
+impl StnPlan {
+    /// The plan as a network, when the parameters have these values. Nodes keep their positions.
+    ///
+    /// Constraint by constraint: first that each node but zero comes at 0 or later, then the
+    /// plan's own, each of which makes as many as it has finite bounds.
+    pub fn network(&self, valuation: &[Rational]) -> Network {
+        let value = |bound: &Bound| match bound {
+            Bound::Infinite => None,
+            Bound::Finite(value) => Some(value.clone()),
+            Bound::Parameter(id) => Some(valuation[id.index()].clone()),
+        };
+        let mut network = Network::with_nodes(self.nodes.len());
+        let zero = network_node(NodeId::ZERO);
+        for (node, _) in self.nodes().skip(1) {
+            network.add(elbowroom_stn::Constraint::at_least(
+                zero,
+                network_node(node),
+                Rational::ZERO,
+            ));
+        }
+        for constraint in &self.constraints {
+            let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+            if let Some(lower) = value(&constraint.lower) {
+                network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
+            }
+            if let Some(upper) = value(&constraint.upper) {
+                network.add(elbowroom_stn::Constraint::at_most(from, to, upper));
+            }
+        }
+        network
+    }
+
+    /// The plan with these values in place of its parameters.
+    #[must_use]
+    pub fn at(&self, valuation: &[Rational]) -> Self {
+        let mut plan = self.clone();
+        for instance in &mut plan.instances {
+            instance.action = instance.action.map_leaves(&mut |leaf| match leaf {
+                Expression::Unknown(Unknown::Parameter(index)) => {
+                    Some(Expression::Constant(valuation[*index as usize].clone()))
+                }
+                _ => None,
+            });
+        }
+        for constraint in &mut plan.constraints {
+            for bound in [&mut constraint.lower, &mut constraint.upper] {
+                if let Bound::Parameter(id) = bound {
+                    *bound = Bound::Finite(valuation[id.index()].clone());
+                }
+            }
+        }
+        plan
+    }
+
+    /// The plan with fixed times that a schedule makes of it, steps in order of start.
+    pub fn scheduled(&self, schedule: &[Rational]) -> TimeTriggeredPlan {
+        let mut steps = Vec::with_capacity(self.instances.len());
+        let mut ends = vec![None; self.instances.len()];
+        for (node, what) in self.nodes() {
+            if let Node::End(id) = what {
+                ends[id.index()] = Some(schedule[node.index()].clone());
+            }
+        }
+        for (node, what) in self.nodes() {
+            let (Node::Start(id) | Node::Instant(id)) = what else {
+                continue;
+            };
+            let start = schedule[node.index()].clone();
+            let action = self.instance(id).action.clone();
+            let duration = match action.body {
+                Body::Instantaneous(_) => None,
+                Body::Durative(_) => ends[id.index()].take().map(|end| end - &start),
+            };
+            steps.push(Step {
+                start,
+                action,
+                duration,
+            });
+        }
+        steps.sort_by(|a, b| a.start.cmp(&b.start));
+        TimeTriggeredPlan { steps }
+    }
+}

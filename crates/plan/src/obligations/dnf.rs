@@ -1,0 +1,143 @@
+//! Conditions as alternatives of linear inequalities.
+
+use elbowroom_model::ground::{Condition, Expression};
+use elbowroom_model::problem::Comparison;
+
+use super::timeline::Reading;
+use super::{Inequality, Refusal};
+use crate::linear::Linear;
+
+/// Alternatives, each a conjunction: none is never, an empty one is always.
+pub(crate) type Alternatives = Vec<Vec<Inequality>>;
+
+/// How many alternatives a condition may unfold into.
+const MOST_ALTERNATIVES: usize = 4096;
+
+impl Reading<'_> {
+    /// The alternatives in which the condition is true (`wanted`) or false.
+    ///
+    /// A comparison with an undefined number is false, whichever way it is written.
+    pub(crate) fn alternatives(
+        &self,
+        condition: &Condition,
+        wanted: bool,
+    ) -> Result<Alternatives, Refusal> {
+        match condition {
+            Condition::Fact(fact) => Ok(always_if(self.fact(*fact)? == wanted)),
+            Condition::Not(part) => self.alternatives(part, !wanted),
+            Condition::And(parts) if wanted => self.all(parts, true),
+            Condition::And(parts) => self.any(parts, false),
+            Condition::Or(parts) if wanted => self.any(parts, true),
+            Condition::Or(parts) => self.all(parts, false),
+            Condition::Compare(comparison, left, right) => {
+                self.comparison(*comparison, left, right, wanted)
+            }
+        }
+    }
+
+    fn any(&self, parts: &[Condition], wanted: bool) -> Result<Alternatives, Refusal> {
+        let mut alternatives = Vec::new();
+        for part in parts {
+            alternatives.extend(self.alternatives(part, wanted)?);
+            if alternatives.iter().any(Vec::is_empty) {
+                return Ok(vec![Vec::new()]);
+            }
+            self.check_size(&alternatives)?;
+        }
+        Ok(alternatives)
+    }
+
+    fn all(&self, parts: &[Condition], wanted: bool) -> Result<Alternatives, Refusal> {
+        let mut product: Alternatives = vec![Vec::new()];
+        for part in parts {
+            let alternatives = self.alternatives(part, wanted)?;
+            product = product
+                .iter()
+                .flat_map(|so_far| {
+                    alternatives
+                        .iter()
+                        .map(move |more| [&so_far[..], more].concat())
+                })
+                .collect();
+            if product.is_empty() {
+                break;
+            }
+            self.check_size(&product)?;
+        }
+        Ok(product)
+    }
+
+    fn check_size(&self, alternatives: &Alternatives) -> Result<(), Refusal> {
+        if alternatives.len() > MOST_ALTERNATIVES {
+            return Err(Refusal::TooManyCases {
+                place: self.place.to_owned(),
+                limit: MOST_ALTERNATIVES,
+            });
+        }
+        Ok(())
+    }
+
+    fn comparison(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+        wanted: bool,
+    ) -> Result<Alternatives, Refusal> {
+        let (Some(left), Some(right)) = (self.linear(left)?, self.linear(right)?) else {
+            return Ok(always_if(!wanted));
+        };
+        Ok(compared(comparison, &left, &right, wanted))
+    }
+}
+
+/// The alternatives in which `left comparison right` is true (`wanted`) or false.
+pub(crate) fn compared(
+    comparison: Comparison,
+    left: &Linear,
+    right: &Linear,
+    wanted: bool,
+) -> Alternatives {
+    let below = |is_strict| {
+        vec![Inequality {
+            expression: left.minus(right),
+            is_strict,
+        }]
+    };
+    let above = |is_strict| {
+        vec![Inequality {
+            expression: right.minus(left),
+            is_strict,
+        }]
+    };
+    let alternatives = match (comparison, wanted) {
+        (Comparison::Less, true) | (Comparison::AtLeast, false) => vec![below(true)],
+        (Comparison::AtMost, true) | (Comparison::Greater, false) => vec![below(false)],
+        (Comparison::AtLeast, true) | (Comparison::Less, false) => vec![above(false)],
+        (Comparison::Greater, true) | (Comparison::AtMost, false) => vec![above(true)],
+        (Comparison::Equal, true) => vec![[below(false), above(false)].concat()],
+        (Comparison::Equal, false) => vec![below(true), above(true)],
+    };
+    alternatives.into_iter().filter_map(settled).collect()
+}
+
+/// Drops inequalities between constants that hold; `None` if one does not.
+fn settled(conjunction: Vec<Inequality>) -> Option<Vec<Inequality>> {
+    let mut open = Vec::new();
+    for inequality in conjunction {
+        match inequality.expression.as_constant() {
+            Some(value) if value.is_negative() || (value.is_zero() && !inequality.is_strict) => {}
+            Some(_) => return None,
+            None => open.push(inequality),
+        }
+    }
+    Some(open)
+}
+
+fn always_if(condition: bool) -> Alternatives {
+    if condition {
+        vec![Vec::new()]
+    } else {
+        Vec::new()
+    }
+}

@@ -1,0 +1,276 @@
+//! Whether every schedule of a plan is valid, for every value in a box.
+//!
+//! The second half of paper 1's CHECKINENVELOPE, `enc_tn ∧ enc_eff ∧ enc_R → enc_proofs`, without
+//! an SMT solver. Each way of breaking an obligation is a system of linear inequalities over the
+//! schedules of the box ([`BadCase`]); that it has no solution is shown by a path or a flow in the
+//! plan's network, or, where parameters are coupled, by a linear program. Such proofs are sums of
+//! constraints, so they are kept, and when a box is widened only those that use the moved end
+//! and no longer add up are looked for again.
+
+mod bad_case;
+mod certificate;
+mod flow;
+mod linear_program;
+mod proof;
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_stn::ConsistentNetwork;
+
+use crate::decoupled::DecoupledEnvelope;
+use crate::obligations::{BadCase, Obligations, Refusal, Requirement};
+use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
+use crate::reduction::{BoxEnd, Reduction};
+use bad_case::{Outcome, Schedules};
+use certificate::Certificate;
+use proof::{Proof, Prover};
+
+/// Decides, box by box, whether every schedule is valid.
+#[derive(Clone, Debug)]
+pub struct Soundness<'a> {
+    task: &'a Task,
+    plan: &'a ParametrizedPlan,
+    reduction: Reduction,
+    obligations: Obligations,
+    direct: Vec<DirectCase>,
+    over_all: Vec<Option<Proof>>,
+    /// The case that broke last: the likeliest to break next.
+    suspect: usize,
+    /// How many bad cases have been refuted from scratch.
+    refutations: usize,
+}
+
+/// A bad case of a direct obligation with the proofs that it is impossible.
+#[derive(Clone, Debug)]
+struct DirectCase {
+    obligation: usize,
+    case: usize,
+    proofs: Option<Vec<Certificate>>,
+}
+
+/// An obligation that some schedule of a box breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Broken {
+    /// What is required.
+    pub requirement: Requirement,
+    /// How it is broken.
+    pub case: BadCase,
+}
+
+/// Values of the parameters and a schedule that break an obligation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Counterexample {
+    /// The parameters' values.
+    pub valuation: Valuation,
+    /// A time for each node.
+    pub schedule: Vec<Rational>,
+    /// For an over-all condition, the moment at which it is false.
+    pub moment: Option<Rational>,
+}
+
+impl<'a> Soundness<'a> {
+    /// Compiles a plan's obligations.
+    ///
+    /// # Errors
+    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+    /// reasoning.
+    pub fn new(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &Rational,
+    ) -> Result<Self, Refusal> {
+        let reduction = Reduction::new(plan);
+        let nominal = nominal_schedule(&reduction, plan).ok_or(Refusal::NoNominalSchedule)?;
+        let obligations =
+            Obligations::compile(task, plan, epsilon, &nominal, &reduction.substitution)?;
+        let mut direct = Vec::new();
+        for (index, obligation) in obligations.direct.iter().enumerate() {
+            for (case, bad) in obligation.bad_cases.iter().enumerate() {
+                check_products(plan, &reduction, bad)?;
+                direct.push(DirectCase {
+                    obligation: index,
+                    case,
+                    proofs: None,
+                });
+            }
+        }
+        let over_all = vec![None; obligations.over_all.len()];
+        Ok(Self {
+            task,
+            plan,
+            reduction,
+            obligations,
+            direct,
+            over_all,
+            suspect: 0,
+            refutations: 0,
+        })
+    }
+
+    /// The obligations.
+    pub fn obligations(&self) -> &Obligations {
+        &self.obligations
+    }
+
+    /// How many bad cases have been refuted from scratch so far: a measure of work.
+    pub fn refutations(&self) -> usize {
+        self.refutations
+    }
+
+    /// The first obligation that some schedule for some value in the box breaks.
+    ///
+    /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
+    /// end, further out than before, from the last one for which the answer was `None`.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn broken(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+    ) -> Result<Option<Broken>, Refusal> {
+        let Self {
+            reduction,
+            obligations,
+            direct,
+            over_all,
+            suspect,
+            refutations,
+            ..
+        } = self;
+        let mut schedules = Lazy {
+            reduction,
+            envelope,
+            schedules: None,
+        };
+        let first = (*suspect).min(direct.len());
+        for index in (first..direct.len()).chain(0..first) {
+            let direct = &mut direct[index];
+            if direct.stands(envelope, moved) {
+                continue;
+            }
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
+            *refutations += 1;
+            let obligation = &obligations.direct[direct.obligation];
+            match schedules.possible(&obligation.bad_cases[direct.case]) {
+                Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
+                Outcome::Possible => {
+                    *suspect = index;
+                    return Ok(Some(Broken {
+                        requirement: obligation.requirement.clone(),
+                        case: obligation.bad_cases[direct.case].clone(),
+                    }));
+                }
+            }
+        }
+        for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
+            if proof
+                .as_ref()
+                .is_some_and(|proof| proof.holds_in(envelope, moved))
+            {
+                continue;
+            }
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
+            *refutations += 1;
+            let mut prover = Prover::new(self.task, &self.plan.plan, over_all, schedules);
+            match prover.prove(proof.as_ref(), moved)? {
+                Ok(found) => *proof = Some(found),
+                Err(case) => {
+                    return Ok(Some(Broken {
+                        requirement: Requirement::OverAll {
+                            instance: over_all.instance,
+                            condition: over_all.condition.clone(),
+                        },
+                        case,
+                    }));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Values and a schedule in the box that break the obligation as said.
+    pub fn counterexample(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        bad_case::witness(&self.reduction, envelope, &broken.case)
+    }
+}
+
+impl DirectCase {
+    /// Whether the known proofs still stand.
+    fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+        let Some(proofs) = &self.proofs else {
+            return false;
+        };
+        proofs.iter().all(|proof| match moved {
+            Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
+            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
+        })
+    }
+}
+
+/// The network of a box, made when first needed.
+struct Lazy<'a> {
+    reduction: &'a Reduction,
+    envelope: &'a DecoupledEnvelope,
+    schedules: Option<Option<Schedules<'a>>>,
+}
+
+impl<'a> Lazy<'a> {
+    /// `None` if the box has no schedule at all: then none is bad.
+    fn get(&mut self) -> Option<&mut Schedules<'a>> {
+        self.schedules
+            .get_or_insert_with(|| Schedules::new(self.reduction, self.envelope))
+            .as_mut()
+    }
+}
+
+/// The earliest schedule at the nominal values, by node.
+fn nominal_schedule(reduction: &Reduction, plan: &ParametrizedPlan) -> Option<Vec<Rational>> {
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let network = reduction.network(&point).network;
+    let consistent = ConsistentNetwork::try_from(network).ok()?;
+    let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));
+    let times: Vec<Rational> = earliest
+        .times()
+        .iter()
+        .map(|time| time.real.clone())
+        .collect();
+    Some(reduction.times(&times))
+}
+
+/// Products are exact only one inequality at a time, and only if the multiplied parameter does not
+/// also move the times.
+fn check_products(
+    plan: &ParametrizedPlan,
+    reduction: &Reduction,
+    case: &BadCase,
+) -> Result<(), Refusal> {
+    let multiplied: BTreeMap<ParameterId, ()> = case
+        .inequalities
+        .iter()
+        .flat_map(|inequality| {
+            inequality
+                .expression
+                .multiplied_parameters()
+                .map(|id| (id, ()))
+        })
+        .collect();
+    for &parameter in multiplied.keys() {
+        if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
+            return Err(Refusal::Coupled {
+                name: plan.parameter(parameter).name.clone(),
+            });
+        }
+    }
+    Ok(())
+}

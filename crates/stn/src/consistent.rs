@@ -1,0 +1,250 @@
+//! A network with its proof of consistency, tightened and relaxed step by step.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use elbowroom_num::Rational;
+
+use crate::{Constraint, ConstraintId, NegativeCycle, Network, NodeId, Schedule, Weight};
+
+/// A network and a schedule in which all its constraints hold.
+#[derive(Clone, Debug)]
+pub struct ConsistentNetwork<W = Rational> {
+    network: Network<W>,
+    schedule: Schedule<W>,
+    repair: Repair<W>,
+}
+
+/// How much of a network was there at some moment.
+///
+/// Checkpoints nest: going back to one makes all later ones void.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Checkpoint {
+    node_count: usize,
+    constraint_count: usize,
+}
+
+impl<W: Weight> Default for ConsistentNetwork<W> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<W: Weight> TryFrom<Network<W>> for ConsistentNetwork<W> {
+    type Error = NegativeCycle<W>;
+
+    fn try_from(network: Network<W>) -> Result<Self, NegativeCycle<W>> {
+        let schedule = network.consistency()?;
+        let mut repair = Repair::default();
+        repair.resize(network.node_count());
+        Ok(Self {
+            network,
+            schedule,
+            repair,
+        })
+    }
+}
+
+impl<W: Weight> ConsistentNetwork<W> {
+    /// The network without nodes.
+    pub fn new() -> Self {
+        Self {
+            network: Network::new(),
+            schedule: Schedule::new(Vec::new()),
+            repair: Repair::default(),
+        }
+    }
+
+    /// The nodes and constraints.
+    pub fn network(&self) -> &Network<W> {
+        &self.network
+    }
+
+    /// Gives up the proof.
+    pub fn into_network(self) -> Network<W> {
+        self.network
+    }
+
+    /// Some schedule in which every constraint holds. It depends on the order of additions.
+    pub fn schedule(&self) -> &Schedule<W> {
+        &self.schedule
+    }
+
+    /// A new time point, free of constraints.
+    pub fn add_node(&mut self) -> NodeId {
+        let node = self.network.add_node();
+        self.resize();
+        node
+    }
+
+    /// Adds a constraint, unless it contradicts the others; then the network stays as it was.
+    ///
+    /// Takes time in proportion to what the constraint moves (Cotton & Maler, SAT 2006).
+    ///
+    /// # Errors
+    /// A cycle of negative length. Its first constraint is the refused one, by the number it
+    /// would have got.
+    pub fn add(&mut self, constraint: Constraint<W>) -> Result<ConstraintId, NegativeCycle<W>> {
+        let before = self.checkpoint();
+        let id = self.network.add(constraint);
+        let repaired = self
+            .repair
+            .after_adding(id, &self.network, &mut self.schedule);
+        if let Err(cycle) = repaired {
+            self.undo_to(before);
+            return Err(cycle);
+        }
+        Ok(id)
+    }
+
+    /// The present moment, to come back to.
+    pub fn checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            node_count: self.network.node_count(),
+            constraint_count: self.network.constraints().len(),
+        }
+    }
+
+    /// Takes back all nodes and constraints added since `checkpoint`.
+    ///
+    /// The schedule stays as it is: with fewer constraints it is as good as before.
+    pub fn undo_to(&mut self, checkpoint: Checkpoint) {
+        self.network
+            .truncate(checkpoint.node_count, checkpoint.constraint_count);
+        self.resize();
+    }
+
+    fn resize(&mut self) {
+        self.schedule.resize(self.network.node_count());
+        self.repair.resize(self.network.node_count());
+    }
+}
+
+/// The workspace of [`ConsistentNetwork::add`], kept to spare allocations.
+///
+/// Invariant: between additions, nothing is proposed and the queue is empty.
+#[derive(Clone, Debug)]
+struct Repair<W> {
+    /// An earlier time for a node, and the constraint that demands it.
+    proposed: Vec<Option<(W, ConstraintId)>>,
+    /// Whether the proposed time is final.
+    is_final: Vec<bool>,
+    /// The nodes with a proposal.
+    moved: Vec<NodeId>,
+    /// Nodes to look at, by how much they move: the largest step back first.
+    queue: BinaryHeap<Reverse<(W, NodeId)>>,
+}
+
+impl<W: Ord> Default for Repair<W> {
+    fn default() -> Self {
+        Self {
+            proposed: Vec::new(),
+            is_final: Vec::new(),
+            moved: Vec::new(),
+            queue: BinaryHeap::new(),
+        }
+    }
+}
+
+impl<W: Weight> Repair<W> {
+    fn resize(&mut self, node_count: usize) {
+        self.proposed.resize_with(node_count, || None);
+        self.is_final.resize(node_count, false);
+    }
+
+    /// Moves nodes back in time until the constraint `added` holds as well, if that can be.
+    fn after_adding(
+        &mut self,
+        added: ConstraintId,
+        network: &Network<W>,
+        schedule: &mut Schedule<W>,
+    ) -> Result<(), NegativeCycle<W>> {
+        let outcome = self.propose(added, network, schedule);
+        self.queue.clear();
+        for node in self.moved.drain(..) {
+            self.is_final[node.index()] = false;
+            let proposed = self.proposed[node.index()].take();
+            if let (Ok(()), Some((time, _))) = (&outcome, proposed) {
+                schedule.set(node, time);
+            }
+        }
+        outcome
+    }
+
+    /// Dijkstra's algorithm over the slack of the constraints, from the new constraint's `to`.
+    ///
+    /// When it comes to move the new constraint's `from`, the two ends chase each other.
+    fn propose(
+        &mut self,
+        added: ConstraintId,
+        network: &Network<W>,
+        schedule: &Schedule<W>,
+    ) -> Result<(), NegativeCycle<W>> {
+        let anchor = network.constraint(added).from;
+        self.tighten(added, anchor, network, schedule)?;
+        while let Some(Reverse((_, node))) = self.queue.pop() {
+            if std::mem::replace(&mut self.is_final[node.index()], true) {
+                continue;
+            }
+            for &id in network.leaving(node) {
+                self.tighten(id, anchor, network, schedule)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Proposes an earlier time for the `to` of one constraint, if it needs one.
+    fn tighten(
+        &mut self,
+        id: ConstraintId,
+        anchor: NodeId,
+        network: &Network<W>,
+        schedule: &Schedule<W>,
+    ) -> Result<(), NegativeCycle<W>> {
+        let Constraint { from, to, bound } = network.constraint(id);
+        if self.is_final[to.index()] {
+            return Ok(());
+        }
+        let limit = self.time(*from, schedule).plus(bound);
+        if limit >= *self.time(*to, schedule) {
+            return Ok(());
+        }
+        let step = limit.minus(&schedule[*to]);
+        if *to == anchor {
+            let constraints = self.path(anchor, id, network);
+            return Err(NegativeCycle {
+                constraints,
+                total: step,
+            });
+        }
+        if self.proposed[to.index()].is_none() {
+            self.moved.push(*to);
+        }
+        self.proposed[to.index()] = Some((limit, id));
+        self.queue.push(Reverse((step, *to)));
+        Ok(())
+    }
+
+    /// The proposed time, or the present one.
+    fn time<'a>(&'a self, node: NodeId, schedule: &'a Schedule<W>) -> &'a W {
+        match &self.proposed[node.index()] {
+            Some((time, _)) => time,
+            None => &schedule[node],
+        }
+    }
+
+    /// The constraints that moved one node after the other, from `anchor` up to `last`.
+    fn path(&self, anchor: NodeId, last: ConstraintId, network: &Network<W>) -> Vec<ConstraintId> {
+        let mut path = vec![last];
+        let mut node = network.constraint(last).from;
+        while node != anchor {
+            let (_, id) = self.proposed[node.index()]
+                .as_ref()
+                .expect("only nodes with a proposal move others");
+            path.push(*id);
+            node = network.constraint(*id).from;
+        }
+        path.reverse();
+        path
+    }
+}

@@ -1,0 +1,239 @@
+//! Time points and the constraints between them.
+
+use std::fmt;
+
+use elbowroom_num::Rational;
+
+use crate::{Schedule, Weight};
+
+/// A time point of a network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// The node's place in a list of all nodes.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) fn from_index(index: usize) -> Self {
+        Self(u32::try_from(index).expect("networks have fewer than 2^32 nodes"))
+    }
+}
+
+impl fmt::Display for NodeId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "n{}", self.0)
+    }
+}
+
+/// A constraint's place in the order in which the constraints were added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ConstraintId(pub u32);
+
+impl ConstraintId {
+    /// The constraint's place in a list of all constraints.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) fn from_index(index: usize) -> Self {
+        Self(u32::try_from(index).expect("networks have fewer than 2^32 constraints"))
+    }
+}
+
+/// The constraint `to - from <= bound`, drawn as the edge `from --bound--> to`.
+///
+/// "`to` at most `bound` after `from`"; a negative `bound` reads
+/// "`to` at least `-bound` before `from`".
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Constraint<W = Rational> {
+    /// Where the edge begins: the time that is subtracted.
+    pub from: NodeId,
+    /// Where the edge ends.
+    pub to: NodeId,
+    /// What the difference does not exceed.
+    pub bound: W,
+}
+
+impl<W: Weight> Constraint<W> {
+    /// `to - from <= bound`.
+    pub fn at_most(from: NodeId, to: NodeId, bound: W) -> Self {
+        Self { from, to, bound }
+    }
+
+    /// `to - from >= bound`, which is `from - to <= -bound`.
+    #[allow(
+        clippy::needless_pass_by_value,
+        reason = "both constructors take the bound alike"
+    )]
+    pub fn at_least(from: NodeId, to: NodeId, bound: W) -> Self {
+        Self {
+            from: to,
+            to: from,
+            bound: bound.negated(),
+        }
+    }
+
+    /// Whether `schedule[to] - schedule[from] <= bound`.
+    pub fn holds_in(&self, schedule: &Schedule<W>) -> bool {
+        schedule[self.to] <= schedule[self.from].plus(&self.bound)
+    }
+
+    /// `schedule[from] + bound - schedule[to]`: how far the constraint is from being violated.
+    ///
+    /// Measured by a schedule, the length of a path changes only by the times of its two ends;
+    /// where all constraints hold, no edge is negative.
+    pub fn slack_in(&self, schedule: &Schedule<W>) -> W {
+        schedule[self.from]
+            .plus(&self.bound)
+            .minus(&schedule[self.to])
+    }
+}
+
+/// Time points and constraints `to - from <= bound` between them. May contradict itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Network<W = Rational> {
+    constraints: Vec<Constraint<W>>,
+    /// For each node, the constraints whose `from` it is, in the order they were added.
+    leaving: Vec<Vec<ConstraintId>>,
+    /// For each node, the constraints whose `to` it is, in the order they were added.
+    entering: Vec<Vec<ConstraintId>>,
+}
+
+impl<W> Default for Network<W> {
+    fn default() -> Self {
+        Self {
+            constraints: Vec::new(),
+            leaving: Vec::new(),
+            entering: Vec::new(),
+        }
+    }
+}
+
+impl<W: Weight> Network<W> {
+    /// The network without nodes.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// `node_count` nodes and no constraint.
+    pub fn with_nodes(node_count: usize) -> Self {
+        Self {
+            constraints: Vec::new(),
+            leaving: vec![Vec::new(); node_count],
+            entering: vec![Vec::new(); node_count],
+        }
+    }
+
+    /// A new time point, free of constraints.
+    pub fn add_node(&mut self) -> NodeId {
+        let node = NodeId::from_index(self.leaving.len());
+        self.leaving.push(Vec::new());
+        self.entering.push(Vec::new());
+        node
+    }
+
+    /// Adds a constraint between two nodes of the network.
+    pub fn add(&mut self, constraint: Constraint<W>) -> ConstraintId {
+        let id = ConstraintId::from_index(self.constraints.len());
+        self.leaving[constraint.from.index()].push(id);
+        self.entering[constraint.to.index()].push(id);
+        self.constraints.push(constraint);
+        id
+    }
+
+    /// How many nodes there are; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
+    pub fn node_count(&self) -> usize {
+        self.leaving.len()
+    }
+
+    /// All nodes.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = NodeId> + use<W> {
+        (0..self.node_count()).map(NodeId::from_index)
+    }
+
+    /// The constraint of that number.
+    pub fn constraint(&self, id: ConstraintId) -> &Constraint<W> {
+        &self.constraints[id.index()]
+    }
+
+    /// All constraints; `ConstraintId` counts along this list.
+    pub fn constraints(&self) -> &[Constraint<W>] {
+        &self.constraints
+    }
+
+    /// The numbers of all constraints.
+    pub fn constraint_ids(&self) -> impl ExactSizeIterator<Item = ConstraintId> + use<W> {
+        (0..self.constraints.len()).map(ConstraintId::from_index)
+    }
+
+    /// The constraints whose `from` is `node`.
+    pub fn leaving(&self, node: NodeId) -> &[ConstraintId] {
+        &self.leaving[node.index()]
+    }
+
+    /// The constraints whose `to` is `node`.
+    pub fn entering(&self, node: NodeId) -> &[ConstraintId] {
+        &self.entering[node.index()]
+    }
+
+    /// The network without the constraints `left_out`; the others keep their order.
+    ///
+    /// `left_out` is sorted, as [`implied`](crate::ConsistentNetwork::implied) returns it.
+    #[must_use]
+    pub fn without(&self, left_out: &[ConstraintId]) -> Self {
+        debug_assert!(left_out.is_sorted());
+        let mut rest = Self::with_nodes(self.node_count());
+        for id in self.constraint_ids() {
+            if left_out.binary_search(&id).is_err() {
+                rest.add(self.constraint(id).clone());
+            }
+        }
+        rest
+    }
+
+    /// All nodes in the order in which a depth-first search along the edges for which
+    /// `is_followed` holds leaves them: if no cycle is followed, `to` before `from`.
+    pub(crate) fn depth_first_postorder(
+        &self,
+        is_followed: impl Fn(ConstraintId) -> bool,
+    ) -> Vec<NodeId> {
+        let mut finished = Vec::with_capacity(self.node_count());
+        let mut is_seen = vec![false; self.node_count()];
+        let mut path: Vec<(NodeId, usize)> = Vec::new();
+        for root in self.nodes() {
+            if !std::mem::replace(&mut is_seen[root.index()], true) {
+                path.push((root, 0));
+            }
+            while let Some((node, next)) = path.last_mut() {
+                let Some(&id) = self.leaving(*node).get(*next) else {
+                    finished.push(*node);
+                    path.pop();
+                    continue;
+                };
+                *next += 1;
+                let to = self.constraint(id).to;
+                if is_followed(id) && !std::mem::replace(&mut is_seen[to.index()], true) {
+                    path.push((to, 0));
+                }
+            }
+        }
+        finished
+    }
+
+    /// Takes back the last constraints and nodes, until so many are left.
+    ///
+    /// No constraint that stays may mention a node that goes.
+    pub(crate) fn truncate(&mut self, node_count: usize, constraint_count: usize) {
+        while self.constraints.len() > constraint_count {
+            // The newest constraint is the last in both of its lists.
+            if let Some(constraint) = self.constraints.pop() {
+                self.leaving[constraint.from.index()].pop();
+                self.entering[constraint.to.index()].pop();
+            }
+        }
+        self.leaving.truncate(node_count);
+        self.entering.truncate(node_count);
+    }
+}

@@ -1,0 +1,163 @@
+//! Shortest paths: the tightest bounds that follow, and from which constraints they follow.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use elbowroom_num::Rational;
+
+use crate::{ConsistentNetwork, Constraint, ConstraintId, NodeId, Schedule, Weight};
+
+/// Which end of the paths is the same for all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// The paths begin at the root: distances bound `node - root`.
+    FromRoot,
+    /// The paths end at the root: distances bound `root - node`.
+    ToRoot,
+}
+
+/// The tightest implied bound between one node, the root, and each other node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShortestPaths<W = Rational> {
+    root: NodeId,
+    direction: Direction,
+    distances: Vec<Option<W>>,
+    /// The edge next to each node, and the node at its other end, one step nearer to the root.
+    steps: Vec<Option<(ConstraintId, NodeId)>>,
+}
+
+impl<W: Weight> ShortestPaths<W> {
+    /// The node where all paths begin or end.
+    pub fn root(&self) -> NodeId {
+        self.root
+    }
+
+    /// Whether the paths begin or end at the root.
+    pub fn direction(&self) -> Direction {
+        self.direction
+    }
+
+    /// The least `d` with `node - root <= d` (or `root - node <= d`, by direction) in every
+    /// schedule; `None` when there is none.
+    pub fn distance(&self, node: NodeId) -> Option<&W> {
+        self.distances[node.index()].as_ref()
+    }
+
+    /// The constraints whose sum is the bound, in the order of the path from its begin to its
+    /// end; `None` when there is no bound.
+    pub fn path(&self, node: NodeId) -> Option<Vec<ConstraintId>> {
+        self.distance(node)?;
+        let mut path = Vec::new();
+        let mut place = node;
+        while let Some((id, nearer)) = self.steps[place.index()] {
+            path.push(id);
+            place = nearer;
+        }
+        if self.direction == Direction::FromRoot {
+            path.reverse();
+        }
+        Some(path)
+    }
+}
+
+impl<W: Weight> ConsistentNetwork<W> {
+    /// The tightest bounds on `node - root`, for each node.
+    pub fn shortest_paths_from(&self, root: NodeId) -> ShortestPaths<W> {
+        self.shortest_paths(root, Direction::FromRoot, None)
+    }
+
+    /// The tightest bounds on `root - node`, for each node.
+    pub fn shortest_paths_to(&self, root: NodeId) -> ShortestPaths<W> {
+        self.shortest_paths(root, Direction::ToRoot, None)
+    }
+
+    /// The least `d` with `to - from <= d` in every schedule; `None` when there is none.
+    pub fn distance(&self, from: NodeId, to: NodeId) -> Option<W> {
+        let paths = self.shortest_paths(from, Direction::FromRoot, Some(to));
+        paths.distance(to).cloned()
+    }
+
+    /// Constraints from `from` to `to` whose bounds sum up to the [`distance`](Self::distance).
+    pub fn shortest_path(&self, from: NodeId, to: NodeId) -> Option<Vec<ConstraintId>> {
+        self.shortest_paths(from, Direction::FromRoot, Some(to))
+            .path(to)
+    }
+
+    /// Dijkstra's algorithm. Distances are final for all nodes, or only for `goal`.
+    ///
+    /// The queue is ordered by the length of the path as the network's schedule measures it
+    /// ([`Constraint::slack_in`]), less the root's constant share.
+    fn shortest_paths(
+        &self,
+        root: NodeId,
+        direction: Direction,
+        goal: Option<NodeId>,
+    ) -> ShortestPaths<W> {
+        let network = self.network();
+        let mut distances: Vec<Option<W>> = vec![None; network.node_count()];
+        let mut steps = vec![None; network.node_count()];
+        let mut is_final = vec![false; network.node_count()];
+        let mut queue = BinaryHeap::new();
+        distances[root.index()] = Some(W::zero());
+        queue.push(Reverse((
+            direction.key(&W::zero(), root, self.schedule()),
+            root,
+        )));
+        while let Some(Reverse((_, node))) = queue.pop() {
+            if std::mem::replace(&mut is_final[node.index()], true) {
+                continue;
+            }
+            if goal == Some(node) {
+                break;
+            }
+            let edges = match direction {
+                Direction::FromRoot => network.leaving(node),
+                Direction::ToRoot => network.entering(node),
+            };
+            for &id in edges {
+                let constraint = network.constraint(id);
+                let far = direction.far_end(constraint);
+                if is_final[far.index()] {
+                    continue;
+                }
+                let Some(near) = &distances[node.index()] else {
+                    continue;
+                };
+                let distance = near.plus(&constraint.bound);
+                if distances[far.index()]
+                    .as_ref()
+                    .is_none_or(|old| distance < *old)
+                {
+                    queue.push(Reverse((
+                        direction.key(&distance, far, self.schedule()),
+                        far,
+                    )));
+                    distances[far.index()] = Some(distance);
+                    steps[far.index()] = Some((id, node));
+                }
+            }
+        }
+        ShortestPaths {
+            root,
+            direction,
+            distances,
+            steps,
+        }
+    }
+}
+
+impl Direction {
+    fn far_end<W>(self, constraint: &Constraint<W>) -> NodeId {
+        match self {
+            Direction::FromRoot => constraint.to,
+            Direction::ToRoot => constraint.from,
+        }
+    }
+
+    fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
+        match self {
+            Direction::FromRoot => distance.minus(&schedule[node]),
+            Direction::ToRoot => distance.plus(&schedule[node]),
+        }
+    }
+}
