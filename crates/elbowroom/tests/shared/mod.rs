@@ -2,6 +2,7 @@
 //! absent.
 #![allow(dead_code, reason = "each test uses some of it")]
 
+pub(crate) mod draw;
 pub(crate) mod instances;
 
 use std::path::{Path, PathBuf};
