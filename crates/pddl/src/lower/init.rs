@@ -98,7 +98,7 @@ impl Reader {
                     let (predicate, arguments) = self.initial_fact(atom, &scope)?;
                     return Some(TimedChange::Delete(predicate, arguments));
                 }
-                ("=" | "assign" | "not" | "increase" | "decrease", _) => {
+                ("=" | "assign" | "not" | "increase" | "decrease" | "<" | "<=" | ">" | ">=", _) => {
                     self.not_initial(node);
                     return None;
                 }
