@@ -9,6 +9,7 @@ mod derived;
 mod domain;
 mod duration;
 mod effect;
+mod expansion;
 mod expression;
 mod hierarchy;
 mod init;
@@ -22,14 +23,13 @@ mod term;
 mod timed;
 mod typed_list;
 
-use std::rc::Rc;
-
 use elbowroom_model::Problem;
 use elbowroom_model::problem::TypeId;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::lower::names::Names;
 use crate::lower::sections::Sections;
+use crate::lower::typed_list::TypeNames;
 use crate::report::Report;
 use crate::source::{FileId, Source, Span};
 use crate::syntax;
@@ -71,7 +71,11 @@ struct Reader {
     /// How much text was copied because it stands around more than one effect.
     copied: usize,
     /// The types resolved last.
-    resolved_types: Option<(Rc<[(String, Span)]>, Vec<TypeId>)>,
+    resolved_types: Option<(TypeNames, Vec<TypeId>)>,
+    /// Where each schema's name stands.
+    schema_spans: Vec<Span>,
+    /// Where each rule's head stands.
+    rule_spans: Vec<Span>,
 }
 
 impl Reader {
@@ -82,6 +86,8 @@ impl Reader {
             names: Names::default(),
             copied: 0,
             resolved_types: None,
+            schema_spans: Vec::new(),
+            rule_spans: Vec::new(),
         }
     }
 

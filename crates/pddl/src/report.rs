@@ -3,6 +3,7 @@
 use crate::diagnostic::{Diagnostic, Label, Severity};
 use crate::feature::Feature;
 use crate::source::{FileId, Source, Span};
+use crate::suggest::nearest;
 
 /// More would help nobody; a text with so many mistakes is not PDDL.
 const MOST_DIAGNOSTICS: usize = 200;
@@ -69,6 +70,19 @@ impl Report {
         let last = self.surplus.as_mut().or(self.diagnostics.last_mut());
         if let Some(last) = last {
             last.labels.push(label);
+        }
+    }
+
+    /// The candidate most like `name`, unless there are so many diagnostics that none is needed.
+    pub(crate) fn nearest<'a>(
+        &self,
+        name: &str,
+        candidates: impl IntoIterator<Item = &'a str>,
+    ) -> Option<&'a str> {
+        if self.diagnostics.len() < MOST_DIAGNOSTICS {
+            nearest(name, candidates)
+        } else {
+            None
         }
     }
 

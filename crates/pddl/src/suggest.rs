@@ -14,11 +14,12 @@ pub(crate) fn nearest<'a>(
     if name.len() > LONGEST {
         return None;
     }
+    let length = name.iter().map(|letter| letter.len_utf8()).sum::<usize>();
     let tolerated = (name.len() / 3).clamp(1, 3);
     candidates
         .into_iter()
         .take(MOST_CANDIDATES)
-        .filter(|candidate| candidate.len() <= LONGEST)
+        .filter(|candidate| candidate.len().abs_diff(length) <= tolerated)
         .map(|candidate| {
             let letters: Vec<char> = candidate.to_ascii_lowercase().chars().collect();
             (distance(&name, &letters), candidate)

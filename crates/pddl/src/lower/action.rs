@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::problem::{Body, Schema, SchemaId};
+use elbowroom_model::problem::{Body, Condition, Schema, SchemaId};
 
 use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::effect::{Around, Effects, Moment};
 use crate::lower::scope::Scope;
 use crate::lower::sections::Section;
+use crate::lower::timed::Timed;
 use crate::source::Span;
 use crate::suggest::nearest;
 use crate::syntax::Node;
@@ -57,7 +58,6 @@ impl Reader {
         } else {
             self.instantaneous_body(&fields, &mut scope)
         };
-        scope.unknowns.shrink_to_fit();
         let id = SchemaId::from(self.problem.schemas.len());
         let span = section.content[0].span;
         if self.names.schemas.insert(name.to_string(), id).is_some() {
@@ -65,6 +65,7 @@ impl Reader {
                 .error(span, format!("an action `{name}` is declared already"))
                 .help("give each action its own name");
         }
+        self.schema_spans.push(span);
         self.problem.schemas.push(Schema {
             name: name.into_owned(),
             parameters: scope.variables,
@@ -152,7 +153,7 @@ impl Reader {
     fn instantaneous_body(&mut self, fields: &Fields, scope: &mut Scope) -> Body {
         let condition = match fields.get(":precondition") {
             Some((_, Some(node))) => self.condition(node, scope),
-            _ => elbowroom_model::problem::Condition::TRUE,
+            _ => Condition::TRUE,
         };
         let effects = self.effects(fields, Moment::Instant, scope);
         Body::Instantaneous {
@@ -174,7 +175,7 @@ impl Reader {
         }
         let condition = match fields.get(":condition") {
             Some((_, Some(node))) => self.timed_condition(node, scope),
-            _ => crate::lower::timed::Timed::default(),
+            _ => Timed::default(),
         };
         let effects = self.effects(fields, Moment::Unspecified, scope);
         Body::Durative {

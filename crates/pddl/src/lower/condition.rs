@@ -1,6 +1,6 @@
 //! Conditions without time specifiers.
 
-use elbowroom_model::problem::{Comparison, Condition};
+use elbowroom_model::problem::{Comparison, Condition, Variable};
 
 use crate::feature::Feature;
 use crate::lower::Reader;
@@ -91,7 +91,7 @@ impl Reader {
         variables: &Node,
         part: &Node,
         scope: &mut Scope,
-    ) -> (Vec<elbowroom_model::problem::Variable>, Condition) {
+    ) -> (Vec<Variable>, Condition) {
         let variables = self.variable_list(variables);
         let outside = scope.variables.len();
         scope.variables.extend(variables.iter().cloned());

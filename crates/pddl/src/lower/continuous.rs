@@ -74,11 +74,16 @@ impl Reader {
                 Some(sum(first.into_iter().chain(parts.map(Linear::negated))))
             }
             ("*", _) => {
-                let product = parts.into_iter().try_fold(None, product);
-                if product.is_none() {
-                    self.refuse_nonlinear(node);
+                let mut parts = parts.into_iter();
+                let mut product = parts.next()?;
+                for part in parts {
+                    if product.rate.is_some() && part.rate.is_some() {
+                        self.refuse_nonlinear(node);
+                        return None;
+                    }
+                    product = product.times(part);
                 }
-                product?
+                Some(product)
             }
             ("/", 2) => {
                 let [dividend, divisor] = <[Linear; 2]>::try_from(parts).ok()?;
@@ -114,6 +119,20 @@ impl Linear {
             rate: self.rate.map(negated),
         }
     }
+
+    /// The product, where at most one of the two has a rate.
+    fn times(self, other: Self) -> Self {
+        let (timed, factor) = if other.rate.is_some() {
+            (other, self.constant)
+        } else {
+            (self, other.constant)
+        };
+        let factor = factor.unwrap_or(Expression::Constant(Rational::ZERO));
+        Self {
+            constant: timed.constant.map(|part| times(part, factor.clone())),
+            rate: timed.rate.map(|part| times(part, factor)),
+        }
+    }
 }
 
 fn sum(parts: impl IntoIterator<Item = Linear>) -> Linear {
@@ -131,24 +150,6 @@ fn sum(parts: impl IntoIterator<Item = Linear>) -> Linear {
         constant: add(constants),
         rate: add(rates),
     }
-}
-
-/// The product of the parts so far with one more; `None` if it is quadratic. At most one of the
-/// two has a rate, so nothing is ever copied more than twice.
-fn product(so_far: Option<Linear>, part: Linear) -> Option<Option<Linear>> {
-    let Some(so_far) = so_far else {
-        return Some(Some(part));
-    };
-    let (timed, factor) = match (so_far.rate.is_some(), part.rate.is_some()) {
-        (true, true) => return None,
-        (false, true) => (part, so_far.constant),
-        (_, false) => (so_far, part.constant),
-    };
-    let factor = factor.unwrap_or(Expression::Constant(Rational::ZERO));
-    Some(Some(Linear {
-        constant: timed.constant.map(|c| times(c, factor.clone())),
-        rate: timed.rate.map(|rate| times(rate, factor)),
-    }))
 }
 
 fn times(left: Expression, right: Expression) -> Expression {

@@ -1,10 +1,13 @@
 //! Constants, objects, predicates, functions, unknowns.
 
-use elbowroom_model::problem::{Function, FunctionId, Object, ObjectId, Predicate, PredicateId};
+use elbowroom_model::problem::{
+    Function, FunctionId, Object, ObjectId, Predicate, PredicateId, TypeId,
+};
 
 use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::sections::Section;
+use crate::lower::typed_list::MOST_VARIABLES;
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -38,21 +41,13 @@ impl Reader {
     }
 
     /// An object declared again: as a constant and as an object, or with one more type.
-    fn redeclare(
-        &mut self,
-        id: ObjectId,
-        types: Vec<elbowroom_model::problem::TypeId>,
-        name: &str,
-        span: Span,
-    ) {
+    fn redeclare(&mut self, id: ObjectId, types: Vec<TypeId>, name: &str, span: Span) {
         self.report
             .warning(span, format!("`{name}` is declared already"));
         let own = &mut self.problem.objects[id.index()].types;
-        for ty in types {
-            if !own.contains(&ty) {
-                own.push(ty);
-            }
-        }
+        own.extend(types);
+        own.sort_unstable();
+        own.dedup();
     }
 
     /// `:predicates`
@@ -141,6 +136,13 @@ impl Reader {
     pub(super) fn unknowns(&mut self, nodes: &[Node]) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for entry in self.typed_list(nodes) {
+            if names.len() == MOST_VARIABLES {
+                self.report.error(
+                    entry.node.span,
+                    format!("more than {MOST_VARIABLES} unknowns in one list"),
+                );
+                break;
+            }
             let name = entry.node.lower().filter(|name| name.starts_with('?'));
             match name {
                 Some(name) if names.iter().any(|own| *own == name) => {

@@ -4,6 +4,7 @@ use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::sections::{Section, Sections};
 use crate::suggest::nearest;
+use crate::syntax::Node;
 
 /// What can stand in a domain.
 const SECTIONS: &[&str] = &[
@@ -58,7 +59,7 @@ const REQUIREMENTS: &[&str] = &[
 impl Reader {
     /// Reads a domain.
     pub(super) fn domain(&mut self, sections: &Sections) {
-        self.problem.domain = sections.name.to_owned();
+        sections.name.clone_into(&mut self.problem.domain);
         for section in sections.all(":requirements") {
             self.requirements(section);
         }
@@ -120,7 +121,7 @@ impl Reader {
             ":constraint" => Feature::GlobalConstraints,
             _ => Feature::Modules,
         };
-        let name = section.content.first().and_then(|node| node.word());
+        let name = section.content.first().and_then(Node::word);
         let named = name.map_or(String::new(), |name| format!(" `{name}`"));
         self.report.unsupported(
             feature,

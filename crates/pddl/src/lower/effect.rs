@@ -6,7 +6,7 @@ use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
 use crate::lower::scope::Scope;
 use crate::lower::shift::shift;
-use crate::lower::timed::{Time, Timed, both, time_specifier};
+use crate::lower::timed::{Time, Timed, both, near_specifier, time_specifier};
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -147,6 +147,10 @@ impl Reader {
         around: &Around,
         effects: &mut Effects,
     ) {
+        if head == "change" {
+            self.object_change(node, parts);
+            return;
+        }
         let operator = operator(head);
         if moment == Moment::Unspecified {
             match operator {
@@ -311,6 +315,19 @@ impl Reader {
         Some(guard)
     }
 
+    /// `(change (f …) object)`, an assignment to an object fluent.
+    fn object_change(&mut self, node: &Node, parts: &[Node]) {
+        let is_refused = parts
+            .first()
+            .and_then(Node::form)
+            .is_some_and(|(head, _)| self.names.object_functions.contains(head.as_ref()));
+        if !is_refused {
+            self.report
+                .error(node.head_span(), "`change` is not an effect")
+                .suggest(Some("assign"));
+        }
+    }
+
     fn wrong_update(&mut self, operator: UpdateOperator, node: &Node) {
         let name = operator.name();
         self.report
@@ -319,6 +336,7 @@ impl Reader {
     }
 
     pub(super) fn missing_moment(&mut self, node: &Node) {
+        let near = near_specifier(node);
         self.report
             .error(
                 node.span,
@@ -327,7 +345,8 @@ impl Reader {
             .help(
                 "expected `(at start …)` or `(at end …)`, or for continuous change \
                  `(increase (f) (* #t rate))`",
-            );
+            )
+            .suggest(near);
     }
 }
 

@@ -7,10 +7,11 @@ use elbowroom_model::problem::{Type, TypeId};
 use crate::lower::Reader;
 use crate::lower::sections::Section;
 use crate::source::Span;
-use crate::suggest::nearest;
 
 /// Most ways up from one type to `object`: who asks for supertypes may walk them all.
 const MOST_PATHS: u64 = 1000;
+/// In larger hierarchies it is not looked for types that could do for two others.
+const MOST_COMPARED: usize = 1000;
 /// Longest way up.
 const HIGHEST: u32 = 200;
 
@@ -82,7 +83,10 @@ impl Reader {
         if name == "object" || declared.contains_key(name) || self.names.types.contains_key(name) {
             return;
         }
-        if let Some(near) = nearest(name, declared.keys().map(String::as_str)) {
+        if let Some(near) = self
+            .report
+            .nearest(name, declared.keys().map(String::as_str))
+        {
             self.report
                 .warning(
                     span,
@@ -155,6 +159,9 @@ impl Reader {
 
     /// Whether some object can be of one of `own` and one of `asked`.
     pub(super) fn can_fit(&self, own: &[TypeId], asked: &[TypeId]) -> bool {
+        if self.problem.types.len() > MOST_COMPARED {
+            return true;
+        }
         let all = (0..self.problem.types.len()).map(TypeId::from);
         all.into_iter().any(|ty| {
             let is_below = |of: &[TypeId]| of.iter().any(|&of| self.problem.is_subtype(ty, of));

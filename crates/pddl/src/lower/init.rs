@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::problem::{FunctionId, ObjectId, TimedChange, TimedInitial};
+use elbowroom_model::problem::{FunctionId, ObjectId, PredicateId, TimedChange, TimedInitial};
 use elbowroom_num::Rational;
 
 use crate::lower::Reader;
@@ -86,11 +86,19 @@ impl Reader {
                     let arguments = Self::objects_only(&fluent.arguments)?;
                     return Some(TimedChange::Assign(fluent.function, arguments, value));
                 }
+                // Generated problems list what is false, too; saying so about a predicate that
+                // the domain has not got is true.
+                ("not", [atom]) if self.is_undeclared(atom) => {
+                    self.report
+                        .warning(atom.span, format!("unknown predicate `{}`", atom.quote()))
+                        .label("ignored: it is false anyway");
+                    return None;
+                }
                 ("not", [atom]) => {
                     let (predicate, arguments) = self.initial_fact(atom, &scope)?;
                     return Some(TimedChange::Delete(predicate, arguments));
                 }
-                ("=" | "assign" | "not" | "increase" | "decrease", _) => {
+                ("=" | "assign" | "not" | "increase" | "decrease" | "<" | "<=" | ">" | ">=", _) => {
                     self.not_initial(node);
                     return None;
                 }
@@ -104,11 +112,12 @@ impl Reader {
         None
     }
 
-    fn initial_fact(
-        &mut self,
-        node: &Node,
-        scope: &Scope,
-    ) -> Option<(elbowroom_model::problem::PredicateId, Vec<ObjectId>)> {
+    fn is_undeclared(&self, atom: &Node) -> bool {
+        atom.form()
+            .is_some_and(|(head, _)| !self.names.predicates.contains_key(head.as_ref()))
+    }
+
+    fn initial_fact(&mut self, node: &Node, scope: &Scope) -> Option<(PredicateId, Vec<ObjectId>)> {
         let atom = self.atom(node, scope)?;
         self.refuse_derived(atom.predicate, node.span);
         let arguments = Self::objects_only(&atom.arguments)?;
@@ -147,20 +156,17 @@ impl Reader {
         span: Span,
         valued: &mut Valued,
     ) {
-        let values = &mut self.problem.initial_values;
-        match valued.get(&(function, arguments.clone())) {
-            Some(&place) => {
-                if values[place].2 != value {
-                    self.report
-                        .warning(span, "a second initial value of this fluent")
-                        .help("the last one counts");
-                }
-                values[place].2 = value;
+        let initial = &mut self.problem.initial_values;
+        if let Some(&place) = valued.get(&(function, arguments.clone())) {
+            if initial[place].2 != value {
+                self.report
+                    .warning(span, "a second initial value of this fluent")
+                    .help("the last one counts");
             }
-            None => {
-                valued.insert((function, arguments.clone()), values.len());
-                values.push((function, arguments, value));
-            }
+            initial[place].2 = value;
+        } else {
+            valued.insert((function, arguments.clone()), initial.len());
+            initial.push((function, arguments, value));
         }
     }
 }

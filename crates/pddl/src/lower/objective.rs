@@ -23,7 +23,7 @@ const SECTIONS: &[&str] = &[
 impl Reader {
     /// Reads a problem, after its domain.
     pub(super) fn problem(&mut self, sections: &Sections) {
-        self.problem.name = sections.name.to_owned();
+        sections.name.clone_into(&mut self.problem.name);
         self.domain_name(sections);
         for section in sections.all(":requirements") {
             self.requirements(section);
@@ -39,7 +39,8 @@ impl Reader {
                     .help("nothing is true at time 0");
             }
         }
-        match sections.only(":goal", &mut self.report) {
+        let goal = sections.only(":goal", &mut self.report);
+        match goal {
             Some(section) => self.goal(section),
             None => {
                 self.report
@@ -47,6 +48,7 @@ impl Reader {
                     .help("every plan reaches it; expected `(:goal condition)`");
             }
         }
+        self.check_expansion(goal.map(|section| section.span));
         for section in sections.all(":constraints") {
             self.constraints(section);
         }

@@ -14,7 +14,7 @@ pub(super) struct Sections<'t, 's> {
     pub(super) name: &'s str,
     /// Where the name stands.
     pub(super) name_span: Span,
-    sections: Vec<Section<'t, 's>>,
+    all: Vec<Section<'t, 's>>,
 }
 
 /// One section.
@@ -54,7 +54,7 @@ impl<'t, 's> Sections<'t, 's> {
         let mut found = Self {
             name,
             name_span,
-            sections: Vec::new(),
+            all: Vec::new(),
         };
         for node in &content[1..] {
             found.add(node, report);
@@ -89,12 +89,12 @@ impl<'t, 's> Sections<'t, 's> {
 
     /// All sections.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Section<'t, 's>> {
-        self.sections.iter()
+        self.all.iter()
     }
 
     fn add(&mut self, node: &'t Node<'s>, report: &mut Report) {
         match node.form() {
-            Some((keyword, content)) if keyword.starts_with(':') => self.sections.push(Section {
+            Some((keyword, content)) if keyword.starts_with(':') => self.all.push(Section {
                 keyword,
                 content,
                 span: node.head_span(),

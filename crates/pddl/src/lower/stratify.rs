@@ -75,17 +75,14 @@ fn walk(root: usize, edges: &[Vec<usize>], seen: &mut [bool], finished: &mut Vec
     }
     let mut path = vec![(root, 0)];
     while let Some((node, next)) = path.last_mut() {
-        match edges[*node].get(*next) {
-            Some(&to) => {
-                *next += 1;
-                if !std::mem::replace(&mut seen[to], true) {
-                    path.push((to, 0));
-                }
+        if let Some(&to) = edges[*node].get(*next) {
+            *next += 1;
+            if !std::mem::replace(&mut seen[to], true) {
+                path.push((to, 0));
             }
-            None => {
-                finished.push(*node);
-                path.pop();
-            }
+        } else {
+            finished.push(*node);
+            path.pop();
         }
     }
 }

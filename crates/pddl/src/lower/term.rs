@@ -5,7 +5,6 @@ use elbowroom_model::problem::{Atom, Fluent, FunctionId, ObjectId, PredicateId, 
 use crate::lower::Reader;
 use crate::lower::scope::Scope;
 use crate::source::Span;
-use crate::suggest::nearest;
 use crate::syntax::Node;
 
 impl Reader {
@@ -36,8 +35,8 @@ impl Reader {
     /// `(function term …)`, or the bare name of a function without arguments. `None`, with a
     /// report unless it is an object fluent, if it cannot be understood.
     pub(super) fn fluent(&mut self, node: &Node, scope: &Scope) -> Option<Fluent> {
-        let none: &[Node] = &[];
-        let form = node.form().or_else(|| Some((node.lower()?, none)));
+        let no_arguments: &[Node] = &[];
+        let form = node.form().or_else(|| Some((node.lower()?, no_arguments)));
         let Some((name, arguments)) = form else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
@@ -80,7 +79,9 @@ impl Reader {
             if let Some((term, _)) = scope.variable(&word) {
                 return Some(term);
             }
-            let near = nearest(&word, scope.variables.iter().map(|v| v.name.as_str()));
+            let near = self
+                .report
+                .nearest(&word, scope.variables.iter().map(|v| v.name.as_str()));
             let is_number = scope.unknown(&word).is_some() || word == "?duration";
             let diagnostic = self.report.error(
                 node.span,
@@ -100,7 +101,9 @@ impl Reader {
         if let Some(&object) = self.names.objects.get(word.as_ref()) {
             return Some(Term::Object(object));
         }
-        let near = nearest(&word, self.names.objects.keys().map(String::as_str));
+        let near = self
+            .report
+            .nearest(&word, self.names.objects.keys().map(String::as_str));
         self.report
             .error(node.span, format!("unknown object `{}`", node.quote()))
             .help("declare it under `:objects` or `:constants`")
@@ -202,7 +205,9 @@ impl Reader {
         if self.names.object_functions.contains(name) {
             return;
         }
-        let near = nearest(name, self.names.predicates.keys().map(String::as_str));
+        let near = self
+            .report
+            .nearest(name, self.names.predicates.keys().map(String::as_str));
         let is_function = self.names.functions.contains_key(name);
         let diagnostic = self
             .report
@@ -217,7 +222,9 @@ impl Reader {
     }
 
     fn unknown_function(&mut self, name: &str, node: &Node) {
-        let near = nearest(name, self.names.functions.keys().map(String::as_str));
+        let near = self
+            .report
+            .nearest(name, self.names.functions.keys().map(String::as_str));
         let is_predicate = self.names.predicates.contains_key(name);
         let diagnostic = self
             .report

@@ -6,37 +6,40 @@ use elbowroom_model::problem::{TypeId, Variable};
 
 use crate::lower::Reader;
 use crate::source::Span;
-use crate::suggest::nearest;
 use crate::syntax::Node;
 
 /// Longest `either`; the list is kept once for each name it types.
 const LONGEST_EITHER: usize = 100;
+
+/// Names of types in lower case, with their places; none if nothing is said. Shared by all
+/// entries typed together.
+pub(super) type TypeNames = Rc<[(String, Span)]>;
+
+/// Most variables in one list; looking them up takes linear time.
+pub(super) const MOST_VARIABLES: usize = 1000;
 
 /// An entry of a typed list.
 #[derive(Debug)]
 pub(super) struct Typed<'t, 's> {
     /// What is typed: a name, or a function's head.
     pub(super) node: &'t Node<'s>,
-    /// The types' names in lower case; none if nothing is said. Shared by all entries typed
-    /// together.
-    pub(super) types: Rc<[(String, Span)]>,
+    pub(super) types: TypeNames,
 }
 
 impl Reader {
     /// Takes a typed list apart.
     pub(super) fn typed_list<'t, 's>(&mut self, nodes: &'t [Node<'s>]) -> Vec<Typed<'t, 's>> {
-        let untyped: Rc<[_]> = Rc::new([]);
+        let untyped: TypeNames = Rc::new([]);
         let mut entries: Vec<Typed> = Vec::new();
         let mut first_untyped = 0;
         let mut nodes = nodes.iter();
         while let Some(node) = nodes.next() {
             let types = if node.is("-") {
-                match nodes.next() {
-                    Some(types) => self.type_names(types),
-                    None => {
-                        self.report.error(node.span, "expected a type after `-`");
-                        Rc::clone(&untyped)
-                    }
+                if let Some(types) = nodes.next() {
+                    self.type_names(types)
+                } else {
+                    self.report.error(node.span, "expected a type after `-`");
+                    Rc::clone(&untyped)
                 }
             } else if let Some(name) = node.word().and_then(type_after_dash) {
                 // `?x -type` without a space.
@@ -63,7 +66,7 @@ impl Reader {
     }
 
     /// `type` or `(either type …)`.
-    fn type_names(&mut self, node: &Node) -> Rc<[(String, Span)]> {
+    fn type_names(&mut self, node: &Node) -> TypeNames {
         if let Some(name) = node.lower() {
             return Rc::new([(name.into_owned(), node.span)]);
         }
@@ -90,7 +93,7 @@ impl Reader {
     }
 
     /// The ids of the types; `object` if there are none. Reports those not declared.
-    pub(super) fn resolve_types(&mut self, types: &Rc<[(String, Span)]>) -> Vec<TypeId> {
+    pub(super) fn resolve_types(&mut self, types: &TypeNames) -> Vec<TypeId> {
         // Entries typed together share one report, too.
         match &self.resolved_types {
             Some((last, ids)) if Rc::ptr_eq(last, types) => return ids.clone(),
@@ -98,16 +101,17 @@ impl Reader {
         }
         let mut ids = Vec::with_capacity(types.len().max(1));
         for (name, span) in types.iter() {
-            match self.names.types.get(name) {
-                Some(&id) => ids.push(id),
-                None => {
-                    let near = nearest(name, self.names.types.keys().map(String::as_str));
-                    self.report
-                        .error(*span, format!("unknown type `{name}`"))
-                        .help("declare it under `:types`")
-                        .suggest(near);
-                }
+            if let Some(&id) = self.names.types.get(name) {
+                ids.push(id);
+                continue;
             }
+            let near = self
+                .report
+                .nearest(name, self.names.types.keys().map(String::as_str));
+            self.report
+                .error(*span, format!("unknown type `{name}`"))
+                .help("declare it under `:types`")
+                .suggest(near);
         }
         if ids.is_empty() {
             ids.push(TypeId::OBJECT);
@@ -120,6 +124,13 @@ impl Reader {
     pub(super) fn variables(&mut self, nodes: &[Node]) -> Vec<Variable> {
         let mut variables: Vec<Variable> = Vec::new();
         for entry in self.typed_list(nodes) {
+            if variables.len() == MOST_VARIABLES {
+                self.report.error(
+                    entry.node.span,
+                    format!("more than {MOST_VARIABLES} variables in one list"),
+                );
+                break;
+            }
             let Some(name) = entry.node.lower().filter(|name| name.starts_with('?')) else {
                 self.report
                     .error(
@@ -149,15 +160,13 @@ impl Reader {
 
     /// The variables of `node`, which should be a list of them.
     pub(super) fn variable_list(&mut self, node: &Node) -> Vec<Variable> {
-        match node.list() {
-            Some(nodes) => self.variables(nodes),
-            None => {
-                self.report
-                    .error(node.span, "expected a list of variables")
-                    .help("write `(?x - type)`, or `()` for none");
-                Vec::new()
-            }
+        if let Some(nodes) = node.list() {
+            return self.variables(nodes);
         }
+        self.report
+            .error(node.span, "expected a list of variables")
+            .help("write `(?x - type)`, or `()` for none");
+        Vec::new()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 use std::ops::Range;
 
 use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId};
@@ -13,7 +14,6 @@ use crate::plan_text::duration::{changing_functions, only_duration};
 use crate::plan_text::line::{Line, RawStep, Word, line};
 use crate::report::Report;
 use crate::source::{FileId, Source, Span};
-use crate::suggest::nearest;
 
 /// Longest duration that planners print for an action which has none.
 const NEGLIGIBLE: (i64, i64) = (1, 100);
@@ -74,7 +74,7 @@ impl<'a> PlanReader<'a> {
         let mut plans: Vec<Vec<Line>> = vec![Vec::new()];
         let mut start = 0;
         for text in self.source.text().split_inclusive('\n') {
-            let line = line(text, start);
+            let line = line(text.trim_end(), start);
             start += text.len();
             match line {
                 Line::Blank => {}
@@ -207,7 +207,9 @@ impl<'a> PlanReader<'a> {
         let name = word.text.to_ascii_lowercase();
         let found = self.schemas.get(&name).copied();
         if found.is_none() {
-            let near = nearest(&name, self.schemas.keys().map(String::as_str));
+            let near = self
+                .report
+                .nearest(&name, self.schemas.keys().map(String::as_str));
             self.report
                 .error(span(&word.range), format!("unknown action `{}`", word.text))
                 .help("the domain has no action of this name")
@@ -220,7 +222,9 @@ impl<'a> PlanReader<'a> {
         let name = word.text.to_ascii_lowercase();
         let found = self.objects.get(&name).copied();
         if found.is_none() {
-            let near = nearest(&name, self.objects.keys().map(String::as_str));
+            let near = self
+                .report
+                .nearest(&name, self.objects.keys().map(String::as_str));
             self.report
                 .error(span(&word.range), format!("unknown object `{}`", word.text))
                 .help("neither the domain nor the problem has an object of this name")
@@ -240,7 +244,8 @@ impl<'a> PlanReader<'a> {
                 .iter()
                 .map(|ty| problem.types[ty.index()].name.as_str())
                 .collect();
-            text.push_str(&format!(" {} - {}", parameter.name, types.join(" or ")));
+            // Writing to a string cannot fail.
+            let _ = write!(text, " {} - {}", parameter.name, types.join(" or "));
         }
         text.push(')');
         text

@@ -1,5 +1,7 @@
 //! From a plan to text.
 
+use std::fmt::Write;
+
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
@@ -23,7 +25,8 @@ pub fn write_plan(task: &Task, plan: &TimeTriggeredPlan) -> String {
         text.push_str(": ");
         text.push_str(&task.action_name(action.schema, &action.arguments));
         if let Some(duration) = &step.duration {
-            text.push_str(&format!(" [{}]", decimal(duration)));
+            // Writing to a string cannot fail.
+            let _ = write!(text, " [{}]", decimal(duration));
         }
         text.push('\n');
     }
@@ -40,12 +43,11 @@ fn decimal(value: &Rational) -> String {
     else {
         return value.to_string();
     };
-    let digits = match text.find('.') {
-        Some(point) => text.len() - point - 1,
-        None => {
-            text.push('.');
-            0
-        }
+    let digits = if let Some(point) = text.find('.') {
+        text.len() - point - 1
+    } else {
+        text.push('.');
+        0
     };
     text.extend(std::iter::repeat_n(
         '0',

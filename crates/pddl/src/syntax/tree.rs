@@ -246,7 +246,7 @@ impl<'s> Builder<'s> {
     }
 }
 
-fn list<'s>(start: Span, end: Span, nodes: Vec<Node<'s>>) -> Node<'s> {
+fn list(start: Span, end: Span, nodes: Vec<Node>) -> Node {
     Node {
         span: Span {
             end: end.end,
