@@ -7,11 +7,9 @@ use std::sync::Arc;
 
 use elbowroom::PlanKind;
 use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
-use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::format::{self, FormatErrors};
-use elbowroom::plan::parametrize::VarySpec;
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
@@ -38,31 +36,25 @@ pub(crate) fn time_triggered_plan(
     with_warnings(pddl::read_plan(&text, task))
 }
 
-/// Reads a plan of either kind, and leaves open what `vary` says.
-pub(crate) fn parametrized_plan(
-    task: &mut Task,
-    path: &Path,
-    vary: &[String],
-    epsilon: &Rational,
-) -> Result<ParametrizedPlan, Failure> {
-    let specs = vary
-        .iter()
-        .map(|text| text.parse::<VarySpec>())
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(|error| Failure::new(error, ""))?;
+/// A plan of either kind, as it stands in a file.
+pub(crate) enum AnyPlan {
+    TimeTriggered(TimeTriggeredPlan),
+    Stn(ParametrizedPlan),
+}
+
+/// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
+pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure> {
     let text = source(path, "plan")?;
-    let is_stn_file = path
+    let is_stn_name = path
         .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("stn"))
-        || PlanKind::of_text(text.text()) == PlanKind::Stn;
-    if is_stn_file {
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("stn"));
+    if is_stn_name || PlanKind::of_text(text.text()) == PlanKind::Stn {
         let plan = format::read(text.text().as_bytes(), task)
             .map_err(|errors| Failure::rendered(stn_mistakes(&text, &errors)))?;
-        return elbowroom::vary_stn_plan(task, plan, &specs)
-            .map_err(|error| Failure::new(error, ""));
+        return Ok(AnyPlan::Stn(plan));
     }
     let plan = with_warnings(pddl::read_plan(&text, task))?;
-    elbowroom::leave_room(task, &plan, &specs, epsilon).map_err(|error| Failure::new(error, ""))
+    Ok(AnyPlan::TimeTriggered(plan))
 }
 
 /// The mistakes in an STN plan file, with excerpts.
@@ -104,28 +96,18 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             output::tell(&format!("reading the {what} from standard input"));
         }
         let mut bytes = Vec::new();
-        let read = io::stdin()
-            .lock()
-            .take(LARGEST_FILE)
-            .read_to_end(&mut bytes);
+        let read = io::stdin().lock().take(LARGEST_FILE).read_to_end(&mut bytes);
         return match read {
             Ok(_) => Ok(Source::from_bytes("standard input", &bytes)),
             Err(error) => Err(Failure::new(
-                format!(
-                    "cannot read the {what} from standard input: {}",
-                    plain(&error)
-                ),
+                format!("cannot read the {what} from standard input: {}", plain(&error)),
                 "",
             )),
         };
     }
     let refused = |error: &io::Error| {
         Failure::new(
-            format!(
-                "cannot read the {what} {}: {}",
-                path.display(),
-                plain(error)
-            ),
+            format!("cannot read the {what} {}: {}", path.display(), plain(error)),
             advice(path, error),
         )
     };
@@ -144,9 +126,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
 fn advice(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            let parent = path
-                .parent()
-                .filter(|folder| !folder.as_os_str().is_empty());
+            let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             match parent {
                 Some(folder) if !folder.is_dir() => {
                     format!("there is no folder {}", folder.display())

@@ -2,6 +2,7 @@
 
 mod box_text;
 mod explain;
+pub mod flow;
 mod makespan;
 mod plan_file;
 

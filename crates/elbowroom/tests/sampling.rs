@@ -16,13 +16,19 @@ use shared::draw;
 use shared::instances::{Instance, figure_3, figure_4};
 
 fn samples() -> usize {
-    std::env::var("ELBOWROOM_SAMPLES").ok().and_then(|text| text.parse().ok()).unwrap_or(20)
+    std::env::var("ELBOWROOM_SAMPLES")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(20)
 }
 
 #[test]
 fn values_and_schedules_in_the_boxes_of_figure_3_pass_the_judge() {
     let Some(data) = shared::data() else { return };
-    let attacked = figure_3(&data).iter().filter(|instance| attack(instance)).count();
+    let attacked = figure_3(&data)
+        .iter()
+        .filter(|instance| attack(instance))
+        .count();
     println!("{attacked} boxes withstood {} samples each", samples());
     assert_eq!(attacked, 52);
 }
@@ -30,7 +36,10 @@ fn values_and_schedules_in_the_boxes_of_figure_3_pass_the_judge() {
 #[test]
 fn values_and_schedules_in_the_boxes_of_figure_4_pass_the_judge() {
     let Some(data) = shared::data() else { return };
-    let attacked = figure_4(&data).iter().filter(|instance| attack(instance)).count();
+    let attacked = figure_4(&data)
+        .iter()
+        .filter(|instance| attack(instance))
+        .count();
     println!("{attacked} boxes withstood {} samples each", samples());
     assert!(attacked >= 25);
 }
@@ -41,8 +50,10 @@ fn attack(instance: &Instance) -> bool {
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
     let plan: ParametrizedPlan = format::read(&bytes, &mut task).expect("a readable plan");
     let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 1000)).expect("within reach");
-    let run = irr(&mut oracle, &Settings::default(), &mut |_| ControlFlow::Continue(()))
-        .expect("within reach");
+    let run = irr(&mut oracle, &Settings::default(), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .expect("within reach");
     let Ok(envelope) = run.envelope else {
         return false;
     };
@@ -53,7 +64,11 @@ fn attack(instance: &Instance) -> bool {
             .unwrap_or_else(|| panic!("{}: no schedule at {valuation:?}", instance.name));
         let fixed = plan.plan.at(&valuation).scheduled(&schedule);
         let verdict = validate(&task, &fixed, &validate::Settings::default());
-        assert!(verdict.is_valid(), "{}: {valuation:?} {verdict:?}", instance.name);
+        assert!(
+            verdict.is_valid(),
+            "{}: {valuation:?} {verdict:?}",
+            instance.name
+        );
     }
     true
 }

@@ -7,24 +7,32 @@ mod search;
 mod text;
 
 use elbowroom::Explainer;
+use elbowroom::flow::{self, FlowError};
 use elbowroom::envelope::Oracle;
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::obligations::Refusal;
+use elbowroom::plan::parametrize::VarySpec;
 
 use crate::args::{EnvelopeArgs, Guarantee, Method};
 use crate::exit::{Answer, Failure};
-use crate::input;
+use crate::input::{self, AnyPlan};
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     refuse_what_is_not_there_yet(arguments)?;
     let mut task = input::task(&arguments.problem)?;
-    let plan = input::parametrized_plan(
-        &mut task,
-        &arguments.plan,
-        &arguments.vary,
-        &arguments.epsilon,
-    )?;
+    let specs = specifications(&arguments.vary)?;
+    let epsilon = &arguments.epsilon;
+    let plan = match input::any_plan(&mut task, &arguments.plan)? {
+        AnyPlan::Stn(plan) => flow::open_more(&task, plan, &specs).map_err(failure)?,
+        AnyPlan::TimeTriggered(plan) => match flow::free(&task, &plan, epsilon) {
+            Ok(freed) => flow::open(&task, freed, &specs, epsilon).map_err(failure)?,
+            Err(FlowError::Invalid(violation)) => {
+                return fails::judged_invalid(arguments, &task, &violation);
+            }
+            Err(error) => return Err(failure(error)),
+        },
+    };
     let subject = Subject {
         arguments,
         plan: &plan,
@@ -56,6 +64,15 @@ impl Subject<'_> {
     fn file(&self) -> String {
         self.arguments.plan.display().to_string()
     }
+}
+
+fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Failure> {
+    let specs = texts.iter().map(|text| text.parse::<VarySpec>());
+    specs.collect::<Result<_, _>>().map_err(failure)
+}
+
+fn failure(error: impl std::fmt::Display) -> Failure {
+    Failure::new(error, "")
 }
 
 fn refused(refusal: &Refusal) -> Failure {

@@ -10,7 +10,11 @@ use rand_chacha::ChaCha8Rng;
 /// Values in the box, often at ends of intervals. From an unbounded interval, a value up to a
 /// thousand away from its other end.
 pub(crate) fn valuation(envelope: &DecoupledEnvelope, rng: &mut ChaCha8Rng) -> Valuation {
-    envelope.intervals.iter().map(|interval| value(interval, rng)).collect()
+    envelope
+        .intervals
+        .iter()
+        .map(|interval| value(interval, rng))
+        .collect()
 }
 
 fn value(interval: &Interval, rng: &mut ChaCha8Rng) -> Rational {
@@ -49,7 +53,9 @@ pub(crate) fn schedule(
     let habit = [Some(Rational::ZERO), Some(Rational::ONE), None][rng.random_range(0..3)].clone();
     for node in nodes {
         let node = network_node(node);
-        let earliest = -network.distance(node, zero).expect("no node comes before zero");
+        let earliest = -network
+            .distance(node, zero)
+            .expect("no node comes before zero");
         let latest = network
             .distance(zero, node)
             .unwrap_or_else(|| &earliest + Rational::from(rng.random_range(0..200_i64)));
@@ -58,8 +64,12 @@ pub(crate) fn schedule(
             _ => share(rng),
         };
         let time = &earliest + (&latest - &earliest) * share;
-        network.add(Constraint::at_least(zero, node, time.clone())).expect("in its window");
-        network.add(Constraint::at_most(zero, node, time)).expect("in its window");
+        network
+            .add(Constraint::at_least(zero, node, time.clone()))
+            .expect("in its window");
+        network
+            .add(Constraint::at_most(zero, node, time))
+            .expect("in its window");
     }
     Some(network.earliest_schedule(zero).times().to_vec())
 }

@@ -1,18 +1,21 @@
 //! Answers as JSON: `docs/formats/envelope-json.md`.
 
 use elbowroom::Explanation;
+use elbowroom::model::Task;
+use elbowroom::model::validate::Violation;
 use elbowroom::plan::reduction::Side;
 use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind};
 use serde_json::{Map, Value, json};
 
 use super::Subject;
 use super::search::Outcome;
-use crate::args::Growth;
+use crate::args::{EnvelopeArgs, Growth};
+use crate::commands::check::violation_document;
 use crate::json;
 
 /// The answer "this is the envelope".
 pub(super) fn envelope(subject: &Subject<'_>, outcome: &Outcome) -> Value {
-    let mut document = header(subject, "envelope");
+    let mut document = header(subject.arguments, subject.task, "envelope");
     let mut parameters = parameters(subject, Some(&outcome.envelope));
     for (parameter, [lower, upper]) in parameters.iter_mut().zip(&outcome.limits) {
         parameter["lower_limit"] = json!(lower);
@@ -51,12 +54,8 @@ pub(super) fn contains(
     envelope: &DecoupledEnvelope,
     why_not: Option<&Explanation>,
 ) -> Value {
-    let answer = if why_not.is_some() {
-        "outside"
-    } else {
-        "inside"
-    };
-    let mut document = header(subject, answer);
+    let answer = if why_not.is_some() { "outside" } else { "inside" };
+    let mut document = header(subject.arguments, subject.task, answer);
     document["parameters"] = Value::Array(parameters(subject, Some(envelope)));
     if let Some(explanation) = why_not {
         document["counterexample"] = counterexample(subject, explanation);
@@ -66,21 +65,31 @@ pub(super) fn contains(
 
 /// The answer "it fails even as planned".
 pub(super) fn fails(subject: &Subject<'_>, explanation: &Explanation) -> Value {
-    let mut document = header(subject, "fails");
+    let mut document = header(subject.arguments, subject.task, "fails");
     document["parameters"] = Value::Array(parameters(subject, None));
     document["counterexample"] = counterexample(subject, explanation);
     document
 }
 
-fn header(subject: &Subject<'_>, answer: &str) -> Value {
-    let arguments = subject.arguments;
-    let problem = subject.task.problem();
+/// The answer "the judge rejects the plan".
+pub(super) fn judged_invalid(
+    arguments: &EnvelopeArgs,
+    task: &Task,
+    violation: &Violation,
+) -> Value {
+    let mut document = header(arguments, task, "fails");
+    document["violation"] = violation_document(violation);
+    document
+}
+
+fn header(arguments: &EnvelopeArgs, task: &Task, answer: &str) -> Value {
+    let problem = task.problem();
     json!({
         "format": "elbowroom-envelope",
         "version": 1,
         "domain": problem.domain,
         "problem": problem.name,
-        "plan": subject.file(),
+        "plan": arguments.plan.display().to_string(),
         "settings": {
             "method": "irr",
             "guarantee": "weak",
@@ -112,13 +121,7 @@ fn parameters(subject: &Subject<'_>, envelope: Option<&DecoupledEnvelope>) -> Ve
         }
         value
     };
-    subject
-        .plan
-        .parameters
-        .iter()
-        .enumerate()
-        .map(each)
-        .collect()
+    subject.plan.parameters.iter().enumerate().map(each).collect()
 }
 
 fn kind(kind: ParameterKind) -> &'static str {
