@@ -67,7 +67,8 @@ impl Frontier {
 
     /// The next end to move and by how much; `None` when every step is below the precision.
     ///
-    /// Round robin over the parameters, the upper end first.
+    /// Round robin over the parameters, the upper end first. While some step is at least the
+    /// precision, those down to half of it take part as well, as in the authors' code.
     pub(crate) fn next_end(&mut self) -> Option<(BoxEnd, Rational)> {
         let unfinished = |progress: &Progress| progress.is_done != [true; 2];
         let go_on = self
@@ -77,10 +78,14 @@ impl Frontier {
         if !go_on {
             return None;
         }
+        let least = &self.precision * &Rational::new(1, 2);
         let count = self.parameters.len();
         for offset in 0..count {
             let index = (self.next + offset) % count;
             let progress = &self.parameters[index];
+            if progress.step < least {
+                continue;
+            }
             for side in [Side::Upper, Side::Lower] {
                 let place = position(side);
                 if progress.is_open[place] && !progress.is_done[place] {

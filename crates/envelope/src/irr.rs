@@ -99,7 +99,7 @@ pub fn irr(
     let plan = oracle.plan();
     let already = oracle.checks();
     let mut envelope = DecoupledEnvelope::point(&plan.nominal());
-    let mut run = |envelope, widenings, checks, stop| {
+    let run = |envelope, widenings, checks, stop| {
         Ok(IrrRun {
             envelope,
             widenings,

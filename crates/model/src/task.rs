@@ -175,6 +175,15 @@ impl Task {
             .apply_name(&self.problem.functions[function.index()].name, arguments)
     }
 
+    /// The function whose value for some objects the fluent is.
+    pub fn function_of(&self, fluent: FluentId) -> FunctionId {
+        let (function, _) = self
+            .fluents
+            .get_index(fluent.index())
+            .expect("a fluent of this task");
+        *function
+    }
+
     /// The fluent in the table, if something has mentioned it.
     pub fn find_fluent(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<FluentId> {
         self.fluents

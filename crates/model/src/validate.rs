@@ -67,8 +67,8 @@ pub struct Settings {
     /// group, which is what VAL asks for.
     pub epsilon: Option<Rational>,
     /// VAL's `-t`. Happenings no more than a tenth of it after the first of their group belong to
-    /// that group, and happen at its time; durations may miss their bounds by it (an equation by
-    /// less than it).
+    /// that group, and happen at its time; durations may miss their bounds by it, strict bounds
+    /// excepted.
     pub tolerance: Rational,
     /// By how much comparisons of numbers may fail, strict ones by less. VAL allows a
     /// ten-thousandth, whatever its `-t`.
@@ -107,8 +107,7 @@ impl Settings {
         comparison.holds(duration, bound)
             || match comparison {
                 Comparison::Less | Comparison::Greater => false,
-                Comparison::AtMost | Comparison::AtLeast => gap <= self.tolerance,
-                Comparison::Equal => gap < self.tolerance,
+                _ => gap <= self.tolerance,
             }
     }
 }

@@ -7,7 +7,8 @@ use insta::assert_snapshot;
 use reading::{domain, mistakes, problem, read_actions, read_sections};
 
 fn rendered(actions: &str) -> String {
-    read_actions(actions).unwrap_err().render(false)
+    let diagnostics = read_actions(actions).expect_err("a mistake");
+    diagnostics.render(false)
 }
 
 #[test]

@@ -7,11 +7,11 @@ use reading::{read_actions, read_sections};
 
 /// The refused features with their lines; panics if there is a mistake among them.
 fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, usize)> {
-    let diagnostics = read.unwrap_err();
+    let diagnostics = read.expect_err("refused");
     assert!(diagnostics.is_unsupported(), "{diagnostics}");
     diagnostics
         .errors()
-        .map(|d| (d.feature.unwrap(), d.line()))
+        .map(|d| (d.feature.expect("a feature"), d.line()))
         .collect()
 }
 

@@ -130,22 +130,20 @@ fn the_deepest_nesting_that_is_read_does_not_overflow_the_stack() {
 
 #[test]
 fn long_chains_of_types_and_rules_are_no_trouble() {
-    let types: String = (0..5000).map(|i| format!("t{i} - t{} ", i + 1)).collect();
+    let types = repeated(0..5000, |i| format!("t{i} - t{} ", i + 1));
     read_changed(
         0,
         format!("(define (domain d) (:types {types}))").as_bytes(),
     );
-    let ladder: String = (0..60)
-        .map(|i| format!("a{i} b{i} - (either a{} b{}) ", i + 1, i + 1))
-        .collect();
+    let ladder = repeated(0..60, |i| {
+        format!("a{i} b{i} - (either a{} b{}) ", i + 1, i + 1)
+    });
     read_changed(
         0,
         format!("(define (domain d) (:types {ladder}))").as_bytes(),
     );
-    let predicates: String = (0..5000).map(|i| format!("(p{i}) ")).collect();
-    let rules: String = (0..4999)
-        .map(|i| format!("(:derived (p{i}) (p{})) ", i + 1))
-        .collect();
+    let predicates = repeated(0..5000, |i| format!("(p{i}) "));
+    let rules = repeated(0..4999, |i| format!("(:derived (p{i}) (p{})) ", i + 1));
     read_changed(
         0,
         format!("(define (domain d) (:predicates {predicates}) {rules})").as_bytes(),
@@ -154,14 +152,19 @@ fn long_chains_of_types_and_rules_are_no_trouble() {
 
 #[test]
 fn large_texts_full_of_mistakes_are_read_quickly() {
-    let facts: String = (0..20_000).map(|i| format!("(inn bb{i} hall) ")).collect();
+    let facts = repeated(0..20_000, |i| format!("(inn bb{i} hall) "));
     read_changed(
         1,
         format!("(define (problem p) (:domain d) (:init {facts}) (:goal (and)))").as_bytes(),
     );
-    let steps: String = (0..20_000).map(|i| format!("{i}: (rol bb{i})\n")).collect();
+    let steps = repeated(0..20_000, |i| format!("{i}: (rol bb{i})\n"));
     read_changed(2, steps.as_bytes());
     read_changed(2, steps.replace('\n', " ").as_bytes());
+}
+
+/// A text for each number, one after the other.
+fn repeated(numbers: std::ops::Range<u32>, text: impl Fn(u32) -> String) -> String {
+    numbers.map(text).collect::<Vec<_>>().concat()
 }
 
 /// A text with some of its bytes replaced, and stretches of it copied to other places.

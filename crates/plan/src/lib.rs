@@ -9,12 +9,14 @@
 //! - [`format`]: STN plan files.
 
 mod decoupled;
+pub mod deorder;
 mod durations;
 pub mod format;
 pub mod linear;
 mod network;
 pub mod obligations;
 mod parameter;
+pub mod parametrize;
 pub mod reduction;
 pub mod soundness;
 mod stn_plan;

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::{Delta, End, Rational};
-use elbowroom_stn::{Constraint, Network, NodeId as ClassId};
+use elbowroom_stn::{ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId};
 
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::Substitution;
@@ -141,7 +141,39 @@ impl Reduction {
             }
         }
         reduction.keep_tightest();
+        reduction.drop_implied(plan);
         reduction
+    }
+
+    /// Drops constraints that the others imply whatever values the parameters take in their
+    /// ranges.
+    ///
+    /// Besides being less work, this shows what parameters really bear on: a constraint "the end
+    /// comes after time 0" would put the duration before it on a cycle of constraints.
+    fn drop_implied(&mut self, plan: &ParametrizedPlan) {
+        let ranges = DecoupledEnvelope {
+            intervals: plan
+                .parameters
+                .iter()
+                .map(|parameter| parameter.range.clone())
+                .collect(),
+        };
+        let BoxNetwork { network, edges } = self.network(&ranges);
+        // No schedule for any values: nothing to gain, and the nominal check will say so.
+        let Ok(network) = ConsistentNetwork::try_from(network) else {
+            return;
+        };
+        let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
+        let implied: Vec<usize> = network
+            .implied(has_parameter)
+            .into_iter()
+            .map(|id| edges[id.index()])
+            .collect();
+        let mut index = 0;
+        self.edges.retain(|_| {
+            index += 1;
+            implied.binary_search(&(index - 1)).is_err()
+        });
     }
 
     /// Learns what a constraint says about the parameters in it.

@@ -131,28 +131,35 @@ impl<'a> Soundness<'a> {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Result<Option<Broken>, Refusal> {
-        let reduction = self.reduction.clone();
+        let Self {
+            reduction,
+            obligations,
+            direct,
+            over_all,
+            suspect,
+            refutations,
+            ..
+        } = self;
         let mut schedules = Lazy {
-            reduction: &reduction,
+            reduction,
             envelope,
             schedules: None,
         };
-        let count = self.direct.len();
-        let suspect = self.suspect.min(count);
-        for index in (suspect..count).chain(0..suspect) {
-            if self.stands(index, envelope, moved) {
+        let first = (*suspect).min(direct.len());
+        for index in (first..direct.len()).chain(0..first) {
+            let direct = &mut direct[index];
+            if direct.stands(envelope, moved) {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
                 return Ok(None);
             };
-            self.refutations += 1;
-            let direct = &mut self.direct[index];
-            let obligation = &self.obligations.direct[direct.obligation];
+            *refutations += 1;
+            let obligation = &obligations.direct[direct.obligation];
             match schedules.possible(&obligation.bad_cases[direct.case]) {
                 Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
                 Outcome::Possible => {
-                    self.suspect = index;
+                    *suspect = index;
                     return Ok(Some(Broken {
                         requirement: obligation.requirement.clone(),
                         case: obligation.bad_cases[direct.case].clone(),
@@ -160,7 +167,7 @@ impl<'a> Soundness<'a> {
                 }
             }
         }
-        for (over_all, proof) in self.obligations.over_all.iter().zip(&mut self.over_all) {
+        for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
             if proof
                 .as_ref()
                 .is_some_and(|proof| proof.holds_in(envelope, moved))
@@ -170,7 +177,7 @@ impl<'a> Soundness<'a> {
             let Some(schedules) = schedules.get() else {
                 return Ok(None);
             };
-            self.refutations += 1;
+            *refutations += 1;
             let mut prover = Prover::new(self.task, &self.plan.plan, over_all, schedules);
             match prover.prove(proof.as_ref(), moved)? {
                 Ok(found) => *proof = Some(found),
@@ -188,17 +195,6 @@ impl<'a> Soundness<'a> {
         Ok(None)
     }
 
-    /// Whether the known proofs of a direct case still stand.
-    fn stands(&self, index: usize, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
-        let Some(proofs) = &self.direct[index].proofs else {
-            return false;
-        };
-        proofs.iter().all(|proof| match moved {
-            Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
-            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
-        })
-    }
-
     /// Values and a schedule in the box that break the obligation as said.
     pub fn counterexample(
         &self,
@@ -206,6 +202,19 @@ impl<'a> Soundness<'a> {
         broken: &Broken,
     ) -> Option<Counterexample> {
         bad_case::witness(&self.reduction, envelope, &broken.case)
+    }
+}
+
+impl DirectCase {
+    /// Whether the known proofs still stand.
+    fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+        let Some(proofs) = &self.proofs else {
+            return false;
+        };
+        proofs.iter().all(|proof| match moved {
+            Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
+            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
+        })
     }
 }
 

@@ -60,42 +60,7 @@ fn schema(name: &str, parameters: &[&str], unknowns: &[&str], body: Body) -> Sch
     }
 }
 
-/// In PDDL:
-///
-/// ```text
-/// (:synth-parameters ?s)
-/// (:durative-action navigate :parameters ()
-///   :duration (and (>= ?duration 5) (<= ?duration 15))
-///   :condition (at start (not (navigating)))
-///   :effect (and (at start (navigating)) (at end (not (navigating)))
-///                (increase (distance) (* #t ?s))))
-/// (:durative-action collect :parameters (?x - sample)
-///   :duration (= ?duration (collection-time))
-///   :condition (over all (not (navigating)))
-///   :effect (at end (collected ?x)))
-/// (:durative-action refuel :parameters (?x - sample) :synth-parameters (?r)
-///   :duration (= ?duration 10)
-///   :condition (at start (>= (fuel) 3))
-///   :effect (and (at start (decrease (fuel) 3)) (at end (increase (fuel) ?r))))
-/// (:action beep :parameters ()
-///   :precondition (open) :effect (increase (distance) 2))
-/// (:init (= (collection-time) 15) (= (distance) 0) (= (fuel) 7) (open) (at 100 (not (open))))
-/// (:goal (and (collected S1)))
-/// ```
-pub(crate) fn rover() -> Task {
-    let predicate = |name: &str, parameters: Vec<Variable>| Predicate {
-        name: name.to_owned(),
-        parameters,
-        is_derived: false,
-    };
-    let function = |name: &str| Function {
-        name: name.to_owned(),
-        parameters: Vec::new(),
-    };
-    let object = |name: &str| Object {
-        name: name.to_owned(),
-        types: vec![TypeId(1)],
-    };
+fn schemas() -> Vec<Schema> {
     let constant = |value: i64| Expression::Constant(Rational::from(value));
     let update = |operator, function, value| {
         effect(Change::Update {
@@ -153,6 +118,50 @@ pub(crate) fn rover() -> Task {
         condition: Condition::Atom(atom(2, vec![])),
         effects: vec![update(UpdateOperator::Increase, 0, constant(2))],
     };
+    vec![
+        schema("navigate", &[], &[], navigate),
+        schema("collect", &["?x"], &[], collect),
+        schema("refuel", &["?x"], &["?r"], refuel),
+        schema("beep", &[], &[], beep),
+    ]
+}
+
+/// In PDDL:
+///
+/// ```text
+/// (:synth-parameters ?s)
+/// (:durative-action navigate :parameters ()
+///   :duration (and (>= ?duration 5) (<= ?duration 15))
+///   :condition (at start (not (navigating)))
+///   :effect (and (at start (navigating)) (at end (not (navigating)))
+///                (increase (distance) (* #t ?s))))
+/// (:durative-action collect :parameters (?x - sample)
+///   :duration (= ?duration (collection-time))
+///   :condition (over all (not (navigating)))
+///   :effect (at end (collected ?x)))
+/// (:durative-action refuel :parameters (?x - sample) :synth-parameters (?r)
+///   :duration (= ?duration 10)
+///   :condition (at start (>= (fuel) 3))
+///   :effect (and (at start (decrease (fuel) 3)) (at end (increase (fuel) ?r))))
+/// (:action beep :parameters ()
+///   :precondition (open) :effect (increase (distance) 2))
+/// (:init (= (collection-time) 15) (= (distance) 0) (= (fuel) 7) (open) (at 100 (not (open))))
+/// (:goal (and (collected S1)))
+/// ```
+pub(crate) fn rover() -> Task {
+    let predicate = |name: &str, parameters: Vec<Variable>| Predicate {
+        name: name.to_owned(),
+        parameters,
+        is_derived: false,
+    };
+    let function = |name: &str| Function {
+        name: name.to_owned(),
+        parameters: Vec::new(),
+    };
+    let object = |name: &str| Object {
+        name: name.to_owned(),
+        types: vec![TypeId(1)],
+    };
     Task::new(Problem {
         types: vec![
             Type {
@@ -175,12 +184,7 @@ pub(crate) fn rover() -> Task {
             function("collection-time"),
             function("fuel"),
         ],
-        schemas: vec![
-            schema("navigate", &[], &[], navigate),
-            schema("collect", &["?x"], &[], collect),
-            schema("refuel", &["?x"], &["?r"], refuel),
-            schema("beep", &[], &[], beep),
-        ],
+        schemas: schemas(),
         unknowns: vec!["?s".to_owned()],
         initial_facts: vec![(PredicateId(2), Vec::new())],
         initial_values: vec![

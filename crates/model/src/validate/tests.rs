@@ -8,5 +8,6 @@ mod explanations;
 mod forms;
 mod groups;
 mod pieces;
+mod plans;
 mod polynomials;
 mod world;

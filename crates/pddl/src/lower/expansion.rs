@@ -3,8 +3,10 @@
 //! The model expands quantifiers over objects. A few nested ones over many objects would use up
 //! all memory there, so they are refused here, where the text can be shown.
 
+use std::collections::BTreeMap;
+
 use elbowroom_model::Problem;
-use elbowroom_model::problem::{Body, Condition, Effect, Guard, Variable};
+use elbowroom_model::problem::{Body, Condition, Effect, Guard, TypeId, Variable};
 
 use crate::lower::Reader;
 use crate::source::Span;
@@ -12,10 +14,21 @@ use crate::source::Span;
 /// Most parts that one condition, or the effects of one action, may have when expanded.
 const MOST_PARTS: u64 = 10_000_000;
 
+/// Counts parts.
+struct Sizes<'a> {
+    problem: &'a Problem,
+    /// How many objects each set of types has.
+    objects: BTreeMap<&'a [TypeId], u64>,
+}
+
 impl Reader {
     /// Reports what is too large when expanded. Objects must have been read.
     pub(super) fn check_expansion(&mut self, goal: Option<Span>) {
         let problem = &self.problem;
+        let mut sizes = Sizes {
+            problem,
+            objects: BTreeMap::new(),
+        };
         let mut too_large: Vec<(Span, String)> = Vec::new();
         let mut check = |size: u64, span: Span, what: String| {
             if size > MOST_PARTS {
@@ -24,18 +37,18 @@ impl Reader {
         };
         if let Some(span) = goal {
             check(
-                of_condition(&problem.goal, problem),
+                sizes.of_condition(&problem.goal),
                 span,
                 "the goal".to_owned(),
             );
         }
         for (rule, span) in problem.rules.iter().zip(&self.rule_spans) {
             let name = &problem.predicates[rule.predicate.index()].name;
-            let size = of_condition(&rule.body, problem);
+            let size = sizes.of_condition(&rule.body);
             check(size, *span, format!("this rule of `{name}`"));
         }
         for (schema, span) in problem.schemas.iter().zip(&self.schema_spans) {
-            let size = of_body(&schema.body, problem);
+            let size = sizes.of_body(&schema.body);
             check(size, *span, format!("action `{}`", schema.name));
         }
         for (span, what) in too_large {
@@ -47,63 +60,72 @@ impl Reader {
     }
 }
 
-fn of_body(body: &Body, problem: &Problem) -> u64 {
-    match body {
-        Body::Instantaneous { condition, effects } => {
-            of_condition(condition, problem).saturating_add(of_effects(effects, problem))
+impl<'a> Sizes<'a> {
+    fn of_body(&mut self, body: &'a Body) -> u64 {
+        match body {
+            Body::Instantaneous { condition, effects } => self
+                .of_condition(condition)
+                .saturating_add(self.of_effects(effects)),
+            Body::Durative {
+                at_start,
+                over_all,
+                at_end,
+                start_effects,
+                end_effects,
+                continuous,
+                ..
+            } => {
+                let mut size = 0_u64;
+                for condition in [at_start, over_all, at_end] {
+                    size = size.saturating_add(self.of_condition(condition));
+                }
+                for effects in [start_effects, end_effects] {
+                    size = size.saturating_add(self.of_effects(effects));
+                }
+                for effect in continuous {
+                    size = size.saturating_add(self.of_guarded(&effect.variables, &effect.guard));
+                }
+                size
+            }
         }
-        Body::Durative {
-            at_start,
-            over_all,
-            at_end,
-            start_effects,
-            end_effects,
-            continuous,
-            ..
-        } => {
-            let conditions = [at_start, over_all, at_end].map(|part| of_condition(part, problem));
-            let effects = [start_effects, end_effects].map(|part| of_effects(part, problem));
-            let continuous = continuous
+    }
+
+    fn of_effects(&mut self, effects: &'a [Effect]) -> u64 {
+        effects.iter().fold(0, |size, effect| {
+            size.saturating_add(self.of_guarded(&effect.variables, &effect.guard))
+        })
+    }
+
+    fn of_guarded(&mut self, variables: &'a [Variable], guard: &'a Guard) -> u64 {
+        let mut size = 1_u64;
+        for part in [&guard.at_start, &guard.over_all, &guard.now] {
+            size = size.saturating_add(self.of_condition(part));
+        }
+        size.saturating_mul(self.combinations(variables))
+    }
+
+    fn of_condition(&mut self, condition: &'a Condition) -> u64 {
+        match condition {
+            Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => 1,
+            Condition::Not(part) => self.of_condition(part),
+            Condition::And(parts) | Condition::Or(parts) => parts
                 .iter()
-                .map(|effect| of_guarded(&effect.variables, &effect.guard, problem));
-            sum(conditions.into_iter().chain(effects).chain(continuous))
+                .fold(0, |size, part| size.saturating_add(self.of_condition(part))),
+            Condition::Forall(variables, part) | Condition::Exists(variables, part) => self
+                .of_condition(part)
+                .saturating_mul(self.combinations(variables)),
         }
     }
-}
 
-fn of_effects(effects: &[Effect], problem: &Problem) -> u64 {
-    sum(effects
-        .iter()
-        .map(|effect| of_guarded(&effect.variables, &effect.guard, problem)))
-}
-
-fn of_guarded(variables: &[Variable], guard: &Guard, problem: &Problem) -> u64 {
-    let parts = [&guard.at_start, &guard.over_all, &guard.now];
-    let guard = sum(parts.map(|part| of_condition(part, problem)));
-    combinations(variables, problem).saturating_mul(guard.saturating_add(1))
-}
-
-fn of_condition(condition: &Condition, problem: &Problem) -> u64 {
-    match condition {
-        Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => 1,
-        Condition::Not(part) => of_condition(part, problem),
-        Condition::And(parts) | Condition::Or(parts) => {
-            sum(parts.iter().map(|part| of_condition(part, problem)))
-        }
-        Condition::Forall(variables, part) | Condition::Exists(variables, part) => {
-            combinations(variables, problem).saturating_mul(of_condition(part, problem))
-        }
+    /// How many ways there are to choose objects for the variables.
+    fn combinations(&mut self, variables: &'a [Variable]) -> u64 {
+        let problem = self.problem;
+        variables.iter().fold(1, |product: u64, variable| {
+            let types = variable.types.as_slice();
+            let objects = self.objects.entry(types).or_insert_with(|| {
+                u64::try_from(problem.objects_of(types).count()).unwrap_or(u64::MAX)
+            });
+            product.saturating_mul(*objects)
+        })
     }
-}
-
-/// How many ways there are to choose objects for the variables.
-fn combinations(variables: &[Variable], problem: &Problem) -> u64 {
-    variables.iter().fold(1, |product: u64, variable| {
-        let objects = problem.objects_of(&variable.types).count();
-        product.saturating_mul(u64::try_from(objects).unwrap_or(u64::MAX))
-    })
-}
-
-fn sum(sizes: impl IntoIterator<Item = u64>) -> u64 {
-    sizes.into_iter().fold(0, u64::saturating_add)
 }

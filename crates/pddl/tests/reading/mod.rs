@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
+use std::fmt::Write;
+
 use elbowroom_model::problem::{
     Atom, Body, Change, Condition, Expression, Fluent, Guard, Schema, Term, Unknown, Variable,
 };
@@ -140,7 +142,7 @@ impl Printer<'_> {
     fn around(&self, variables: &[Variable], guard: &Guard) -> String {
         let mut text = String::new();
         if !variables.is_empty() {
-            text.push_str(&format!(" for all {}", self.variables(variables)));
+            let _ = write!(text, " for all {}", self.variables(variables));
         }
         for (name, part) in [
             ("at start", &guard.at_start),
@@ -148,7 +150,7 @@ impl Printer<'_> {
             ("now", &guard.now),
         ] {
             if !part.is_trivial() {
-                text.push_str(&format!(" when {name} {}", self.condition(part)));
+                let _ = write!(text, " when {name} {}", self.condition(part));
             }
         }
         text

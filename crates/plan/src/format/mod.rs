@@ -35,6 +35,8 @@ mod write;
 
 use elbowroom_model::Task;
 
+pub(crate) use syntax::{Limit, limit};
+pub(crate) use tokens::{Token, tokens};
 pub use write::{WriteError, write};
 
 use crate::parameter::ParametrizedPlan;

@@ -24,7 +24,7 @@ pub(super) struct ParameterItem<'a> {
 
 /// A number or an infinity.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Limit {
+pub(crate) enum Limit {
     MinusInfinity,
     Number(Rational),
     Infinity,
@@ -76,7 +76,7 @@ pub(super) fn parse(text: &str) -> (File<'_>, Mistakes) {
 }
 
 /// The limit that a word denotes.
-pub(super) fn limit(text: &str) -> Option<Limit> {
+pub(crate) fn limit(text: &str) -> Option<Limit> {
     match text.to_ascii_lowercase().as_str() {
         "inf" | "+inf" | "infinity" | "+infinity" => Some(Limit::Infinity),
         "-inf" | "-infinity" => Some(Limit::MinusInfinity),

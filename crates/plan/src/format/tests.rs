@@ -296,25 +296,28 @@ fn plans() -> impl Strategy<Value = ParametrizedPlan> {
 }
 
 type Pick = prop::sample::Index;
+type PickedConstraint = (Pick, Pick, Option<Rational>, Option<Rational>);
+type PickedParameter = (Rational, i64, Option<Rational>, Option<Rational>, Pick);
 
 fn build(
     actions: &[String],
-    constraints: Vec<(Pick, Pick, Option<Rational>, Option<Rational>)>,
-    parameters: Vec<(Rational, i64, Option<Rational>, Option<Rational>, Pick)>,
+    constraints: Vec<PickedConstraint>,
+    parameters: Vec<PickedParameter>,
 ) -> ParametrizedPlan {
     let mut task = rover();
-    let mut text = "parameter ?s default 2;".to_owned();
+    let mut lines = vec!["parameter ?s default 2;".to_owned()];
     for (index, action) in actions.iter().enumerate() {
         let keyword = if action == "beep" {
             "action"
         } else {
             "durative-action"
         };
-        text.push_str(&format!("{keyword} instance n{index} : ({action});\n"));
+        lines.push(format!("{keyword} instance n{index} : ({action});"));
         if action.starts_with("refuel") {
-            text.push_str(&format!("parameter n{index}.?r default -{index};\n"));
+            lines.push(format!("parameter n{index}.?r default -{index};"));
         }
     }
+    let text = lines.concat();
     let mut plan = read(text.as_bytes(), &mut task).unwrap_or_else(|errors| panic!("{errors}"));
     // All nodes but the timed initials, which files do not mention.
     let nodes = plan.plan.nodes.len() - 1;
@@ -366,10 +369,7 @@ fn duration_place(plan: &StnPlan, place: Pick) -> Option<InstanceId> {
 }
 
 /// At most one numeric constraint per pair, as the writer merges them.
-fn given(
-    nodes: usize,
-    constraints: Vec<(Pick, Pick, Option<Rational>, Option<Rational>)>,
-) -> Vec<Constraint> {
+fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
     let mut seen = std::collections::BTreeSet::new();
     let bound = |value: Option<Rational>| value.map_or(Bound::Infinite, Bound::Finite);
     constraints

@@ -21,8 +21,8 @@ impl Span {
 
 /// A word, or one of the marks `: ; ( ) [ ] ,`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Token<'a> {
-    pub(super) text: &'a str,
+pub(crate) struct Token<'a> {
+    pub(crate) text: &'a str,
     pub(super) span: Span,
 }
 
@@ -37,7 +37,7 @@ fn is_mark(c: char) -> bool {
 }
 
 /// All words and marks, comments left out.
-pub(super) fn tokens(text: &str) -> Vec<Token<'_>> {
+pub(crate) fn tokens(text: &str) -> Vec<Token<'_>> {
     let mut tokens = Vec::new();
     let mut rest = text;
     while let Some(first) = rest.chars().next() {

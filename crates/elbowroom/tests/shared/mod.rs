@@ -1,0 +1,35 @@
+//! Benchmark files beside the repository. Tests that need them say so and pass where they are
+//! absent.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+pub(crate) mod draw;
+pub(crate) mod instances;
+
+use std::path::{Path, PathBuf};
+
+use elbowroom_model::Task;
+use elbowroom_pddl::{Source, read_problem};
+
+/// The folder of benchmark data, if it is there.
+pub(crate) fn data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: there is no {}", folder.display());
+    None
+}
+
+/// A file as source text.
+pub(crate) fn source(path: &Path) -> Source {
+    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    Source::from_bytes(path.display().to_string(), &bytes)
+}
+
+/// The task of a domain and a problem file, or what is wrong with them.
+pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
+    match read_problem(&source(domain), &source(problem)) {
+        Ok((problem, _)) => Ok(Task::new(problem)),
+        Err(diagnostics) => Err(diagnostics.render(false)),
+    }
+}

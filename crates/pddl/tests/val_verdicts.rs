@@ -1,0 +1,161 @@
+//! The judge against the recorded verdicts of VAL, on all plans of the benchmark set.
+//!
+//! What the two disagree on, and why, is told in `docs/val-agreement.md`.
+
+use std::path::PathBuf;
+
+use elbowroom_model::Task;
+use elbowroom_model::validate::{Mistake, Settings, Verdict, validate};
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_plan, read_problem};
+
+/// Where VAL's answer depends on how it rounds; see the document.
+const DISAGREEMENTS: [&str; 1] =
+    ["auv-missions/pandora-tactical/plans/mission201.popf.plan at 0.0001"];
+
+/// Plans whose domains have processes or events, which we do not read.
+const NOT_JUDGED: [&str; 5] = [
+    "val-samples/coffee/plans/coffeeproblem.src.plan",
+    "val-samples/sleeping-beauty-with-capacitor/plans/sleepingbeauty-problem.src.plan",
+    "val-samples/sleeping-beauty-with-capacitor/plans/sleepingbeauty-problem2.src.plan",
+    "val-samples/sleeping-beauty-with-magnetic-window-alarm/plans/sleepingbeauty-problem.src.plan",
+    "val-samples/vendingmachine/plans/vendingmachine-problem.src.plan",
+];
+
+const DOCUMENT: &str = include_str!("../../../docs/val-agreement.md");
+
+/// The benchmark set; `None` where it is not installed.
+fn benchmarks() -> Option<PathBuf> {
+    let shared = std::env::var_os("ELBOWROOM_SHARED").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
+        PathBuf::from,
+    );
+    let root = shared.join("data/pddl");
+    root.join("plans.csv").is_file().then_some(root)
+}
+
+/// What VAL answered to one plan, by tolerance.
+struct Row<'a> {
+    domain: &'a str,
+    problem: &'a str,
+    plan: &'a str,
+    verdicts: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Row<'a> {
+    fn all(table: &'a str) -> Vec<Self> {
+        let mut lines = table
+            .lines()
+            .map(|line| line.split(',').collect::<Vec<_>>());
+        let header = lines.next().expect("a header");
+        let column = |name: &str| {
+            header
+                .iter()
+                .position(|column| *column == name)
+                .expect("a column of this name")
+        };
+        let [domain, problem, plan] = ["domain_file", "problem_file", "plan_file"].map(column);
+        let tolerances: Vec<_> = header
+            .iter()
+            .enumerate()
+            .filter_map(|(index, name)| Some((index, name.strip_prefix("val_t")?)))
+            .collect();
+        lines
+            .map(|cells| Self {
+                domain: cells[domain],
+                problem: cells[problem],
+                plan: cells[plan],
+                verdicts: tolerances
+                    .iter()
+                    .map(|(index, t)| (*t, cells[*index]))
+                    .collect(),
+            })
+            .collect()
+    }
+}
+
+/// A problem with its plan, as far as they can be read.
+enum Reading {
+    Read(Box<Task>, elbowroom_model::TimeTriggeredPlan),
+    Mistaken,
+    Unsupported,
+}
+
+fn read(row: &Row<'_>, load: impl Fn(&str) -> Source) -> Reading {
+    let problem = match read_problem(&load(row.domain), &load(row.problem)) {
+        Ok((problem, _)) => problem,
+        Err(diagnostics) if diagnostics.is_unsupported() => return Reading::Unsupported,
+        Err(_) => return Reading::Mistaken,
+    };
+    let mut task = Task::new(problem);
+    match read_plan(&load(row.plan), &mut task) {
+        Ok((plan, _)) => Reading::Read(Box::new(task), plan),
+        Err(_) => Reading::Mistaken,
+    }
+}
+
+/// Our verdict in VAL's words. VAL stops with an error, recorded as `type-error`, where a file
+/// cannot be read, and also where a fluent is read that has no value.
+fn answer(reading: &Reading, tolerance: Rational) -> &'static str {
+    let Reading::Read(task, plan) = reading else {
+        return "type-error";
+    };
+    match validate(task, plan, &Settings::like_val(tolerance)) {
+        Verdict::Valid(_) => "valid",
+        Verdict::Invalid(violation) => match violation.mistake {
+            Mistake::Undefined { .. } => "type-error",
+            _ => "failed-to-execute",
+        },
+        Verdict::Undecided(_) => "undecided",
+    }
+}
+
+#[test]
+fn the_judge_agrees_with_val_up_to_what_the_document_explains() {
+    let Some(root) = benchmarks() else {
+        println!("skipped: no benchmark set; set ELBOWROOM_SHARED to where it is");
+        return;
+    };
+    let load = |path: &str| {
+        let bytes = std::fs::read(root.join(path)).expect("a file that the table names");
+        Source::from_bytes(path, &bytes)
+    };
+    let table = std::fs::read_to_string(root.join("plans.csv")).expect("checked above");
+    let (mut agreements, mut disagreements, mut not_judged) = (0, Vec::new(), Vec::new());
+    for row in Row::all(&table) {
+        let reading = read(&row, load);
+        if matches!(reading, Reading::Unsupported) {
+            not_judged.push(row.plan);
+            continue;
+        }
+        for (tolerance, theirs) in &row.verdicts {
+            let tolerance: Rational = tolerance.parse().expect("a number");
+            if answer(&reading, tolerance.clone()) == *theirs {
+                agreements += 1;
+            } else {
+                disagreements.push(format!("{} at {}", row.plan, tolerance.to_decimal(9)));
+            }
+        }
+    }
+    assert_eq!(disagreements, DISAGREEMENTS);
+    assert_eq!(not_judged, NOT_JUDGED);
+    assert!(
+        DOCUMENT.contains(&format!("agree on {agreements} of")),
+        "{agreements} agreements"
+    );
+}
+
+#[test]
+fn the_document_names_each_disagreement() {
+    for case in DISAGREEMENTS {
+        let (plan, tolerance) = case.split_once(" at ").expect("plan at tolerance");
+        let row = DOCUMENT
+            .lines()
+            .find(|line| line.contains(plan))
+            .expect("a line of the table");
+        assert!(row.contains(tolerance), "{row}");
+    }
+    for plan in NOT_JUDGED {
+        assert!(DOCUMENT.contains(plan), "{plan}");
+    }
+}

@@ -1,0 +1,122 @@
+//! Constants in a ground action: where they stand, and parameters in their place.
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
+use elbowroom_model::problem::{FunctionId, Unknown};
+use elbowroom_num::Rational;
+
+use crate::parameter::ParameterId;
+
+/// In which expressions of an action to look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// What effects, continuous ones too, change the function by or to.
+    Effects(FunctionId),
+    /// Comparisons that read the function.
+    Conditions(FunctionId),
+}
+
+/// The distinct constants there, in ascending order.
+pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Rational> {
+    let mut found = Vec::new();
+    let _ = rewritten(task, action, place, &mut |leaf| {
+        if let Expression::Constant(value) = leaf {
+            found.push(value.clone());
+        }
+        None
+    });
+    found.sort();
+    found.dedup();
+    found
+}
+
+/// The action with the parameter wherever the constant stands there.
+pub(super) fn opened(
+    task: &Task,
+    action: &Action,
+    place: Place,
+    constant: &Rational,
+    id: ParameterId,
+) -> Action {
+    rewritten(task, action, place, &mut |leaf| match leaf {
+        Expression::Constant(value) if value == constant => {
+            Some(Expression::Unknown(Unknown::Parameter(id.0)))
+        }
+        _ => None,
+    })
+}
+
+type Replace<'a> = &'a mut dyn FnMut(&Expression) -> Option<Expression>;
+
+fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -> Action {
+    let mut action = action.clone();
+    match &mut action.body {
+        Body::Instantaneous(snap) => rewrite_snap(task, snap, place, replace),
+        Body::Durative(body) => {
+            rewrite_snap(task, &mut body.start, place, replace);
+            rewrite_snap(task, &mut body.end, place, replace);
+            match place {
+                Place::Conditions(function) => {
+                    rewrite_condition(task, &mut body.over_all, function, replace);
+                }
+                Place::Effects(function) => {
+                    for effect in &mut body.continuous {
+                        if task.function_of(effect.fluent) == function {
+                            effect.rate = effect.rate.map_leaves(&mut |leaf| replace(leaf));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    action
+}
+
+fn rewrite_snap(task: &Task, snap: &mut SnapAction, place: Place, replace: Replace<'_>) {
+    match place {
+        Place::Conditions(function) => {
+            rewrite_condition(task, &mut snap.condition, function, replace);
+        }
+        Place::Effects(function) => {
+            for effect in &mut snap.effects {
+                rewrite_effect(task, effect, function, replace);
+            }
+        }
+    }
+}
+
+fn rewrite_effect(task: &Task, effect: &mut Effect, function: FunctionId, replace: Replace<'_>) {
+    if let Change::Update { fluent, value, .. } = &mut effect.change
+        && task.function_of(*fluent) == function
+    {
+        *value = value.map_leaves(&mut |leaf| replace(leaf));
+    }
+}
+
+fn rewrite_condition(
+    task: &Task,
+    condition: &mut Condition,
+    function: FunctionId,
+    replace: Replace<'_>,
+) {
+    match condition {
+        Condition::Fact(_) => {}
+        Condition::Compare(_, left, right) => {
+            let mut reads = false;
+            for side in [&*left, &*right] {
+                side.visit_fluents(&mut |fluent| reads |= task.function_of(fluent) == function);
+            }
+            if reads {
+                for side in [left, right] {
+                    *side = side.map_leaves(&mut |leaf| replace(leaf));
+                }
+            }
+        }
+        Condition::Not(part) => rewrite_condition(task, part, function, replace),
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                rewrite_condition(task, part, function, replace);
+            }
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Which quantities of a plan to leave open: [`VarySpec`] and [`parametrize`].
+//!
+//! A specification names one quantity, or several alike:
+//!
+//! | specification | leaves open |
+//! | --- | --- |
+//! | `durations` | the duration of every durative instance; what happens if nothing is specified |
+//! | `ACTIONS`, `duration ACTIONS` | the durations of these instances |
+//! | `constant ACTIONS FUNCTION [VALUE] [shared]` | a number in their effects on the function |
+//! | `condition ACTIONS FUNCTION [VALUE] [shared]` | a number that their conditions compare it with |
+//! | `initial (FUNCTION object …)` | the value of a fluent at time 0 |
+//! | `deadline (PREDICATE object …)` | when timed initials make the fact false |
+//! | `timed (NAME object …)` | when timed initials change the fact or fluent in any way |
+//! | `?s=VALUE`, `n0.?r=VALUE` | a `:synth-parameters` number, nominally `VALUE` |
+//!
+//! `ACTIONS` is the name of an action (all its instances), a label (that instance), or
+//! `(NAME object …)`: every instance with these arguments, where `_` stands for any object. A
+//! number in effects is the amount of an `increase`, `decrease` or `assign`, or a rate; if there
+//! are several, `VALUE` says which. It is a parameter of each instance, or of all together if
+//! `shared`. `?r=VALUE` sets an action's number in all instances.
+//!
+//! Each may be followed by `weight W` (how strongly a search should favour it) and
+//! `in [LB, UB]` (the values it can take at all). A later specification of the same quantity
+//! overrides weight and range.
+//!
+//! ```
+//! use elbowroom_plan::parametrize::VarySpec;
+//!
+//! let drives: VarySpec = "duration (goto _ depot) weight 2 in [0, 120]".parse()?;
+//! let consumption: VarySpec = "constant produce_base_1 charge_level shared".parse()?;
+//! # Ok::<(), elbowroom_plan::parametrize::ParametrizeError>(())
+//! ```
+
+mod constants;
+mod error;
+mod opening;
+mod quantities;
+mod select;
+mod spec;
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+
+pub use error::ParametrizeError;
+pub use spec::{ConstantTarget, Selection, Target, VarySpec};
+
+use crate::parameter::ParametrizedPlan;
+use crate::stn_plan::StnPlan;
+use opening::Opening;
+
+/// Leaves quantities of a plan open.
+///
+/// Numbers that the domain itself leaves open become parameters in any case. `nominal` is a
+/// schedule of the plan; it says how long things take nominally.
+///
+/// # Errors
+/// When a specification fits nothing, or fits too much, or a nominal value is missing.
+pub fn parametrize(
+    task: &Task,
+    plan: StnPlan,
+    nominal: &[Rational],
+    specs: &[VarySpec],
+) -> Result<ParametrizedPlan, ParametrizeError> {
+    let plan = ParametrizedPlan::closed(task, plan);
+    let durations: VarySpec = "durations".parse()?;
+    let names_a_quantity = |spec: &VarySpec| !matches!(spec.target, Target::Unknown { .. });
+    if specs.iter().any(names_a_quantity) {
+        vary(task, plan, nominal, specs)
+    } else {
+        let all: Vec<_> = [durations]
+            .into_iter()
+            .chain(specs.iter().cloned())
+            .collect();
+        vary(task, plan, nominal, &all)
+    }
+}
+
+/// Leaves more quantities open, of a plan that may have parameters already.
+///
+/// # Errors
+/// As [`parametrize`].
+pub fn vary(
+    task: &Task,
+    plan: ParametrizedPlan,
+    nominal: &[Rational],
+    specs: &[VarySpec],
+) -> Result<ParametrizedPlan, ParametrizeError> {
+    let mut opening = Opening::new(task, plan, nominal)?;
+    for spec in specs {
+        opening.apply(spec)?;
+    }
+    opening.finish()
+}
+
+fn nothing(spec: &VarySpec, why: String) -> ParametrizeError {
+    ParametrizeError::NothingMatches {
+        spec: spec.text.clone(),
+        why,
+    }
+}
+
+#[cfg(test)]
+mod tests;

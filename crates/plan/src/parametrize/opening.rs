@@ -1,0 +1,181 @@
+//! A plan whose quantities are being opened, one specification after another.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::FluentId;
+use elbowroom_num::{End, Interval, Rational};
+
+use super::constants::Place;
+use super::{ParametrizeError, Target, VarySpec, select};
+use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use crate::stn_plan::InstanceId;
+use crate::unknowns::{self, OpenNumber};
+
+/// A quantity that at most one parameter stands for.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Quantity {
+    Duration(InstanceId),
+    Timed(usize),
+    Initial(FluentId),
+    Open(OpenNumber),
+    /// Named parameters of one constant each; their names say which.
+    Constant(String),
+}
+
+/// A plan whose quantities are being opened.
+pub(super) struct Opening<'a> {
+    pub(super) task: &'a Task,
+    pub(super) nominal: &'a [Rational],
+    pub(super) plan: ParametrizedPlan,
+    pub(super) opened: BTreeMap<Quantity, ParameterId>,
+    open_numbers: BTreeMap<OpenNumber, ParameterId>,
+}
+
+impl<'a> Opening<'a> {
+    /// A plan of which nothing more is open than its parameters say.
+    pub(super) fn new(
+        task: &'a Task,
+        plan: ParametrizedPlan,
+        nominal: &'a [Rational],
+    ) -> Result<Self, ParametrizeError> {
+        if unknowns::occur_in_rules(task) {
+            return Err(ParametrizeError::OpenRule);
+        }
+        Ok(Self {
+            task,
+            nominal,
+            plan,
+            opened: BTreeMap::new(),
+            open_numbers: BTreeMap::new(),
+        })
+    }
+
+    pub(super) fn apply(&mut self, spec: &VarySpec) -> Result<(), ParametrizeError> {
+        match &spec.target {
+            Target::Durations => {
+                let plan = &self.plan.plan;
+                let durative = |id: &InstanceId| plan.instance(*id).action.durative().is_some();
+                let all = (0..plan.instances.len()).map(InstanceId::from);
+                let all: Vec<_> = all.filter(durative).collect();
+                self.open_durations(spec, &all)
+            }
+            Target::Duration(selection) => {
+                let instances = select::instances(self.task, &self.plan.plan, spec, selection)?;
+                self.open_durations(spec, &instances)
+            }
+            Target::Constant(target) => self.open_constants(spec, target, Place::Effects),
+            Target::Condition(target) => self.open_constants(spec, target, Place::Conditions),
+            Target::Initial(atom) => self.open_initial(spec, atom),
+            Target::Timed {
+                atom,
+                only_deletions,
+            } => self.open_timed(spec, atom, *only_deletions),
+            Target::Unknown { name, nominal } => self.open_unknown(spec, name, nominal),
+        }
+    }
+
+    /// The parameter that stands for the quantity: the one there is, or a new one.
+    pub(super) fn parameter(
+        &mut self,
+        spec: &VarySpec,
+        quantity: Quantity,
+        name: String,
+        kind: ParameterKind,
+        nominal: Rational,
+    ) -> Result<ParameterId, ParametrizeError> {
+        let id = if let Some(&id) = self.opened.get(&quantity) {
+            id
+        } else {
+            let id = ParameterId::from(self.plan.parameters.len());
+            let range = kind.natural_range(&nominal);
+            self.plan.parameters.push(Parameter {
+                name: self.unused(name),
+                kind,
+                nominal,
+                weight: Rational::ONE,
+                range,
+            });
+            self.opened.insert(quantity, id);
+            id
+        };
+        let parameter = &mut self.plan.parameters[id.index()];
+        if let Some(weight) = &spec.weight {
+            parameter.weight = weight.clone();
+        }
+        if let Some((lower, upper)) = &spec.range {
+            let end = |limit: &Option<Rational>| limit.clone().map_or(End::Infinite, End::Closed);
+            parameter.range = Interval {
+                lower: end(lower),
+                upper: end(upper),
+            };
+        }
+        if parameter.range.contains(&parameter.nominal) {
+            return Ok(id);
+        }
+        Err(ParametrizeError::OutOfRange {
+            name: parameter.name.clone(),
+            nominal: parameter.nominal.to_string(),
+            range: parameter.range.to_string(),
+        })
+    }
+
+    /// The name, or the name with a number that makes it unique.
+    fn unused(&self, name: String) -> String {
+        if self.plan.find(&name).is_none() {
+            return name;
+        }
+        let numbered = (2..).map(|number: u64| format!("{name}_{number}"));
+        let mut free = numbered.filter(|name| self.plan.find(name).is_none());
+        free.next().expect("some number is free")
+    }
+
+    fn open_unknown(
+        &mut self,
+        spec: &VarySpec,
+        name: &str,
+        nominal: &Rational,
+    ) -> Result<(), ParametrizeError> {
+        let all = unknowns::possible(self.task, &self.plan.plan);
+        let full_name = |number: OpenNumber| number.name(self.task, &self.plan.plan);
+        let is_meant = |number: &OpenNumber| {
+            let full = full_name(*number);
+            let is_short = number.instance.is_some()
+                && full
+                    .rsplit_once('.')
+                    .is_some_and(|(_, short)| short.eq_ignore_ascii_case(name));
+            is_short || full.eq_ignore_ascii_case(name)
+        };
+        let meant: Vec<_> = all.iter().copied().filter(is_meant).collect();
+        if meant.is_empty() {
+            let names: Vec<_> = all.into_iter().map(full_name).collect();
+            return Err(select::unknown(spec, "open number", name, names));
+        }
+        for number in meant {
+            let name = number.name(self.task, &self.plan.plan);
+            let quantity = Quantity::Open(number);
+            if let Some(&id) = self.opened.get(&quantity) {
+                self.plan.parameters[id.index()].nominal = nominal.clone();
+            }
+            let id = self.parameter(spec, quantity, name, number.kind(), nominal.clone())?;
+            self.open_numbers.insert(number, id);
+        }
+        Ok(())
+    }
+
+    pub(super) fn finish(mut self) -> Result<ParametrizedPlan, ParametrizeError> {
+        let plan = &mut self.plan;
+        for number in unknowns::mentioned(self.task, &plan.plan) {
+            // In a plan that was read from a file, none are left, but the goal is the task's.
+            let is_filled = number.instance.is_none()
+                && plan.find(&number.name(self.task, &plan.plan)).is_some();
+            if !self.open_numbers.contains_key(&number) && !is_filled {
+                return Err(ParametrizeError::NoNominal {
+                    name: number.name(self.task, &plan.plan),
+                });
+            }
+        }
+        unknowns::fill(&mut plan.plan, &mut plan.goal, &self.open_numbers);
+        Ok(self.plan)
+    }
+}

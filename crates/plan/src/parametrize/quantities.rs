@@ -1,0 +1,197 @@
+//! Opening durations, constants, initial values and the times of timed initials.
+
+use elbowroom_model::Footprint;
+use elbowroom_model::problem::FunctionId;
+use elbowroom_num::Rational;
+
+use super::constants::{self, Place};
+use super::opening::{Opening, Quantity};
+use super::{ConstantTarget, ParametrizeError, VarySpec, nothing, select};
+use crate::parameter::{Parameter, ParameterId, ParameterKind};
+use crate::stn_plan::{Bound, Constraint, InstanceId, NodeId, Reason};
+
+impl Opening<'_> {
+    pub(super) fn open_durations(
+        &mut self,
+        spec: &VarySpec,
+        instances: &[InstanceId],
+    ) -> Result<(), ParametrizeError> {
+        for &id in instances {
+            let plan = &self.plan.plan;
+            let instance = plan.instance(id);
+            if instance.action.durative().is_none() {
+                let why = format!("`{}` is instantaneous", instance.action.name);
+                return Err(nothing(spec, why));
+            }
+            let (start, end) = (plan.start(id), plan.end(id));
+            let is_open = |parameter: &Parameter| parameter.kind == ParameterKind::Duration(id);
+            if let Some(known) = self.plan.parameters.iter().position(is_open) {
+                let known = ParameterId::from(known);
+                self.opened.entry(Quantity::Duration(id)).or_insert(known);
+            }
+            let is_new = !self.opened.contains_key(&Quantity::Duration(id));
+            let number = instance.label.strip_prefix('n').unwrap_or(&instance.label);
+            let name = format!("dur_{number}");
+            let nominal = &self.nominal[end.index()] - &self.nominal[start.index()];
+            let kind = ParameterKind::Duration(id);
+            let parameter = self.parameter(spec, Quantity::Duration(id), name, kind, nominal)?;
+            if is_new {
+                self.set_duration(id, start, end, parameter);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the parameter in place of whatever fixed how long the instance takes.
+    fn set_duration(&mut self, id: InstanceId, start: NodeId, end: NodeId, parameter: ParameterId) {
+        let plan = &mut self.plan.plan;
+        plan.free_duration(id);
+        plan.constraints
+            .retain(|constraint| match constraint.reason {
+                Reason::Duration(other) => other != id,
+                // Fixing the duration served the schedules of one duration; each value is one.
+                Reason::Pinned => (constraint.from, constraint.to) != (start, end),
+                _ => true,
+            });
+        plan.constraints.push(Constraint {
+            from: start,
+            to: end,
+            lower: Bound::Parameter(parameter),
+            upper: Bound::Parameter(parameter),
+            reason: Reason::Duration(id),
+        });
+    }
+
+    pub(super) fn open_constants(
+        &mut self,
+        spec: &VarySpec,
+        target: &ConstantTarget,
+        place: fn(FunctionId) -> Place,
+    ) -> Result<(), ParametrizeError> {
+        let instances = select::instances(self.task, &self.plan.plan, spec, &target.instances)?;
+        let place = place(select::function(self.task, spec, &target.function)?);
+        let mut shared: Option<Rational> = None;
+        for id in instances {
+            let instance = self.plan.plan.instance(id).clone();
+            let found = constants::constants(self.task, &instance.action, place);
+            let function = &target.function;
+            let value = match (&target.value, &found[..]) {
+                (Some(value), _) if found.contains(value) => value.clone(),
+                (None, [value]) => value.clone(),
+                (_, []) | (Some(_), _) => {
+                    let why = format!(
+                        "`{}` has no such number for `{function}`{}",
+                        instance.action.name,
+                        select::listed(", only ", &found)
+                    );
+                    return Err(nothing(spec, why));
+                }
+                (None, several) => {
+                    return Err(ParametrizeError::Ambiguous {
+                        spec: spec.text.clone(),
+                        choices: several.iter().map(ToString::to_string).collect(),
+                        advice: "add the one that is meant after the function",
+                    });
+                }
+            };
+            let (name, kind) = if target.is_shared {
+                let schema = &self.task.problem().schemas[instance.action.schema.index()];
+                (format!("{}.{function}", schema.name), ParameterKind::Domain)
+            } else {
+                (
+                    format!("{}.{function}", instance.label),
+                    ParameterKind::Constant(id),
+                )
+            };
+            if target.is_shared && shared.as_ref().is_some_and(|other| *other != value) {
+                let why = "the number is not the same in all of them".to_owned();
+                return Err(nothing(spec, why));
+            }
+            let quantity = if target.is_shared {
+                Quantity::Constant(spec.text.clone())
+            } else {
+                Quantity::Constant(format!("{} {}", instance.label, spec.text))
+            };
+            shared = Some(value.clone());
+            let parameter = self.parameter(spec, quantity, name, kind, value.clone())?;
+            let opened = constants::opened(self.task, &instance.action, place, &value, parameter);
+            self.plan.plan.instances[id.index()].action = opened;
+        }
+        Ok(())
+    }
+
+    pub(super) fn open_initial(
+        &mut self,
+        spec: &VarySpec,
+        atom: &[String],
+    ) -> Result<(), ParametrizeError> {
+        let fluent = select::fluent(self.task, spec, atom)?;
+        let Some(value) = self.task.initial().values.get(&fluent).cloned() else {
+            let why = format!("{} has no initial value", self.task.fluent_name(fluent));
+            return Err(nothing(spec, why));
+        };
+        let name = format!("initial_{}", joined(atom));
+        let kind = ParameterKind::Initial(fluent);
+        let id = self.parameter(spec, Quantity::Initial(fluent), name, kind, value)?;
+        self.plan.initial.insert(fluent, id);
+        Ok(())
+    }
+
+    pub(super) fn open_timed(
+        &mut self,
+        spec: &VarySpec,
+        atom: &[String],
+        only_deletions: bool,
+    ) -> Result<(), ParametrizeError> {
+        let groups = select::timed(self.task, spec, atom, only_deletions)?;
+        let word = if only_deletions { "deadline" } else { "timed" };
+        for group in groups {
+            let is_new = !self.opened.contains_key(&Quantity::Timed(group));
+            let name = format!("{word}_{}", joined(atom));
+            let time = self.task.timed()[group].time.clone();
+            let kind = ParameterKind::Timed(group);
+            let id = self.parameter(spec, Quantity::Timed(group), name, kind, time)?;
+            if is_new {
+                self.set_timed(group, id);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the parameter in place of the time of a group of timed initials, which keeps its
+    /// place among the groups that change the same things.
+    fn set_timed(&mut self, group: usize, id: ParameterId) {
+        let timed = self.task.timed();
+        let plan = &mut self.plan.plan;
+        for constraint in &mut plan.constraints {
+            if constraint.reason == Reason::Timed(group) {
+                constraint.lower = Bound::Parameter(id);
+                constraint.upper = Bound::Parameter(id);
+            }
+        }
+        let footprint = Footprint::of_timed(&timed[group]);
+        for other in (0..timed.len()).filter(|&other| other != group) {
+            if !footprint.interferes_with(&Footprint::of_timed(&timed[other])) {
+                continue;
+            }
+            let (first, second) = (group.min(other), group.max(other));
+            // Any positive distance would do: at one time they would fall together.
+            let gap = &timed[second].time - &timed[first].time;
+            let constraint = Constraint {
+                from: plan.timed(first),
+                to: plan.timed(second),
+                lower: Bound::Finite(gap.min(Rational::new(1, 1000))),
+                upper: Bound::Infinite,
+                reason: Reason::Interference,
+            };
+            if !plan.constraints.contains(&constraint) {
+                plan.constraints.push(constraint);
+            }
+        }
+    }
+}
+
+/// `charge_auv`
+fn joined(atom: &[String]) -> String {
+    atom.join("_").to_lowercase()
+}

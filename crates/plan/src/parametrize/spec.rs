@@ -1,0 +1,292 @@
+//! What `--vary` says: one quantity, or several alike, to leave open.
+
+use std::fmt;
+use std::str::FromStr;
+
+use elbowroom_num::Rational;
+
+use super::ParametrizeError;
+use crate::format::{Limit, Token, limit, tokens};
+
+/// One `--vary`: which quantities to leave open, and how to search for them.
+///
+/// The module's documentation has the grammar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VarySpec {
+    /// The text it was read from, for messages.
+    pub text: String,
+    /// Which quantities.
+    pub target: Target,
+    /// How strongly a search should favour them; 1 if not given.
+    pub weight: Option<Rational>,
+    /// The values they can take at all: finite ends, `None` for none. If not given, the natural
+    /// ones.
+    pub range: Option<(Option<Rational>, Option<Rational>)>,
+}
+
+/// Which quantities a [`VarySpec`] leaves open.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// The durations of all durative instances.
+    Durations,
+    /// The durations of these.
+    Duration(Selection),
+    /// A constant in the effects of these on a function.
+    Constant(ConstantTarget),
+    /// A constant that the conditions of these compare a function with.
+    Condition(ConstantTarget),
+    /// The value of a fluent at time 0: function and arguments.
+    Initial(Vec<String>),
+    /// When timed initials change a fact or fluent: predicate or function, and arguments.
+    Timed {
+        /// The fact or fluent.
+        atom: Vec<String>,
+        /// Only those that make it false.
+        only_deletions: bool,
+    },
+    /// One of the domain's `:synth-parameters`, with its nominal value.
+    Unknown {
+        /// `?s`, `n0.?r`, or `?r` for all instances.
+        name: String,
+        /// The nominal value.
+        nominal: Rational,
+    },
+}
+
+/// Some of a plan's instances.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// All instances of the action of that name, or the one of that label.
+    Named(String),
+    /// All instances with these arguments; `_` stands for any.
+    Exactly(Vec<String>),
+}
+
+/// See [`Target::Constant`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConstantTarget {
+    /// In which instances.
+    pub instances: Selection,
+    /// The name of the function.
+    pub function: String,
+    /// Which constant, if several occur.
+    pub value: Option<Rational>,
+    /// Whether it is one number in all of them, rather than one number each.
+    pub is_shared: bool,
+}
+
+impl fmt::Display for VarySpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for VarySpec {
+    type Err = ParametrizeError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let tokens = tokens(text);
+        let mut words = Words {
+            text,
+            tokens: &tokens,
+        };
+        let target = words.target()?;
+        let mut spec = Self {
+            text: text.trim().to_owned(),
+            target,
+            weight: None,
+            range: None,
+        };
+        while let Some(word) = words.peek() {
+            words.skip();
+            match word.to_ascii_lowercase().as_str() {
+                "weight" => {
+                    let weight = words.number()?.filter(Rational::is_positive);
+                    spec.weight = Some(weight.ok_or_else(|| words.wrong("a positive weight"))?);
+                }
+                "in" => spec.range = Some(words.range()?),
+                _ => return Err(words.wrong("`weight W`, `in [LB, UB]` or nothing more")),
+            }
+        }
+        Ok(spec)
+    }
+}
+
+/// The words not read yet.
+struct Words<'a> {
+    text: &'a str,
+    tokens: &'a [Token<'a>],
+}
+
+impl<'a> Words<'a> {
+    fn target(&mut self) -> Result<Target, ParametrizeError> {
+        const TARGETS: &str = "`durations`, an action or a label, `constant`, `condition`, \
+                               `initial`, `deadline`, `timed` or `NAME=VALUE`";
+        let first = self.peek().ok_or_else(|| self.wrong(TARGETS))?;
+        if let Some(unknown) = self.unknown()? {
+            return Ok(unknown);
+        }
+        // An action may be called like one of the keywords; in parentheses it is no keyword.
+        let keyword = first.to_ascii_lowercase();
+        self.skip();
+        match keyword.as_str() {
+            "durations" => Ok(Target::Durations),
+            "duration" => Ok(Target::Duration(self.selection()?)),
+            "constant" => Ok(Target::Constant(self.constant()?)),
+            "condition" => Ok(Target::Condition(self.constant()?)),
+            "initial" => Ok(Target::Initial(self.atom()?)),
+            "timed" | "deadline" => Ok(Target::Timed {
+                atom: self.atom()?,
+                only_deletions: keyword == "deadline",
+            }),
+            "(" => Ok(Target::Duration(Selection::Exactly(self.rest_of_list()?))),
+            _ if is_word(first) => Ok(Target::Duration(Selection::Named(first.to_owned()))),
+            _ => Err(self.wrong(TARGETS)),
+        }
+    }
+
+    /// `NAME=VALUE`, with or without spaces.
+    fn unknown(&mut self) -> Result<Option<Target>, ParametrizeError> {
+        let Some(first) = self.peek() else {
+            return Ok(None);
+        };
+        let (name, mut value) = match first.split_once('=') {
+            Some((name, value)) => (name, value),
+            None => match self
+                .tokens
+                .get(1)
+                .and_then(|next| next.text.strip_prefix('='))
+            {
+                Some(value) => {
+                    self.skip();
+                    (first, value)
+                }
+                None => return Ok(None),
+            },
+        };
+        self.skip();
+        if value.is_empty() {
+            value = self.peek().unwrap_or_default();
+            self.skip();
+        }
+        match limit(value) {
+            Some(Limit::Number(nominal)) if !name.is_empty() => Ok(Some(Target::Unknown {
+                name: name.to_owned(),
+                nominal,
+            })),
+            _ => Err(self.wrong("`NAME=VALUE` with a number")),
+        }
+    }
+
+    fn constant(&mut self) -> Result<ConstantTarget, ParametrizeError> {
+        let instances = self.selection()?;
+        let function = self.word("the name of a function")?;
+        let value = match self.peek().and_then(limit) {
+            Some(Limit::Number(value)) => {
+                self.skip();
+                Some(value)
+            }
+            _ => None,
+        };
+        let is_shared = self.accept("shared");
+        Ok(ConstantTarget {
+            instances,
+            function,
+            value,
+            is_shared,
+        })
+    }
+
+    fn selection(&mut self) -> Result<Selection, ParametrizeError> {
+        if self.accept("(") {
+            Ok(Selection::Exactly(self.rest_of_list()?))
+        } else {
+            Ok(Selection::Named(self.word("an action or a label")?))
+        }
+    }
+
+    /// `(name arg …)`, or `name` alone.
+    fn atom(&mut self) -> Result<Vec<String>, ParametrizeError> {
+        if self.accept("(") {
+            self.rest_of_list()
+        } else {
+            Ok(vec![self.word("`(name object …)`")?])
+        }
+    }
+
+    fn rest_of_list(&mut self) -> Result<Vec<String>, ParametrizeError> {
+        let mut list = vec![self.word("a name")?];
+        while !self.accept(")") {
+            list.push(self.word("an object or `)`")?);
+        }
+        Ok(list)
+    }
+
+    /// `[lb, ub]`, either of which may be infinite.
+    fn range(&mut self) -> Result<(Option<Rational>, Option<Rational>), ParametrizeError> {
+        const RANGE: &str = "`[LB, UB]`";
+        let is_bracketed = self.accept("[");
+        let lower = self.number()?;
+        let is_pair = self.accept(",");
+        let upper = self.number()?;
+        let is_whole = is_bracketed && is_pair && self.accept("]");
+        let is_ordered = lower.is_none() || upper.is_none() || lower <= upper;
+        if is_whole && is_ordered {
+            Ok((lower, upper))
+        } else {
+            Err(self.wrong(RANGE))
+        }
+    }
+
+    /// A number; `None` for an infinity.
+    fn number(&mut self) -> Result<Option<Rational>, ParametrizeError> {
+        let limit = self.peek().and_then(limit);
+        match limit {
+            Some(Limit::Number(number)) => {
+                self.skip();
+                Ok(Some(number))
+            }
+            Some(Limit::Infinity | Limit::MinusInfinity) => {
+                self.skip();
+                Ok(None)
+            }
+            None => Err(self.wrong("a number such as 12.5 or 25/2")),
+        }
+    }
+
+    fn word(&mut self, what: &str) -> Result<String, ParametrizeError> {
+        let word = self.peek().filter(|text| is_word(text));
+        let word = word.ok_or_else(|| self.wrong(what))?.to_owned();
+        self.skip();
+        Ok(word)
+    }
+
+    fn accept(&mut self, text: &str) -> bool {
+        let is_there = self
+            .peek()
+            .is_some_and(|next| next.eq_ignore_ascii_case(text));
+        if is_there {
+            self.skip();
+        }
+        is_there
+    }
+
+    fn peek(&self) -> Option<&'a str> {
+        self.tokens.first().map(|token| token.text)
+    }
+
+    fn skip(&mut self) {
+        self.tokens = self.tokens.get(1..).unwrap_or_default();
+    }
+
+    fn wrong(&self, expected: &str) -> ParametrizeError {
+        ParametrizeError::Syntax {
+            spec: self.text.trim().to_owned(),
+            expected: expected.to_owned(),
+        }
+    }
+}
+
+fn is_word(text: &str) -> bool {
+    !text.starts_with(['(', ')', '[', ']', ',', ';', ':'])
+}
