@@ -85,7 +85,23 @@ fn time(rng: &mut ChaCha8Rng, most: i64) -> Rational {
     Rational::new(rng.random_range(1..=2 * most), 2)
 }
 
-fn effects(rng: &mut ChaCha8Rng, is_timeless: bool) -> Vec<Effect> {
+/// What an effect depends on, mostly nothing. Only end effects look back.
+fn guard(rng: &mut ChaCha8Rng, is_end: bool) -> Guard {
+    let mut part = |may_be: bool| {
+        if may_be && rng.random_bool(0.08) {
+            condition(rng)
+        } else {
+            Condition::TRUE
+        }
+    };
+    Guard {
+        at_start: part(is_end),
+        over_all: part(is_end),
+        now: part(true),
+    }
+}
+
+fn effects(rng: &mut ChaCha8Rng, is_timeless: bool, is_end: bool) -> Vec<Effect> {
     let count = rng.random_range(0..3);
     let change = |rng: &mut ChaCha8Rng| match rng.random_range(0..6) {
         0 | 1 => Change::Add(fact(rng)),
@@ -109,7 +125,7 @@ fn effects(rng: &mut ChaCha8Rng, is_timeless: bool) -> Vec<Effect> {
     (0..count)
         .map(|_| Effect {
             variables: Vec::new(),
-            guard: Guard::default(),
+            guard: guard(rng, is_end),
             change: change(rng),
         })
         .collect()
@@ -148,19 +164,19 @@ fn effects_only(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
     let mut times = Vec::new();
     for index in 0..rng.random_range(1..7) {
         let is_durative = rng.random_bool(0.8);
-        let duration = is_durative.then(|| time(rng, 4));
+        let duration = is_durative.then(|| time(rng, 4) - Rational::new(1, 2));
         let body = match &duration {
             None => Body::Instantaneous {
                 condition: Condition::TRUE,
-                effects: effects(rng, true),
+                effects: effects(rng, true, false),
             },
             Some(duration) => Body::Durative {
                 duration: duration_constraints(rng, duration),
                 at_start: Condition::TRUE,
                 over_all: Condition::TRUE,
                 at_end: Condition::TRUE,
-                start_effects: effects(rng, is_timeless),
-                end_effects: effects(rng, is_timeless),
+                start_effects: effects(rng, is_timeless, false),
+                end_effects: effects(rng, is_timeless, true),
                 continuous: if is_timeless || rng.random_bool(0.6) {
                     Vec::new()
                 } else {
@@ -181,8 +197,11 @@ fn effects_only(rng: &mut ChaCha8Rng, is_timeless: bool) -> Scenario {
         });
         times.push((time(rng, 10), duration));
     }
-    let timed = (0..rng.random_range(0..4)).map(|_| TimedInitial {
-        time: time(rng, 12),
+    // Different times: initials of one time must not contradict each other.
+    let moments: std::collections::BTreeSet<_> =
+        (0..rng.random_range(0..4)).map(|_| time(rng, 12)).collect();
+    let timed = moments.into_iter().map(|time| TimedInitial {
+        time,
         change: match rng.random_range(0..3) {
             0 => TimedChange::Add(fact(rng).predicate, Vec::new()),
             1 => TimedChange::Delete(fact(rng).predicate, Vec::new()),
@@ -294,6 +313,30 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     network.schedule().relative_to(zero).times().to_vec()
 }
 
+/// Steps with what they need and do, and what is left of their order.
+fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
+    let steps = fixed.steps.iter().map(|step| {
+        let duration = step.duration.clone().unwrap_or_default();
+        format!(
+            "{}: {} [{duration}] {:?}\n",
+            step.start, step.action.name, step.action.body
+        )
+    });
+    let order = plan.constraints.iter().map(|constraint| {
+        let (from, to) = (
+            plan.node_label(constraint.from),
+            plan.node_label(constraint.to),
+        );
+        let (lower, upper) = (&constraint.lower, &constraint.upper);
+        format!(
+            "{to} - {from} in [{lower:?}, {upper:?}]: {:?}\n",
+            constraint.reason
+        )
+    });
+    let timed = format!("{:?}\n", task.timed());
+    steps.chain(order).chain([timed]).collect()
+}
+
 fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
     for _ in 0..12 {
         let fixed = plan.scheduled(&draw(plan, rng));
@@ -303,14 +346,14 @@ fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
             &elbowroom_model::validate::Settings::default(),
         );
         if let Verdict::Invalid(violation) = verdict {
-            panic!("seed {seed}: {violation}\n{:#?}", fixed.steps);
+            panic!("seed {seed}: {violation}\n{}", shown(task, plan, &fixed));
         }
     }
 }
 
 #[test]
 fn all_schedules_are_valid_where_no_value_depends_on_time() {
-    for seed in 0..600 {
+    for seed in 0..400 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scenario = scenario(&mut rng, true);
         let mut task = scenario.task();
@@ -324,7 +367,7 @@ fn all_schedules_are_valid_where_no_value_depends_on_time() {
 #[test]
 fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     let (mut pinned, mut untold) = (0, 0);
-    for seed in 0..400 {
+    for seed in 0..250 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scenario = scenario(&mut rng, false);
         let mut task = scenario.task();
@@ -359,5 +402,5 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
         assert_sound(seed, &task, &sound, &mut rng);
     }
     assert!(pinned > 0, "the scenarios are too easy");
-    println!("{pinned} of 400 plans needed pins; of {untold} nothing could be told");
+    println!("{pinned} of 250 plans needed pins; of {untold} nothing could be told");
 }
