@@ -15,7 +15,8 @@ fuzz_target!(|bytes: &[u8]| {
     match format::read(bytes, &mut task) {
         Ok(plan) => {
             let written = format::write(&task, &plan).expect("what was read can be written");
-            let again = format::read(written.as_bytes(), &mut task).expect("what is written is right");
+            let again =
+                format::read(written.as_bytes(), &mut task).expect("what is written is right");
             // Bounds on the same difference are merged the first time.
             let rewritten = format::write(&task, &again).expect("what was read can be written");
             assert_eq!(rewritten, written);

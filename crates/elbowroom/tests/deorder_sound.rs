@@ -1,6 +1,12 @@
 //! Every schedule of a deordered plan is a valid plan: the judge says so of schedules drawn at
 //! random.
 
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "the helpers of a test are part of it"
+)]
+
 mod shared;
 
 use std::path::Path;
