@@ -1,3 +1,41 @@
-//! The command `elbowroom`.
+//! The command `elbowroom`: how much elbow room a temporal plan has.
+//!
+//! What it prints to which stream, and with which exit code it ends, is a contract:
+//! `docs/exit-codes.md`. All input and output of the workspace happens here; what there is to
+//! compute is computed in the library.
 
-fn main() {}
+mod args;
+mod bug;
+mod clock;
+mod commands;
+mod exit;
+mod input;
+mod interrupt;
+mod json;
+mod limits;
+mod look;
+mod number;
+mod output;
+mod progress;
+mod table;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Command, CommandLine};
+use exit::Exit;
+
+fn main() -> ExitCode {
+    bug::install_hook();
+    let answer = match CommandLine::parse().command {
+        Command::Check(arguments) => commands::check::run(&arguments),
+        Command::Stn(_) => todo!(),
+        Command::Envelope(arguments) => commands::envelope::run(&arguments),
+    };
+    let exit = answer.unwrap_or_else(|failure| {
+        output::tell(&failure.to_string());
+        Exit::BadInput
+    });
+    exit.into()
+}

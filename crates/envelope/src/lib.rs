@@ -11,7 +11,9 @@ mod feasibility;
 mod frontier;
 mod irr;
 mod oracle;
+mod sharpen;
 
 pub use frontier::Growth;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use oracle::{Objection, Oracle};
+pub use sharpen::sharpen;

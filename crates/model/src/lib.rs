@@ -20,6 +20,7 @@
 mod describe;
 mod domains;
 pub mod ground;
+mod hash;
 mod instantiate;
 mod interference;
 mod plan;

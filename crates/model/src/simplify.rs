@@ -69,7 +69,8 @@ impl Condition {
         }
     }
 
-    fn always(truth: bool) -> Self {
+    /// [`Condition::TRUE`] or [`Condition::FALSE`].
+    pub(crate) fn always(truth: bool) -> Self {
         if truth { Self::TRUE } else { Self::FALSE }
     }
 }

@@ -9,6 +9,7 @@
 //! - [`format`]: STN plan files.
 
 mod decoupled;
+pub mod deorder;
 mod durations;
 pub mod format;
 pub mod linear;

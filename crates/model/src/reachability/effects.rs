@@ -2,11 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use crate::instantiate::with_arguments;
 use crate::problem::{Body, Guard, ObjectId, SchemaId, Term, Variable};
 
 use super::event::{Event, Symbol};
 use super::fixpoint::Fixpoint;
-use super::relaxation::with_arguments;
 use super::waiting::Pending;
 use super::writes;
 

@@ -74,7 +74,7 @@ impl<'a> PlanReader<'a> {
         let mut plans: Vec<Vec<Line>> = vec![Vec::new()];
         let mut start = 0;
         for text in self.source.text().split_inclusive('\n') {
-            let line = line(text, start);
+            let line = line(text.trim_end(), start);
             start += text.len();
             match line {
                 Line::Blank => {}

@@ -32,7 +32,7 @@ pub(super) fn ground(problem: &Problem) -> Expected {
     let mut task = Task::new(problem.clone());
     for rule in &problem.rules {
         for arguments in bindings(problem, &rule.parameters) {
-            task.fact(rule.predicate, arguments);
+            task.fact(rule.predicate, &arguments);
         }
     }
     let mut candidates: Vec<Action> = (0..problem.schemas.len())

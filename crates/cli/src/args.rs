@@ -1,0 +1,218 @@
+//! What can be said on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use elbowroom::num::Rational;
+
+/// How much elbow room does a temporal plan have?
+#[derive(Debug, Parser)]
+#[command(
+    name = "elbowroom",
+    version,
+    propagate_version = true,
+    max_term_width = 100
+)]
+#[command(long_about = "How much elbow room does a temporal plan have?\n\n\
+    Elbowroom reads PDDL 2.1 problems with durative actions and a plan for them, and says whether \
+    the plan is valid (`check`), which of its orderings and times matter (`stn`), and how far each \
+    duration, rate or deadline may deviate while the plan is still guaranteed to work (`envelope`).")]
+#[command(after_help = "\
+Wherever a file is asked for, `-` means standard input.
+
+Exit codes: 0 the answer is yes, or done; 1 the answer is no; 2 the input or the command line is \
+wrong; 3 a limit was reached with nothing to show; 70 a bug.")]
+pub(crate) struct CommandLine {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Say whether a plan is valid, and if not, what is wrong with it
+    Check(CheckArgs),
+    /// Turn a plan with fixed times into a network that leaves room (an STN plan)
+    Stn(StnArgs),
+    /// Find out how far each duration, rate or deadline may deviate
+    Envelope(Box<EnvelopeArgs>),
+}
+
+/// The problem that every command is about.
+#[derive(Args, Debug)]
+pub(crate) struct ProblemArgs {
+    /// The domain, in PDDL
+    #[arg(value_name = "DOMAIN")]
+    pub(crate) domain: PathBuf,
+    /// The problem, in PDDL
+    #[arg(value_name = "PROBLEM")]
+    pub(crate) problem: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CheckArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plan, one `start: (action arguments) [duration]` a line; without it, only domain and
+    /// problem are checked
+    #[arg(value_name = "PLAN")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Judge like VAL with `-t T`: times closer than that count as equal, and interfering actions
+    /// only must not happen at the same time
+    #[arg(long, value_name = "T", value_parser = positive_or_zero)]
+    pub(crate) tolerance: Option<Rational>,
+    /// How far apart interfering happenings must be
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(conflicts_with = "tolerance")]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct StnArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
+    #[arg(value_name = "PLAN")]
+    pub(crate) plan: PathBuf,
+    /// Write the STN plan there instead of to standard output
+    #[arg(short, long, value_name = "FILE.stn")]
+    pub(crate) output: Option<PathBuf>,
+    /// Also write the network as a graph for Graphviz
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dot: Option<PathBuf>,
+    /// How far apart interfering happenings must be
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    pub(crate) epsilon: Rational,
+    /// Print the network as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct EnvelopeArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
+    #[arg(value_name = "PLAN|FILE.stn")]
+    pub(crate) plan: PathBuf,
+    /// What to leave open; repeat for more. By default all durations, or what the STN plan file or
+    /// the domain (`:synth-parameters`) leaves open
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) vary: Vec<String>,
+    /// How to search
+    #[arg(long, value_enum, default_value_t = Method::Irr, hide_possible_values = true)]
+    pub(crate) method: Method,
+    /// How close to its limit each end should come
+    #[arg(long, value_name = "B", default_value = "1", value_parser = positive)]
+    pub(crate) precision: Rational,
+    /// Whether steps double while they succeed, or stay as they are
+    #[arg(long, value_enum, default_value_t = Growth::Doubling)]
+    pub(crate) growth: Growth,
+    /// Finally move each end exactly onto its limit
+    #[arg(long)]
+    pub(crate) sharpen: bool,
+    /// What is guaranteed inside the envelope: `weak`, that a schedule exists for all values of
+    /// the parameters, and every schedule works
+    #[arg(long, value_enum, default_value_t = Guarantee::Weak, hide_possible_values = true)]
+    pub(crate) guarantee: Guarantee,
+    /// How far apart interfering happenings must be
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    pub(crate) epsilon: Rational,
+    /// Stop after so many seconds with the best envelope so far
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) time_limit: Option<Rational>,
+    /// Only say whether this box is inside: `"dur_0=[7/4,12] dur_7=[0,inf]"`; parameters left out
+    /// keep their nominal value
+    #[arg(long, value_name = "BOX")]
+    pub(crate) contains: Option<String>,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// How to search for an envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Method {
+    /// Widen one end at a time (incremental rectangular robustification)
+    Irr,
+    /// The box that is best by a stated objective
+    Best,
+    /// The whole region
+    Exact,
+}
+
+/// What steps do while they succeed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Growth {
+    /// They double
+    Doubling,
+    /// They stay
+    Constant,
+}
+
+/// What is guaranteed inside an envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Guarantee {
+    /// There is a schedule for all values, known in advance
+    Weak,
+    /// The plan can be executed without knowing the values in advance
+    Dynamic,
+    /// One schedule does for all values
+    Strong,
+}
+
+fn number(text: &str) -> Result<Rational, String> {
+    text.parse::<Rational>().map_err(|error| error.to_string())
+}
+
+fn positive(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    if value.is_positive() {
+        Ok(value)
+    } else {
+        Err("it must be greater than 0".to_owned())
+    }
+}
+
+fn positive_or_zero(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    if value.is_negative() {
+        Err("it must not be negative".to_owned())
+    } else {
+        Ok(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CommandLine;
+    use clap::{CommandFactory, Parser};
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        CommandLine::command().debug_assert();
+    }
+
+    #[test]
+    fn numbers_are_exact_and_must_make_sense() {
+        let parse = |precision| {
+            let line = [
+                "elbowroom",
+                "envelope",
+                "d",
+                "p",
+                "x",
+                "--precision",
+                precision,
+            ];
+            CommandLine::try_parse_from(line).map(|_| ())
+        };
+        assert!(parse("1/3").is_ok());
+        assert!(parse("0.125").is_ok());
+        assert!(parse("0").is_err());
+        assert!(parse("-1").is_err());
+        assert!(parse("much").is_err());
+    }
+}

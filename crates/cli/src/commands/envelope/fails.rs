@@ -1,0 +1,94 @@
+//! Plans that fail even as planned.
+
+use elbowroom::Explanation;
+use elbowroom::envelope::{Objection, Oracle};
+use elbowroom::model::Task;
+use elbowroom::model::validate::Violation;
+use elbowroom::plan::DecoupledEnvelope;
+
+use super::contains::example;
+use super::{Subject, document};
+use crate::args::EnvelopeArgs;
+use crate::exit::{Answer, Exit};
+use crate::limits::push_wrapped;
+use crate::look::{BAD, Look, styled};
+use crate::{number, output};
+
+/// The judge rejects the plan as it stands, so there is nothing to deviate from.
+pub(super) fn judged_invalid(
+    arguments: &EnvelopeArgs,
+    task: &Task,
+    violation: &Violation,
+) -> Answer {
+    if arguments.json {
+        output::print_json(&document::judged_invalid(arguments, task, violation))?;
+    } else {
+        let mut text = headline(arguments);
+        push_wrapped(&mut text, &violation.to_string(), 2, Look::of_stdout().width);
+        output::print(&text)?;
+    }
+    Ok(Exit::No)
+}
+
+fn headline(arguments: &EnvelopeArgs) -> String {
+    format!(
+        "{}: {} fails even if everything goes as planned\n",
+        styled(BAD, "no elbow room"),
+        arguments.plan.display()
+    )
+}
+
+/// The plan contradicts itself: there is no schedule.
+pub(super) fn without_schedule(subject: &Subject<'_>) -> Answer {
+    let nominal = subject.plan.nominal();
+    print(subject, &subject.explainer.no_schedule(&nominal))
+}
+
+/// Some schedule breaks the plan, although everything is as planned.
+pub(super) fn at_nominal(
+    subject: &Subject<'_>,
+    oracle: &Oracle<'_>,
+    objection: &Objection,
+) -> Answer {
+    let point = DecoupledEnvelope::point(&subject.plan.nominal());
+    print(
+        subject,
+        &subject.explainer.objection(oracle, &point, objection),
+    )
+}
+
+fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
+    if subject.arguments.json {
+        output::print_json(&document::fails(subject, explanation))?;
+    } else {
+        let look = Look::of_stdout();
+        let mut text = headline(subject.arguments);
+        push_wrapped(&mut text, &what(explanation), 2, look.width);
+        if explanation.schedule.is_some() {
+            text.push_str(&example(subject, explanation, look));
+        }
+        output::print(&text)?;
+    }
+    Ok(Exit::No)
+}
+
+/// The reason, and by how much.
+pub(super) fn what(explanation: &Explanation) -> String {
+    match &explanation.shortfall {
+        Some(shortfall) if !shortfall.is_zero() && explanation.schedule.is_none() => {
+            format!(
+                "{}: too late by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
+        }
+        Some(shortfall) if !shortfall.is_zero() => {
+            format!(
+                "{}: short by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
+        }
+        _ => explanation.reason.clone(),
+    }
+}

@@ -1,0 +1,185 @@
+//! Reading files.
+
+use std::fs;
+use std::io::{self, ErrorKind, IsTerminal, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::PlanKind;
+use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
+use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
+use elbowroom::plan::ParametrizedPlan;
+use elbowroom::plan::format::{self, FormatErrors};
+
+use crate::args::ProblemArgs;
+use crate::exit::Failure;
+use crate::look::{BAD, styled};
+use crate::output::{self, plain};
+
+/// Larger than any plan or problem, smaller than memory.
+const LARGEST_FILE: u64 = 256 << 20;
+
+/// Reads domain and problem. Warnings go to standard error.
+pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
+    let domain = source(&arguments.domain, "domain")?;
+    let problem = source(&arguments.problem, "problem")?;
+    let problem: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
+    Ok(Task::new(Arc::new(problem)))
+}
+
+/// Reads a plan with fixed times.
+pub(crate) fn time_triggered_plan(
+    task: &mut Task,
+    path: &Path,
+) -> Result<TimeTriggeredPlan, Failure> {
+    let text = source(path, "plan")?;
+    with_warnings(pddl::read_plan(&text, task))
+}
+
+/// A plan of either kind, as it stands in a file.
+pub(crate) enum AnyPlan {
+    TimeTriggered(TimeTriggeredPlan),
+    Stn(ParametrizedPlan),
+}
+
+/// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
+pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure> {
+    let text = source(path, "plan")?;
+    let is_stn_name = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("stn"));
+    if is_stn_name || PlanKind::of_text(text.text()) == PlanKind::Stn {
+        let plan = format::read(text.text().as_bytes(), task)
+            .map_err(|errors| Failure::rendered(stn_mistakes(&text, &errors)))?;
+        return Ok(AnyPlan::Stn(plan));
+    }
+    let plan = with_warnings(pddl::read_plan(&text, task))?;
+    Ok(AnyPlan::TimeTriggered(plan))
+}
+
+/// The mistakes in an STN plan file, with excerpts.
+fn stn_mistakes(text: &Source, errors: &FormatErrors) -> String {
+    let mut shown = String::new();
+    for error in &errors.errors {
+        let line = error.line.to_string();
+        let margin = " ".repeat(line.len());
+        let carets = "^".repeat(error.length.max(1));
+        let offset = " ".repeat(error.column.saturating_sub(1));
+        shown.push_str(&format!(
+            "{}: {}\n{margin}--> {}:{}:{}\n",
+            styled(BAD, "error"),
+            error.message,
+            text.name(),
+            error.line,
+            error.column,
+        ));
+        // An excerpt of a long line does not start at its first column.
+        if error.column <= error.excerpt.chars().count() + 1 {
+            let expected = error.expected.as_deref().unwrap_or_default();
+            shown.push_str(&format!(
+                "{margin} |\n{line} | {}\n{margin} | {offset}{carets} {expected}\n",
+                error.excerpt
+            ));
+        } else if let Some(expected) = &error.expected {
+            shown.push_str(&format!("{margin} = {expected}\n"));
+        }
+        shown.push('\n');
+    }
+    shown.push_str(&output::counted(errors.errors.len(), "error"));
+    shown
+}
+
+/// Reads a text file, or standard input for `-`.
+pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
+    if path.as_os_str() == "-" {
+        if io::stdin().is_terminal() {
+            output::tell(&format!("reading the {what} from standard input"));
+        }
+        let mut bytes = Vec::new();
+        let read = io::stdin().lock().take(LARGEST_FILE).read_to_end(&mut bytes);
+        return match read {
+            Ok(_) => Ok(Source::from_bytes("standard input", &bytes)),
+            Err(error) => Err(Failure::new(
+                format!("cannot read the {what} from standard input: {}", plain(&error)),
+                "",
+            )),
+        };
+    }
+    let refused = |error: &io::Error| {
+        Failure::new(
+            format!("cannot read the {what} {}: {}", path.display(), plain(error)),
+            advice(path, error),
+        )
+    };
+    let size = fs::metadata(path).map_err(|error| refused(&error))?.len();
+    if size > LARGEST_FILE {
+        return Err(Failure::new(
+            format!("the {what} {} is too large", path.display()),
+            "give a text file; this one has more than 256 MB",
+        ));
+    }
+    let bytes = fs::read(path).map_err(|error| refused(&error))?;
+    Ok(Source::from_bytes(path.display().to_string(), &bytes))
+}
+
+/// What to do about a file that cannot be read.
+fn advice(path: &Path, error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => {
+            let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            match parent {
+                Some(folder) if !folder.is_dir() => {
+                    format!("there is no folder {}", folder.display())
+                }
+                _ => similar_file(path).map_or_else(
+                    || "check the path; the order is DOMAIN PROBLEM PLAN".to_owned(),
+                    |name| format!("did you mean {name}?"),
+                ),
+            }
+        }
+        ErrorKind::PermissionDenied => "you may not read it; check its permissions".to_owned(),
+        _ if path.is_dir() => "it is a folder; name a file in it".to_owned(),
+        _ => String::new(),
+    }
+}
+
+/// A file in the same folder with the same name but another ending or case.
+fn similar_file(path: &Path) -> Option<String> {
+    let stem = path.file_stem()?.to_str()?.to_ascii_lowercase();
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .ok()?
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| {
+            Path::new(name)
+                .file_stem()
+                .and_then(|other| other.to_str())
+                .is_some_and(|other| other.eq_ignore_ascii_case(&stem))
+        })
+        .collect();
+    names.sort();
+    let name = names.into_iter().next()?;
+    Some(path.with_file_name(name).display().to_string())
+}
+
+/// The value read; its warnings go to standard error, errors become a failure.
+pub(crate) fn with_warnings<T>(
+    outcome: Result<(T, Vec<Diagnostic>), Diagnostics>,
+) -> Result<T, Failure> {
+    match outcome {
+        Ok((value, warnings)) => {
+            for warning in &warnings {
+                output::tell(&format!("{}\n", warning.render(true)));
+            }
+            Ok(value)
+        }
+        Err(diagnostics) => Err(Failure::rendered(format!(
+            "{}\n\n{}",
+            diagnostics.render(true),
+            output::counted(diagnostics.errors().count(), "error")
+        ))),
+    }
+}

@@ -1,0 +1,28 @@
+//! Ctrl-C ends a search with the best result so far.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether the user has asked to stop.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// From now on, the first Ctrl-C asks to stop, and the second ends the program.
+    pub(crate) fn listen() -> Self {
+        let interrupt = Self::default();
+        let flag = interrupt.clone();
+        // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
+        let _ = ctrlc::set_handler(move || {
+            if flag.0.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+        });
+        interrupt
+    }
+
+    /// Whether Ctrl-C was pressed.
+    pub(crate) fn is_requested(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}

@@ -1,0 +1,75 @@
+//! What the output is shown on: how wide it is, and which characters and colours it has.
+
+use std::env;
+use std::io::{self, IsTerminal};
+
+use anstyle::{AnsiColor, Style};
+
+/// Width assumed where there is no terminal to ask.
+const DEFAULT_WIDTH: usize = 80;
+/// Wider lines are hard to read.
+const MAX_WIDTH: usize = 110;
+
+/// How to lay out text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Look {
+    /// Columns to stay within.
+    pub(crate) width: usize,
+    /// Whether there are more characters than ASCII.
+    pub(crate) unicode: bool,
+}
+
+impl Look {
+    /// The look of plain text: what pipes and files get.
+    pub(crate) const PLAIN: Self = Self {
+        width: DEFAULT_WIDTH,
+        unicode: false,
+    };
+
+    /// The look of standard output.
+    pub(crate) fn of_stdout() -> Self {
+        if !io::stdout().is_terminal() {
+            return Self::PLAIN;
+        }
+        let width =
+            terminal_size::terminal_size().map_or(DEFAULT_WIDTH, |(width, _)| usize::from(width.0));
+        Self {
+            width: width.clamp(40, MAX_WIDTH),
+            unicode: locale_is_utf8(),
+        }
+    }
+}
+
+/// Whether the locale's character encoding is UTF-8, by the variables in POSIX order.
+fn locale_is_utf8() -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"]
+        .iter()
+        .filter_map(|name| env::var(name).ok())
+        .find(|value| !value.is_empty());
+    match locale {
+        Some(locale) => {
+            let locale = locale.to_ascii_lowercase();
+            locale.contains("utf-8") || locale.contains("utf8")
+        }
+        None => cfg!(windows),
+    }
+}
+
+/// For what the eye should find first.
+pub(crate) const STRONG: Style = Style::new().bold();
+/// For what may be overlooked.
+pub(crate) const FAINT: Style = Style::new().dimmed();
+/// For good news.
+pub(crate) const GOOD: Style = AnsiColor::Green.on_default().bold();
+/// For bad news.
+pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
+/// For advice.
+pub(crate) const HINT: Style = AnsiColor::Cyan.on_default().bold();
+
+/// The text in a style. Escape sequences are removed again where the output takes no colours.
+pub(crate) fn styled(style: Style, text: &str) -> String {
+    if text.is_empty() {
+        return String::new();
+    }
+    format!("{style}{text}{style:#}")
+}

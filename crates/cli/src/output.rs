@@ -1,0 +1,68 @@
+//! Standard output and standard error.
+
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::exit::Failure;
+
+/// Writes text to standard output. Escape sequences are dropped where colours are not wanted.
+///
+/// When the reader has gone (`| head`) the rest is dropped silently, as it asked for.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = anstream::stdout().lock();
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    survive(written, "standard output")
+}
+
+/// Writes one JSON document to standard output.
+pub(crate) fn print_json(document: &Value) -> Result<(), Failure> {
+    print(&format!("{document:#}\n"))
+}
+
+/// Writes text to standard error. There is nobody to tell when that fails.
+pub(crate) fn tell(text: &str) {
+    let mut stderr = anstream::stderr().lock();
+    let _ = writeln!(stderr, "{text}");
+}
+
+/// Writes a file; `-` is standard output.
+pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+    if path.as_os_str() == "-" {
+        return print(text);
+    }
+    std::fs::write(path, text).map_err(|error| {
+        Failure::new(
+            format!("cannot write {}: {}", path.display(), plain(&error)),
+            "choose a file in a folder that exists and that you may write to",
+        )
+    })
+}
+
+fn survive(result: io::Result<()>, target: &str) -> Result<(), Failure> {
+    match result {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::new(
+            format!("cannot write to {target}: {}", plain(&error)),
+            "",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// `1 check`, `2 checks`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+/// The error without the number that the operating system gives it.
+pub(crate) fn plain(error: &io::Error) -> String {
+    let text = error.to_string();
+    match text.find(" (os error") {
+        Some(at) => text[..at].to_lowercase(),
+        None => text,
+    }
+}

@@ -1,0 +1,338 @@
+//! The tolerance table: one row for each parameter.
+//!
+//! ```text
+//!                                 nominal   lower   upper       slack
+//!  d0  (drive rover depot shelf)       10   0.001  19.996   -99%  +99%  |----o----|
+//! ```
+//!
+//! What is shown never promises more than what is known: lower ends are rounded up, upper ends
+//! down, and slack towards zero.
+
+use elbowroom::num::{End, Interval, Rational};
+use unicode_width::UnicodeWidthStr;
+
+use crate::look::{FAINT, Look, STRONG, styled};
+use crate::number::{self, Rounding};
+
+/// What a row of the table shows.
+#[derive(Clone, Debug)]
+pub(crate) struct Row {
+    /// The parameter's name.
+    pub(crate) name: String,
+    /// What it is in plain words.
+    pub(crate) quantity: String,
+    /// Its value in the original plan.
+    pub(crate) nominal: Rational,
+    /// The values it may take.
+    pub(crate) interval: Interval,
+}
+
+/// Columns of the bar: the first of these that fits.
+const BARS: [usize; 3] = [11, 9, 7];
+/// Names up to this width have a column of their own even where the numbers stand below.
+const SHORT_NAME: usize = 12;
+/// Left margin, and gap between columns.
+const GAP: usize = 2;
+
+/// The rows as a table, each line ended; empty without rows.
+pub(crate) fn render(rows: &[Row], look: Look) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let cells: Vec<Cells> = rows.iter().map(Cells::of).collect();
+    let numbers = Numbers::fitting(&cells);
+    let names = widest(rows.iter().map(|row| row.name.as_str()));
+    let quantities = widest(rows.iter().map(|row| row.quantity.as_str()));
+    let indent = 1;
+    let beside = indent + names + GAP + quantities;
+    let bar_beside = |text: usize| {
+        let room = look.width.saturating_sub(text + numbers.width() + 2 * GAP);
+        BARS.into_iter().find(|&bar| bar <= room)
+    };
+    let layout = match bar_beside(beside) {
+        Some(bar) => Layout {
+            names,
+            text: beside,
+            bar,
+            stacked: false,
+        },
+        None => Layout {
+            names: names.min(SHORT_NAME),
+            text: indent + GAP,
+            bar: bar_beside(indent + GAP).unwrap_or(0),
+            stacked: true,
+        },
+    };
+    let mut table = String::new();
+    let heading = numbers.heading(look.width.saturating_sub(layout.text + GAP));
+    let heading = format!("{:1$}{heading}", "", layout.text + GAP);
+    push_line(&mut table, &styled(FAINT, heading.trim_end()));
+    for (row, cells) in rows.iter().zip(&cells) {
+        layout.push_row(&mut table, row, cells, &numbers, look);
+    }
+    table
+}
+
+/// Where the columns stand.
+struct Layout {
+    /// Width of the names.
+    names: usize,
+    /// Where the numbers begin, less the gap.
+    text: usize,
+    /// Columns of the bar; 0 if there is no room for one.
+    bar: usize,
+    /// Whether the numbers stand below name and quantity rather than beside them.
+    stacked: bool,
+}
+
+impl Layout {
+    fn push_row(
+        &self,
+        table: &mut String,
+        row: &Row,
+        cells: &Cells,
+        numbers: &Numbers,
+        look: Look,
+    ) {
+        let name = styled(STRONG, &pad_right(&row.name, self.names));
+        let bar = bar(&row.nominal, &row.interval, self.bar, look.unicode);
+        let figures = numbers.line(cells);
+        if self.stacked {
+            let name_width = UnicodeWidthStr::width(&*row.name).max(self.names);
+            let room = look.width.saturating_sub(1 + name_width + GAP);
+            let quantity = shorten(&row.quantity, room.max(12), look.unicode);
+            push_line(table, &format!(" {name}  {quantity}"));
+            let indent = self.text + GAP;
+            push_line(table, &format!("{:indent$}{figures}  {bar}", ""));
+        } else {
+            let quantity = pad_right(&row.quantity, self.text - 1 - self.names - GAP);
+            push_line(table, &format!(" {name}  {quantity}  {figures}  {bar}"));
+        }
+    }
+}
+
+/// The texts of one row's numbers.
+struct Cells {
+    nominal: String,
+    lower: String,
+    upper: String,
+    less: String,
+    more: String,
+}
+
+impl Cells {
+    fn of(row: &Row) -> Self {
+        let end = |end: &End, rounding| match end.value() {
+            Some(value) => number::between(value, &row.nominal, rounding),
+            None if rounding == Rounding::Up => "-inf".to_owned(),
+            None => "inf".to_owned(),
+        };
+        Self {
+            nominal: number::nearest(&row.nominal),
+            lower: end(&row.interval.lower, Rounding::Up),
+            upper: end(&row.interval.upper, Rounding::Down),
+            less: slack(&row.nominal, &row.interval.lower, '-'),
+            more: slack(&row.nominal, &row.interval.upper, '+'),
+        }
+    }
+}
+
+/// How far the end lies from the nominal value, in percent of it, rounded towards zero.
+fn slack(nominal: &Rational, end: &End, sign: char) -> String {
+    let Some(value) = end.value() else {
+        return format!("{sign}inf");
+    };
+    let distance = (value - nominal).abs();
+    if distance.is_zero() {
+        return "0%".to_owned();
+    }
+    let Some(share) = distance.checked_div(&nominal.abs()) else {
+        return "-".to_owned(); // no percentage of a nominal 0
+    };
+    let percent = &share * &Rational::from(100);
+    let digits = u32::from(percent < Rational::from(10));
+    format!(
+        "{sign}{}%",
+        number::rounded(&percent, digits, Rounding::Down)
+    )
+}
+
+/// The widths of the number columns. Decimal points stand below each other.
+struct Numbers {
+    nominal: Split,
+    lower: Split,
+    upper: Split,
+    less: usize,
+    more: usize,
+}
+
+/// Digits before and after the decimal point.
+#[derive(Clone, Copy)]
+struct Split {
+    whole: usize,
+    part: usize,
+    width: usize,
+}
+
+impl Split {
+    fn fitting<'a>(heading: &str, texts: impl Iterator<Item = &'a str>) -> Self {
+        let (mut whole, mut part) = (0, 0);
+        for text in texts {
+            let at = text.find('.').unwrap_or(text.len());
+            whole = whole.max(at);
+            part = part.max(text.len() - at);
+        }
+        let width = (whole + part).max(heading.len());
+        Self { whole, part, width }
+    }
+
+    fn align(self, text: &str) -> String {
+        let at = text.find('.').unwrap_or(text.len());
+        let left = self.width - self.part - at;
+        let right = self.part - (text.len() - at);
+        format!("{:left$}{text}{:right$}", "", "")
+    }
+}
+
+impl Numbers {
+    fn fitting(cells: &[Cells]) -> Self {
+        let column = |heading, text: fn(&Cells) -> &str| {
+            let split = Split::fitting(heading, cells.iter().map(text));
+            debug_assert!(split.width >= split.whole + split.part);
+            split
+        };
+        Self {
+            nominal: column("nominal", |c| &c.nominal),
+            lower: column("lower", |c| &c.lower),
+            upper: column("upper", |c| &c.upper),
+            less: widest(cells.iter().map(|c| c.less.as_str())),
+            more: widest(cells.iter().map(|c| c.more.as_str())),
+        }
+    }
+
+    fn width(&self) -> usize {
+        self.nominal.width + self.lower.width + self.upper.width + self.slack() + 3 * GAP
+    }
+
+    fn slack(&self) -> usize {
+        (self.less + 1 + self.more).max("slack".len())
+    }
+
+    fn heading(&self, room: usize) -> String {
+        let heading = format!(
+            "{:>1$}  {2:>3$}  {4:>5$}  {6:>7$}",
+            "nominal",
+            self.nominal.width,
+            "lower",
+            self.lower.width,
+            "upper",
+            self.upper.width,
+            "slack",
+            self.slack(),
+        );
+        heading.chars().take(room).collect()
+    }
+
+    fn line(&self, cells: &Cells) -> String {
+        let slack = format!(
+            "{:>1$} {2:>3$}",
+            cells.less, self.less, cells.more, self.more
+        );
+        format!(
+            "{}  {}  {}  {slack:>width$}",
+            self.nominal.align(&cells.nominal),
+            self.lower.align(&cells.lower),
+            self.upper.align(&cells.upper),
+            width = self.slack(),
+        )
+    }
+}
+
+/// Where the nominal value sits in its interval: `|--o-----|`, `|--o----->` where it has no end.
+fn bar(nominal: &Rational, interval: &Interval, width: usize, unicode: bool) -> String {
+    if width == 0 {
+        return String::new();
+    }
+    let [left, right, endless_left, endless_right, line, dot] = if unicode {
+        ['├', '┤', '◀', '▶', '─', '●']
+    } else {
+        ['|', '|', '<', '>', '-', 'o']
+    };
+    let last = width - 1;
+    let below = interval.lower.value().map(|lower| nominal - lower);
+    let above = interval.upper.value().map(|upper| upper - nominal);
+    let position = match (&below, &above) {
+        (Some(below), Some(above)) => {
+            let Some(share) = below.checked_div(&(below + above)) else {
+                // A single value: a dot without a line.
+                return format!("{:1$}{dot}", "", last / 2);
+            };
+            place(&share, last)
+        }
+        (Some(below), None) if below.is_zero() => 0,
+        (None, Some(above)) if above.is_zero() => last,
+        (Some(_), None) => last / 3,
+        (None, Some(_)) => last - last / 3,
+        (None, None) => last / 2,
+    };
+    let mut text = String::new();
+    for column in 0..width {
+        text.push(match column {
+            _ if column == position => dot,
+            0 if below.is_none() => endless_left,
+            0 => left,
+            _ if column == last && above.is_none() => endless_right,
+            _ if column == last => right,
+            _ => line,
+        });
+    }
+    text
+}
+
+/// The column for a share between 0 and 1; the first and the last mean exactly 0 and 1.
+fn place(share: &Rational, last: usize) -> usize {
+    if share.is_zero() {
+        return 0;
+    }
+    if *share == Rational::ONE {
+        return last;
+    }
+    // Few columns, so a linear search says it best.
+    let steps = i64::try_from(last).expect("a narrow bar");
+    (1..last)
+        .find(|&column| {
+            let column = i64::try_from(column).expect("a narrow bar");
+            *share <= Rational::new(2 * column + 1, 2 * steps)
+        })
+        .unwrap_or(last - 1)
+}
+
+fn widest<'a>(texts: impl Iterator<Item = &'a str>) -> usize {
+    texts.map(UnicodeWidthStr::width).max().unwrap_or(0)
+}
+
+fn pad_right(text: &str, width: usize) -> String {
+    let missing = width.saturating_sub(UnicodeWidthStr::width(text));
+    format!("{text}{:missing$}", "")
+}
+
+/// The text, with its middle left out where it is wider than `width`.
+fn shorten(text: &str, width: usize, unicode: bool) -> String {
+    if UnicodeWidthStr::width(text) <= width {
+        return text.to_owned();
+    }
+    let gap = if unicode { "…" } else { "..." };
+    let keep = width.saturating_sub(UnicodeWidthStr::width(gap));
+    let head: String = text.chars().take(keep.div_ceil(2)).collect();
+    let count = text.chars().count();
+    let tail: String = text.chars().skip(count - keep / 2).collect();
+    format!("{head}{gap}{tail}")
+}
+
+fn push_line(text: &mut String, line: &str) {
+    text.push_str(line.trim_end());
+    text.push('\n');
+}
+
+#[cfg(test)]
+mod tests;

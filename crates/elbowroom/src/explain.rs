@@ -1,0 +1,206 @@
+//! What the library finds out about a plan, in words.
+
+mod conflict;
+mod timed;
+
+use elbowroom_envelope::{Limit, Objection, Oracle};
+use elbowroom_model::Task;
+use elbowroom_model::validate::{self, Verdict};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::obligations::Requirement;
+use elbowroom_plan::reduction::Side;
+use elbowroom_plan::soundness::{Broken, Counterexample};
+use elbowroom_plan::{
+    DecoupledEnvelope, InstanceId, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan,
+    Schedule, Valuation,
+};
+
+/// Says in words what was found out about one plan.
+#[derive(Clone, Copy, Debug)]
+pub struct Explainer<'a> {
+    task: &'a Task,
+    plan: &'a ParametrizedPlan,
+    epsilon: &'a Rational,
+}
+
+/// Why a plan does not work somewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// What goes wrong, without the numbers of the example: several boxes that fail for one
+    /// reason have the same text here.
+    pub reason: String,
+    /// By how much, where that is one number: a deadline is missed, or a condition fails, by it.
+    pub shortfall: Option<Rational>,
+    /// Values of the parameters at which it goes wrong.
+    pub valuation: Valuation,
+    /// A time for each node at which it goes wrong; `None` if there is no schedule at all.
+    pub schedule: Option<Schedule>,
+    /// What the judge says about that schedule.
+    pub verdict: Option<String>,
+}
+
+impl<'a> Explainer<'a> {
+    /// Explains what concerns this plan.
+    pub fn new(task: &'a Task, plan: &'a ParametrizedPlan, epsilon: &'a Rational) -> Self {
+        Self {
+            task,
+            plan,
+            epsilon,
+        }
+    }
+
+    /// Why a box is not inside the envelope, with an example.
+    pub fn objection(
+        &self,
+        oracle: &Oracle<'_>,
+        refused: &DecoupledEnvelope,
+        objection: &Objection,
+    ) -> Explanation {
+        match objection {
+            Objection::NoSchedule(valuation) => self.no_schedule(valuation),
+            Objection::Broken(broken) => {
+                let example = oracle.counterexample(refused, broken);
+                self.broken(broken, example)
+            }
+        }
+    }
+
+    /// Why the plan has no schedule at these values. If it has one, the explanation is empty.
+    pub fn no_schedule(&self, valuation: &[Rational]) -> Explanation {
+        let conflict = conflict::find(self, valuation);
+        Explanation {
+            reason: conflict
+                .as_ref()
+                .map_or_else(String::new, |c| c.reason.clone()),
+            shortfall: conflict.map(|conflict| conflict.excess),
+            valuation: valuation.to_vec(),
+            schedule: None,
+            verdict: None,
+        }
+    }
+
+    /// What keeps an end of a parameter's interval where it is; `None` if nothing does.
+    pub fn limit(&self, id: ParameterId, side: Side, limit: &Limit) -> Option<String> {
+        match limit {
+            Limit::Unbounded => None,
+            Limit::Range => Some(self.range(id, side)),
+            Limit::Objection { objection, .. } => Some(match objection {
+                Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
+                Objection::Broken(broken) => self.requirement(&broken.requirement),
+            }),
+        }
+    }
+
+    fn broken(&self, broken: &Broken, example: Option<Counterexample>) -> Explanation {
+        let reason = self.requirement(&broken.requirement);
+        let Some(example) = example else {
+            return Explanation {
+                reason,
+                shortfall: None,
+                valuation: self.plan.nominal(),
+                schedule: None,
+                verdict: None,
+            };
+        };
+        Explanation {
+            reason,
+            shortfall: self.shortfall(broken, &example),
+            verdict: self.verdict(&example),
+            valuation: example.valuation,
+            schedule: Some(example.schedule),
+        }
+    }
+
+    /// By how much the example breaks the requirement.
+    fn shortfall(&self, broken: &Broken, example: &Counterexample) -> Option<Rational> {
+        if let Requirement::Separation { first, second } = &broken.requirement {
+            let gap = &example.schedule[second.index()] - &example.schedule[first.index()];
+            return Some(self.epsilon - &gap);
+        }
+        let [inequality] = broken.case.inequalities.as_slice() else {
+            return None;
+        };
+        let mut times = example.schedule.clone();
+        times.extend(example.moment.clone());
+        let value = inequality.expression.value(&times, &example.valuation);
+        Some(value.abs())
+    }
+
+    /// What the judge says about the example; `None` where it cannot be asked, because something
+    /// else than the plan's own numbers is left open, or if it finds nothing wrong.
+    fn verdict(&self, example: &Counterexample) -> Option<String> {
+        let is_askable = self.plan.parameters.iter().all(|parameter| {
+            matches!(
+                parameter.kind,
+                ParameterKind::Duration(_) | ParameterKind::Constant(_) | ParameterKind::Bound
+            )
+        });
+        if !is_askable {
+            return None;
+        }
+        let plan = self.plan.plan.at(&example.valuation);
+        let plan = plan.scheduled(&example.schedule);
+        let settings = validate::Settings {
+            epsilon: Some(self.epsilon.clone()),
+            ..validate::Settings::default()
+        };
+        match validate::validate(self.task, &plan, &settings) {
+            Verdict::Invalid(violation) => Some(violation.to_string()),
+            _ => None,
+        }
+    }
+
+    /// A requirement in words.
+    pub fn requirement(&self, requirement: &Requirement) -> String {
+        let plan = &self.plan.plan;
+        let Requirement::Separation { first, second } = requirement else {
+            return requirement.describe(self.task, plan);
+        };
+        let epsilon = self.epsilon.to_decimal(6);
+        let kind = |node: &NodeId| plan.nodes[node.index()];
+        match (kind(first), kind(second)) {
+            (Node::Start(start), Node::End(end)) if start == end => {
+                format!("an action whose start and end interfere takes at least {epsilon}")
+            }
+            (_, Node::Timed(index)) => self.deadline(*first, index),
+            (Node::Timed(index), _) => format!(
+                "{} must come {epsilon} after {} at {}",
+                plan.node_words(self.task, *second),
+                self.timed_change(*second, index),
+                self.timed_time(index),
+            ),
+            _ => format!(
+                "{} must come {epsilon} before {}",
+                plan.node_words(self.task, *first),
+                plan.node_words(self.task, *second),
+            ),
+        }
+    }
+
+    /// Which values a parameter can take at all.
+    fn range(&self, id: ParameterId, side: Side) -> String {
+        let parameter = self.plan.parameter(id);
+        let end = match side {
+            Side::Lower => parameter.range.lower.value(),
+            Side::Upper => parameter.range.upper.value(),
+        };
+        let is_natural = parameter.range == Interval::at_least(Rational::ZERO);
+        match (end, parameter.kind) {
+            (Some(_), ParameterKind::Duration(_)) if is_natural => {
+                "a duration is at least 0".to_owned()
+            }
+            (Some(_), ParameterKind::Constant(_)) if is_natural => {
+                "an amount is at least 0".to_owned()
+            }
+            (Some(end), _) if side == Side::Lower => {
+                format!("its range: at least {}", end.to_decimal(6))
+            }
+            (Some(end), _) => format!("its range: at most {}", end.to_decimal(6)),
+            (None, _) => String::new(),
+        }
+    }
+
+    fn action_name(&self, id: InstanceId) -> &'a str {
+        &self.plan.plan.instance(id).action.name
+    }
+}

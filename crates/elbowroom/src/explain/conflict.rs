@@ -1,0 +1,163 @@
+//! Why a plan has no schedule: what takes too long, and what it must fit into.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason};
+
+use super::Explainer;
+
+/// Constraints that contradict each other, in words.
+pub(super) struct Conflict {
+    /// What takes how long, against what.
+    pub(super) reason: String,
+    /// By how much it is too long.
+    pub(super) excess: Rational,
+}
+
+/// What an edge of the network comes from.
+#[derive(Clone, Copy)]
+enum Origin<'a> {
+    /// Nothing happens before time 0.
+    Beginning(NodeId),
+    /// The lower bound of a constraint.
+    AtLeast(&'a Constraint),
+    /// The upper bound of a constraint.
+    AtMost(&'a Constraint),
+}
+
+/// The contradiction in the plan's constraints at these values; `None` if there is none.
+pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<Conflict> {
+    let plan = &explainer.plan.plan;
+    let cycle = plan.network(valuation).consistency().err()?;
+    // In the order in which `StnPlan::network` adds them.
+    let mut origins: Vec<Origin<'_>> = plan
+        .nodes()
+        .skip(1)
+        .map(|(node, _)| Origin::Beginning(node))
+        .collect();
+    for constraint in &plan.constraints {
+        if constraint.lower != Bound::Infinite {
+            origins.push(Origin::AtLeast(constraint));
+        }
+        if constraint.upper != Bound::Infinite {
+            origins.push(Origin::AtMost(constraint));
+        }
+    }
+    let mut walked: Vec<Origin<'_>> = cycle
+        .constraints
+        .iter()
+        .map(|id| origins[id.index()])
+        .collect();
+    // Walking a cycle goes back in time along what takes long; people read forwards, from the
+    // first of what must fit to the last.
+    let first_room = walked.iter().position(|o| matches!(o, Origin::AtMost(_)));
+    walked.rotate_left(first_room.unwrap_or(0));
+    let mut needs: Vec<String> = Vec::new();
+    let mut rooms: Vec<String> = Vec::new();
+    for (position, origin) in walked.iter().enumerate() {
+        match origin {
+            Origin::Beginning(_) => {}
+            Origin::AtLeast(constraint) => needs.extend(need(explainer, constraint, valuation)),
+            Origin::AtMost(constraint) => {
+                let next = walked[(position + 1) % walked.len()];
+                rooms.push(room(explainer, constraint, next, valuation));
+            }
+        }
+    }
+    needs.reverse();
+    Some(Conflict {
+        reason: sentence(&needs, &rooms),
+        excess: -cycle.total,
+    })
+}
+
+fn sentence(needs: &[String], rooms: &[String]) -> String {
+    let rooms = rooms.join(", and ");
+    if needs.is_empty() {
+        return rooms;
+    }
+    format!("{rooms}, with {}", needs.join(", "))
+}
+
+/// What takes time because of a lower bound; `None` for mere separations.
+fn need(
+    explainer: &Explainer<'_>,
+    constraint: &Constraint,
+    valuation: &[Rational],
+) -> Option<String> {
+    if let Some(id) = duration_of(explainer, constraint) {
+        return Some(explainer.action_name(id).to_owned());
+    }
+    let least = value(&constraint.lower, valuation)?;
+    if least <= *explainer.epsilon {
+        return None;
+    }
+    let plan = &explainer.plan.plan;
+    Some(if constraint.from == NodeId::ZERO {
+        format!(
+            "{} not before {}",
+            plan.node_words(explainer.task, constraint.to),
+            least.to_decimal(6)
+        )
+    } else {
+        format!(
+            "at least {} from {} to {}",
+            least.to_decimal(6),
+            plan.node_words(explainer.task, constraint.from),
+            plan.node_words(explainer.task, constraint.to),
+        )
+    })
+}
+
+/// What there is to fit into because of an upper bound. `next` follows on the cycle.
+fn room(
+    explainer: &Explainer<'_>,
+    constraint: &Constraint,
+    next: Origin<'_>,
+    valuation: &[Rational],
+) -> String {
+    let plan = &explainer.plan.plan;
+    if let Reason::Timed(index) = constraint.reason {
+        let before = match next {
+            Origin::AtLeast(after) => after.from,
+            Origin::AtMost(_) | Origin::Beginning(_) => constraint.to,
+        };
+        return explainer.deadline(before, index);
+    }
+    if let Some(id) = duration_of(explainer, constraint) {
+        return format!("it must fit into {}", explainer.action_name(id));
+    }
+    let most = value(&constraint.upper, valuation).unwrap_or_default();
+    if constraint.from == NodeId::ZERO {
+        if let Some(deadline) = explainer.deadline_behind(constraint.to, &most) {
+            return deadline;
+        }
+        return format!(
+            "{} must come at {} or before",
+            plan.node_words(explainer.task, constraint.to),
+            most.to_decimal(6)
+        );
+    }
+    format!(
+        "at most {} may pass from {} to {}",
+        most.to_decimal(6),
+        plan.node_words(explainer.task, constraint.from),
+        plan.node_words(explainer.task, constraint.to),
+    )
+}
+
+/// The instance whose duration the constraint bounds.
+fn duration_of(explainer: &Explainer<'_>, constraint: &Constraint) -> Option<InstanceId> {
+    let kind = |node: NodeId| explainer.plan.plan.nodes[node.index()];
+    match (kind(constraint.from), kind(constraint.to)) {
+        (Node::Start(start), Node::End(end)) if start == end => Some(start),
+        _ => None,
+    }
+}
+
+fn value(bound: &Bound, valuation: &[Rational]) -> Option<Rational> {
+    match bound {
+        Bound::Infinite => None,
+        Bound::Finite(value) => Some(value.clone()),
+        Bound::Parameter(id) => Some(valuation[id.index()].clone()),
+    }
+}

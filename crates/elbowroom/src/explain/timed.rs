@@ -1,0 +1,94 @@
+//! Timed initials in words: deadlines, and others.
+
+use elbowroom_model::Footprint;
+use elbowroom_model::ground::{Change, Condition, FactId};
+use elbowroom_num::Rational;
+use elbowroom_plan::{Node, NodeId};
+
+use super::Explainer;
+
+impl Explainer<'_> {
+    /// Why the node must come before the timed initials: `deadline of (open w) at 320.118`.
+    pub(super) fn deadline(&self, node: NodeId, timed: usize) -> String {
+        let time = self.timed_time(timed);
+        match self.lost(node, timed) {
+            Some(fact) => format!("deadline of {} at {time}", self.task.fact_name(fact)),
+            None => format!(
+                "{} must come before {} at {time}",
+                self.plan.plan.node_words(self.task, node),
+                self.timed_change(node, timed),
+            ),
+        }
+    }
+
+    /// The deadline behind a bound that a plan puts on a node's absolute time, if there is one:
+    /// the first timed initial at or after it that takes away what the node needs.
+    pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
+        let (index, timed) = self
+            .task
+            .timed()
+            .iter()
+            .enumerate()
+            .filter(|(_, timed)| timed.time >= *bound)
+            .find(|(index, _)| self.lost(node, *index).is_some())?;
+        if &timed.time - bound > Rational::ONE {
+            return None;
+        }
+        Some(self.deadline(node, index))
+    }
+
+    /// What the timed initials do, as far as it concerns the node: `(open w) becomes false`.
+    pub(super) fn timed_change(&self, node: NodeId, timed: usize) -> String {
+        let changes = &self.task.timed()[timed].changes;
+        let footprint = self.plan.plan.footprint(self.task, node);
+        let concerns = |change: &&Change| match change {
+            Change::Add(fact) | Change::Delete(fact) => {
+                footprint.reads.contains(fact)
+                    || footprint.adds.contains(fact)
+                    || footprint.deletes.contains(fact)
+            }
+            Change::Update { fluent, .. } => {
+                footprint.reads_fluents.contains(fluent)
+                    || footprint.shifts.contains(fluent)
+                    || footprint.assigns.contains(fluent)
+            }
+        };
+        let change = changes.iter().find(concerns).or(changes.first());
+        match change {
+            Some(Change::Add(fact)) => format!("{} becomes true", self.task.fact_name(*fact)),
+            Some(Change::Delete(fact)) => format!("{} becomes false", self.task.fact_name(*fact)),
+            Some(Change::Update { fluent, .. }) => {
+                format!("{} changes", self.task.fluent_name(*fluent))
+            }
+            None => "a timed initial".to_owned(),
+        }
+    }
+
+    /// When the timed initials happen.
+    pub(super) fn timed_time(&self, timed: usize) -> String {
+        self.task.timed()[timed].time.to_decimal(6)
+    }
+
+    /// A fact that the timed initials make false and that is needed at the node, or until then.
+    fn lost(&self, node: NodeId, timed: usize) -> Option<FactId> {
+        let mut needed = self.plan.plan.footprint(self.task, node).reads;
+        if let Node::End(id) = self.plan.plan.nodes[node.index()]
+            && let Some(body) = self.plan.plan.instance(id).action.durative()
+        {
+            needed.extend(self.reads(&body.over_all));
+        }
+        let deleted = self.task.timed()[timed].changes.iter();
+        deleted
+            .filter_map(|change| match change {
+                Change::Delete(fact) => Some(*fact),
+                _ => None,
+            })
+            .find(|fact| needed.contains(fact))
+    }
+
+    fn reads(&self, condition: &Condition) -> impl Iterator<Item = FactId> + use<> {
+        Footprint::of_condition(self.task, condition)
+            .reads
+            .into_iter()
+    }
+}

@@ -1,0 +1,215 @@
+//! From a plan with fixed times to the deviations it survives: the figure in ARCHITECTURE.md,
+//! left to right.
+
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{IrrRun, Oracle, irr};
+use elbowroom_model::validate::{self, Verdict};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder, pin_until_sound};
+use elbowroom_plan::linear::Factor;
+use elbowroom_plan::obligations::{Refusal, Requirement};
+use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
+use elbowroom_plan::soundness::{Broken, Soundness};
+use elbowroom_plan::{DecoupledEnvelope, NodeId, ParametrizedPlan, StnPlan};
+use elbowroom_stn::ConsistentNetwork;
+
+/// What to leave open, and how to search.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The least separation of interfering happenings (ε); positive.
+    pub epsilon: Rational,
+    /// What to leave open; all durations if empty.
+    pub vary: Vec<VarySpec>,
+    /// How to search.
+    pub search: elbowroom_envelope::Settings,
+}
+
+impl Default for Settings {
+    /// ε = 0.001, all durations, precision 1.
+    fn default() -> Self {
+        Self {
+            epsilon: Rational::new(1, 1000),
+            vary: Vec::new(),
+            search: elbowroom_envelope::Settings::default(),
+        }
+    }
+}
+
+/// A plan with its envelope, and how it was found.
+#[derive(Clone, Debug)]
+pub struct RobustPlan {
+    /// The plan, with what is left open.
+    pub plan: ParametrizedPlan,
+    /// The envelope.
+    pub run: IrrRun,
+}
+
+/// A plan that leaves no room to compute with.
+#[derive(Debug, thiserror::Error)]
+pub enum FlowError {
+    /// The judge rejects the plan.
+    #[error("the plan is not valid: {0}")]
+    Invalid(Box<validate::Violation>),
+    /// The plan has no order.
+    #[error(transparent)]
+    Deorder(#[from] DeorderError),
+    /// Something cannot be left open.
+    #[error(transparent)]
+    Parametrize(#[from] ParametrizeError),
+    /// The plan is beyond exact analysis.
+    #[error("this plan is beyond what can be analysed exactly: {0}")]
+    Refused(#[from] Refusal),
+}
+
+/// From a plan with fixed times to the deviations it survives.
+///
+/// # Errors
+/// When the plan is not valid, when `settings.vary` names what the plan does not have, and when
+/// the plan is beyond exact analysis.
+pub fn robust_plan(
+    task: &Task,
+    time_triggered: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> Result<RobustPlan, FlowError> {
+    let stn_plan = free(task, time_triggered, &settings.epsilon)?;
+    let plan = open(task, stn_plan, &settings.vary, &settings.epsilon)?;
+    let mut oracle = Oracle::new(task, &plan, &settings.epsilon)?;
+    let run = irr(&mut oracle, &settings.search, &mut |_| {
+        ControlFlow::Continue(())
+    })?;
+    Ok(RobustPlan { plan, run })
+}
+
+/// The plan with only the orderings and bounds that it needs.
+///
+/// Planners round their times, and the judge forgives nothing. If it rejects the plan, but the
+/// plan's order leaves a schedule that it accepts, that schedule is taken in place of the plan's.
+///
+/// # Errors
+/// When the judge rejects the plan.
+pub fn free(
+    task: &Task,
+    time_triggered: &TimeTriggeredPlan,
+    epsilon: &Rational,
+) -> Result<Deordered, FlowError> {
+    let settings = deorder::Settings {
+        epsilon: epsilon.clone(),
+    };
+    let Verdict::Invalid(violation) = judge(task, time_triggered, epsilon) else {
+        return Ok(deorder(task, time_triggered, &settings)?);
+    };
+    match deorder(task, time_triggered, &settings) {
+        Ok(freed) if judge(task, &freed.plan.scheduled(&freed.nominal), epsilon).is_valid() => {
+            Ok(freed)
+        }
+        _ => Err(FlowError::Invalid(Box::new(violation))),
+    }
+}
+
+/// The plan with quantities left open; all durations, if nothing is specified. Where needed,
+/// differences of times are fixed so that every schedule works as long as these quantities keep
+/// their nominal values.
+///
+/// # Errors
+/// When `specs` names what the plan does not have.
+pub fn open(
+    task: &Task,
+    freed: Deordered,
+    specs: &[VarySpec],
+    epsilon: &Rational,
+) -> Result<ParametrizedPlan, FlowError> {
+    let plan = parametrize(task, freed.plan, &freed.nominal, specs)?;
+    Ok(pinned(task, plan, &freed.nominal, epsilon))
+}
+
+/// An STN plan, which may have parameters already, with more left open.
+///
+/// # Errors
+/// When `specs` names what the plan does not have.
+pub fn open_more(
+    task: &Task,
+    plan: ParametrizedPlan,
+    specs: &[VarySpec],
+) -> Result<ParametrizedPlan, ParametrizeError> {
+    if specs.is_empty() {
+        return Ok(plan);
+    }
+    let network = plan.plan.network(&plan.nominal());
+    // Without a schedule there is no answer either, which will be said with its reason.
+    let Ok(network) = ConsistentNetwork::try_from(network) else {
+        return Ok(plan);
+    };
+    let schedule = network.earliest_schedule(elbowroom_plan::network_node(NodeId::ZERO));
+    vary(task, plan, schedule.times(), specs)
+}
+
+/// The plan with as few differences fixed as it takes for every nominal schedule to work. If even
+/// that does not help, the plan as it is: the box check will say what is wrong with it.
+fn pinned(
+    task: &Task,
+    plan: ParametrizedPlan,
+    nominal: &[Rational],
+    epsilon: &Rational,
+) -> ParametrizedPlan {
+    let given = plan.plan.constraints.len();
+    let with_pins = |fixed: &StnPlan| {
+        let mut candidate = plan.clone();
+        let pins = fixed.constraints[given..].iter().cloned();
+        candidate.plan.constraints.extend(pins);
+        candidate
+    };
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let mut is_refused = false;
+    let mut oracle = |fixed: &StnPlan| {
+        let candidate = with_pins(fixed);
+        let broken = Soundness::new(task, &candidate, epsilon)
+            .and_then(|mut soundness| soundness.broken(&point, None));
+        is_refused |= broken.is_err();
+        let broken = broken.ok().flatten()?;
+        Some(nodes_of(&broken, candidate.plan.nodes.len()))
+    };
+    let fixed = pin_until_sound(plan.plan.at(&plan.nominal()), nominal, &mut oracle);
+    match fixed {
+        Some(fixed) if !is_refused => with_pins(&fixed),
+        _ => plan,
+    }
+}
+
+/// The time points that a broken obligation is about.
+fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
+    let differences = broken.case.differences.iter();
+    let mut nodes: Vec<NodeId> = differences
+        .flat_map(|difference| [difference.from, difference.to])
+        .collect();
+    for inequality in &broken.case.inequalities {
+        let expression = &inequality.expression;
+        nodes.extend(expression.times.keys());
+        nodes.extend(
+            expression
+                .products
+                .keys()
+                .filter_map(|(_, factor)| match factor {
+                    Factor::Time(node) => Some(*node),
+                    Factor::Parameter(_) => None,
+                }),
+        );
+    }
+    // The moment inside an over-all condition is no node of the plan.
+    nodes.retain(|node| node.index() < count);
+    if let Requirement::Condition { node, .. } | Requirement::Defined { node, .. } =
+        broken.requirement
+    {
+        nodes.push(node);
+    }
+    nodes
+}
+
+fn judge(task: &Task, plan: &TimeTriggeredPlan, epsilon: &Rational) -> Verdict {
+    let settings = validate::Settings {
+        epsilon: Some(epsilon.clone()),
+        ..validate::Settings::default()
+    };
+    validate::validate(task, plan, &settings)
+}

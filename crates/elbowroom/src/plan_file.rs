@@ -1,0 +1,54 @@
+//! Which kind of plan a text is.
+
+/// The two kinds of plan that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanKind {
+    /// Actions with fixed times: `0.000: (drive rover depot shelf) [10.000]`.
+    TimeTriggered,
+    /// An STN plan file: action instances and constraints.
+    Stn,
+}
+
+impl PlanKind {
+    /// Tells the kind of a plan by its content.
+    ///
+    /// An STN plan file declares action instances (`durative-action instance n0 : …`), which no
+    /// line of a planner's output looks like. A text with neither is a plan with fixed times: the
+    /// empty plan is one.
+    pub fn of_text(text: &str) -> Self {
+        let is_declaration = |line: &str| {
+            let mut words = line.split_ascii_whitespace();
+            let (first, second) = (words.next(), words.next());
+            matches!(first, Some("durative-action" | "action")) && second == Some("instance")
+        };
+        if text.split(['\n', '\r', ';']).any(is_declaration) {
+            Self::Stn
+        } else {
+            Self::TimeTriggered
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PlanKind;
+
+    #[test]
+    fn a_plan_is_known_by_its_content() {
+        let kind = PlanKind::of_text;
+        assert_eq!(kind("0.0: (go a) [1]\n"), PlanKind::TimeTriggered);
+        assert_eq!(kind(""), PlanKind::TimeTriggered);
+        assert_eq!(
+            kind("; an action instance\n0: (action instance) [1]"),
+            PlanKind::TimeTriggered
+        );
+        assert_eq!(
+            kind("# a file\nparameter p;durative-action  instance n0 : (go a);"),
+            PlanKind::Stn
+        );
+        assert_eq!(
+            kind("\u{0}\u{fffd}garbage (action instance)"),
+            PlanKind::TimeTriggered
+        );
+    }
+}

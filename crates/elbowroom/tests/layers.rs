@@ -1,0 +1,156 @@
+//! Which crates of the workspace each crate may import.
+//!
+//! Cargo forbids circles between crates but not a wrong direction; this table does. It is the
+//! table of ARCHITECTURE.md: change both together, and give the reason there.
+//!
+//! `[dependencies]`, `[build-dependencies]` and their `[target.….…]` forms count. So does what a
+//! crate imports under another name. `[dev-dependencies]` do not: a test may look upwards, because
+//! nobody who uses the crate gets its tests.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+/// Each crate, by folder, with those it may import. Lowest first.
+const LAYERS: &[(&str, &[&str])] = &[
+    ("num", &[]),
+    ("model", &["num"]),
+    ("stn", &["num"]),
+    ("pddl", &["num", "model"]),
+    ("plan", &["num", "model", "stn"]),
+    ("envelope", &["num", "model", "stn", "plan"]),
+    (
+        "elbowroom",
+        &["num", "model", "stn", "pddl", "plan", "envelope"],
+    ),
+    ("cli", &["elbowroom"]),
+];
+
+#[test]
+fn crates_import_only_what_their_layer_allows() {
+    for (name, allowed) in LAYERS {
+        let violations = forbidden_imports(&manifest_of(name), allowed);
+        assert!(
+            violations.is_empty(),
+            "`{name}` must not import {violations:?}; it may import {allowed:?}"
+        );
+    }
+}
+
+#[test]
+fn the_table_names_exactly_the_members_of_the_workspace() {
+    let root = read(&workspace().join("Cargo.toml"));
+    let members: BTreeSet<_> = root["workspace"]["members"]
+        .as_array()
+        .expect("a list of members")
+        .iter()
+        .filter_map(|member| member.as_str()?.strip_prefix("crates/"))
+        .collect();
+    let table: BTreeSet<_> = LAYERS.iter().map(|(name, _)| *name).collect();
+    assert_eq!(members, table);
+}
+
+#[test]
+fn the_table_goes_upwards_only() {
+    for (position, (name, allowed)) in LAYERS.iter().enumerate() {
+        for import in *allowed {
+            assert!(
+                LAYERS[..position].iter().any(|(lower, _)| lower == import),
+                "`{import}` must stand above `{name}` in the table"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_forbidden_import_is_found_wherever_it_is_written() {
+    let forbidden = |manifest: &str| {
+        let manifest: Table = manifest.parse().expect("a manifest");
+        forbidden_imports(&manifest, &["num"])
+    };
+    let clean = "
+        [dependencies]
+        elbowroom-num.workspace = true
+        serde = '1'
+        [dev-dependencies]
+        elbowroom-envelope.workspace = true
+    ";
+    assert_eq!(forbidden(clean), [""; 0]);
+    assert_eq!(
+        forbidden("[dependencies]\nelbowroom-stn.workspace = true"),
+        ["stn"]
+    );
+    assert_eq!(
+        forbidden("[build-dependencies]\nelbowroom-plan = { path = '../plan' }"),
+        ["plan"]
+    );
+    assert_eq!(
+        forbidden("[target.'cfg(unix)'.dependencies]\nelbowroom-pddl.workspace = true"),
+        ["pddl"]
+    );
+    assert_eq!(
+        forbidden("[dependencies]\nnetworks = { package = 'elbowroom-stn', path = '../stn' }"),
+        ["stn"]
+    );
+    assert_eq!(
+        forbidden("[dependencies]\nelbowroom.workspace = true"),
+        ["elbowroom"]
+    );
+}
+
+/// The crates of this workspace that a manifest imports although `allowed` does not list them.
+fn forbidden_imports(manifest: &Table, allowed: &[&str]) -> Vec<String> {
+    imports_of(manifest)
+        .into_iter()
+        .filter(|import| !allowed.contains(&import.as_str()))
+        .collect()
+}
+
+/// The folders of the workspace's crates that a manifest imports.
+fn imports_of(manifest: &Table) -> BTreeSet<String> {
+    let mut sections = vec![manifest];
+    if let Some(targets) = manifest.get("target").and_then(Value::as_table) {
+        sections.extend(targets.values().filter_map(Value::as_table));
+    }
+    sections
+        .iter()
+        .flat_map(|section| {
+            ["dependencies", "build-dependencies"].map(|kind| section.get(kind)?.as_table())
+        })
+        .flatten()
+        .flatten()
+        .filter_map(|(key, dependency)| {
+            let renamed = dependency.get("package").and_then(Value::as_str);
+            folder(renamed.unwrap_or(key))
+        })
+        .collect()
+}
+
+/// The folder of a package of this workspace; `None` for packages from elsewhere.
+fn folder(package: &str) -> Option<String> {
+    match package {
+        "elbowroom" => Some(package.to_owned()),
+        _ => package.strip_prefix("elbowroom-").map(str::to_owned),
+    }
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn manifest_of(name: &str) -> Table {
+    let manifest = read(&workspace().join("crates").join(name).join("Cargo.toml"));
+    let package = manifest["package"]["name"]
+        .as_str()
+        .expect("a package name");
+    assert_eq!(folder(package).as_deref(), Some(name));
+    manifest
+}
+
+fn read(path: &Path) -> Table {
+    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    text.parse()
+        .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}

@@ -1,0 +1,173 @@
+//! Moving the ends of a box onto their limits.
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::{End, Rational};
+use elbowroom_plan::obligations::Refusal;
+use elbowroom_plan::reduction::{BoxEnd, Side};
+use elbowroom_plan::{DecoupledEnvelope, ParameterId};
+
+use crate::oracle::Oracle;
+
+/// What may be left between an end and its limit where the limit is not found exactly: 10⁻¹².
+const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
+
+/// The box with each end moved out until it touches its limit: upper before lower, parameter by
+/// parameter, each as far as those before it allow.
+///
+/// A limit is a fraction, mostly one with a small denominator. Halving encloses it; the simplest
+/// fraction that is enclosed is tried as well, and is the limit as soon as no simpler one is left.
+/// What is returned lies inside the envelope in any case, and less than 10⁻¹² from the limit.
+///
+/// `envelope` must lie inside the robustness envelope. `on_step` is called after every check and
+/// can end the work at any moment.
+///
+/// # Errors
+/// When there are too many cases to tell apart.
+pub fn sharpen(
+    oracle: &mut Oracle<'_>,
+    envelope: &DecoupledEnvelope,
+    on_step: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<DecoupledEnvelope, Refusal> {
+    let mut envelope = envelope.clone();
+    // From here on the oracle's last accepted box is `envelope`.
+    oracle.objection(&envelope)?;
+    for index in 0..oracle.plan().parameters.len() {
+        for side in [Side::Upper, Side::Lower] {
+            let end = BoxEnd {
+                parameter: ParameterId::from(index),
+                side,
+            };
+            if push(oracle, &mut envelope, end, on_step)?.is_break() {
+                return Ok(envelope);
+            }
+        }
+    }
+    Ok(envelope)
+}
+
+/// Moves one end out to its limit.
+fn push(
+    oracle: &mut Oracle<'_>,
+    envelope: &mut DecoupledEnvelope,
+    end: BoxEnd,
+    on_step: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<ControlFlow<()>, Refusal> {
+    let Some(mut inside) = end.reach(envelope) else {
+        return Ok(ControlFlow::Continue(()));
+    };
+    let border = border(oracle, end);
+    if border.as_ref() == Some(&inside) {
+        return Ok(ControlFlow::Continue(()));
+    }
+    let mut accepts = |reach: Option<Rational>| -> Result<bool, Refusal> {
+        let candidate = end.with_reach(envelope, reach);
+        let is_inside = oracle.objection_after(&candidate, Some(end))?.is_none();
+        if is_inside {
+            *envelope = candidate;
+        }
+        Ok(is_inside)
+    };
+    if accepts(border.clone())? {
+        return Ok(on_step());
+    }
+    let mut outside = match border {
+        Some(border) => border,
+        None => {
+            // Something stops it: go out until there.
+            let mut step = Rational::ONE;
+            loop {
+                let farther = &inside + &step;
+                if !accepts(Some(farther.clone()))? {
+                    break farther;
+                }
+                inside = farther;
+                step = &step + &step;
+                if on_step().is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+        }
+    };
+    let resolution = Rational::new(RESOLUTION.0, RESOLUTION.1);
+    let half = Rational::new(1, 2);
+    let mut halve = true;
+    while &outside - &inside > resolution {
+        let candidate = if halve {
+            &(&inside + &outside) * &half
+        } else {
+            simplest_between(&inside, &outside)
+        };
+        halve = !halve;
+        if accepts(Some(candidate.clone()))? {
+            inside = candidate;
+        } else {
+            outside = candidate;
+        }
+        if on_step().is_break() {
+            return Ok(ControlFlow::Break(()));
+        }
+    }
+    Ok(ControlFlow::Continue(()))
+}
+
+/// How far out the parameter's range goes; `None` if infinitely far.
+fn border(oracle: &Oracle<'_>, end: BoxEnd) -> Option<Rational> {
+    let range = &oracle.plan().parameter(end.parameter).range;
+    match (end.side, &range.lower, &range.upper) {
+        (Side::Lower, End::Closed(lower) | End::Open(lower), _) => Some(-lower),
+        (Side::Upper, _, End::Closed(upper) | End::Open(upper)) => Some(upper.clone()),
+        _ => None,
+    }
+}
+
+/// The fraction with the smallest denominator strictly between two numbers, `low < high`.
+fn simplest_between(low: &Rational, high: &Rational) -> Rational {
+    if low.is_negative() {
+        if high.is_positive() {
+            return Rational::ZERO;
+        }
+        return -simplest_between(&-high, &-low);
+    }
+    let whole = low.floor();
+    let next = &whole + &Rational::ONE;
+    if next < *high {
+        return next;
+    }
+    // Both lie between `whole` and `next`: compare the reciprocals of what is left.
+    let (low, high) = (low - &whole, high - &whole);
+    let least = high
+        .reciprocal()
+        .expect("greater than `low`, which is not negative");
+    let fraction = match low.reciprocal() {
+        Some(most) => simplest_between(&least, &most),
+        None => &least.floor() + &Rational::ONE,
+    };
+    &whole
+        + &fraction
+            .reciprocal()
+            .expect("greater than `least`, which is positive")
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_num::Rational;
+
+    use super::simplest_between;
+
+    #[test]
+    fn the_simplest_fraction_has_the_smallest_denominator() {
+        let between = |low: &str, high: &str| {
+            let number = |text: &str| text.parse::<Rational>().unwrap();
+            simplest_between(&number(low), &number(high)).to_string()
+        };
+        assert_eq!(between("0", "5"), "1");
+        assert_eq!(between("-1", "1"), "0");
+        assert_eq!(between("0", "1"), "1/2");
+        assert_eq!(between("0", "1/3"), "1/4");
+        assert_eq!(between("2.49", "2.51"), "5/2");
+        assert_eq!(between("39.997999", "39.998001"), "19999/500");
+        assert_eq!(between("-3.2", "-3.1"), "-19/6");
+        assert_eq!(between("3.1415", "3.1416"), "333/106");
+    }
+}

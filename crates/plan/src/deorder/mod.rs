@@ -1,0 +1,194 @@
+//! From a plan with fixed times to one that leaves as much room as is easy: [`deorder`].
+//!
+//! Also called *lifting to a partial order*, and in `ROSPlan` the ESTEREL transformation.
+//!
+//! What makes the result sound is that whatever a happening reads was written by the same
+//! happenings as in the original plan:
+//!
+//! - Interfering happenings keep their order, at least ε apart. Timed initials take part, so
+//!   deadlines become constraints.
+//! - A happening that writes what an over-all condition reads stays on its side of the action's
+//!   start and of its end. What an over-all condition sees is the open interval between them, so
+//!   falling together with start or end does no harm: at the start, the write comes first, as a
+//!   condition over the interval sees only what is true after the start; at the end it comes
+//!   last.
+//! - Rates of continuous effects and conditions of conditional ones are treated like over-all
+//!   conditions.
+//! - Timed initials that change what the goal reads stay on their side of the plan's end.
+//! - A duration obeys its domain rather than the planner's number; where the domain's bounds
+//!   depend on values that depend on the schedule, it stays as it was.
+//!
+//! Conditions on numbers that change continuously, or by amounts that depend on durations, can
+//! still fail in some schedules. [`pin_until_sound`] is for those.
+
+mod durations;
+mod goal;
+mod implied;
+mod order;
+mod over_all;
+mod pin;
+
+use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_stn::ConsistentNetwork;
+
+pub use implied::without_implied;
+pub use pin::{pin_until_sound, pinned_to};
+
+use crate::network::{Schedule, network_node};
+use crate::stn_plan::{Instance, Node, NodeId, StnPlan};
+use order::{Order, Timeline};
+
+/// How to deorder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The least separation of interfering happenings (ε); positive.
+    pub epsilon: Rational,
+}
+
+impl Default for Settings {
+    /// One thousandth.
+    fn default() -> Self {
+        Self {
+            epsilon: Rational::new(1, 1000),
+        }
+    }
+}
+
+/// A plan with room, and a schedule of it: the original one, if it is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deordered {
+    /// The plan; its instances are labelled `n0`, `n1`, … in order of their start.
+    pub plan: StnPlan,
+    /// The times of the original plan. Where they do not satisfy the constraints, because they
+    /// were rounded, times close to them that do.
+    pub nominal: Schedule,
+}
+
+/// A plan cannot be deordered, because it is not valid.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DeorderError {
+    /// Two interfering happenings have no order.
+    #[error("{first} and {second} interfere, but both happen at {time}")]
+    Simultaneous {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+        /// When.
+        time: String,
+    },
+    /// No times satisfy the constraints that keep the plan's order.
+    #[error(
+        "the order of the plan leaves no schedule: between {}, interfering happenings cannot all \
+         be {epsilon} apart",
+        nodes.join(", ")
+    )]
+    NoSchedule {
+        /// The happenings whose constraints contradict each other.
+        nodes: Vec<String>,
+        /// The least separation.
+        epsilon: String,
+    },
+}
+
+/// Finds out which of a valid plan's happenings need to keep their order.
+///
+/// # Errors
+/// When the plan is not valid, as far as that shows here; ask the judge first.
+pub fn deorder(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> Result<Deordered, DeorderError> {
+    let (mut stn_plan, times) = labelled(task, plan);
+    let footprints: Vec<Footprint> = stn_plan
+        .nodes()
+        .map(|(node, _)| stn_plan.footprint(task, node))
+        .collect();
+    let timeline = Timeline::new(&times, &footprints);
+    let mut order = Order::default();
+    timeline
+        .interference(&stn_plan, &settings.epsilon, &mut order)
+        .map_err(|(first, second)| DeorderError::Simultaneous {
+            first: stn_plan.node_words(task, first),
+            second: stn_plan.node_words(task, second),
+            time: times[first.index()].to_decimal(6),
+        })?;
+    over_all::order(task, &stn_plan, &timeline, &mut order);
+    goal::order(task, &stn_plan, &times, &settings.epsilon, &mut order);
+    stn_plan
+        .constraints
+        .extend(durations::constraints(task, &stn_plan, &times));
+    stn_plan.constraints.extend(order.into_constraints());
+    let nominal = nominal(task, &stn_plan, times, settings)?;
+    Ok(Deordered {
+        plan: without_implied(stn_plan),
+        nominal,
+    })
+}
+
+/// The plan without order, and the time that each of its nodes has in the original.
+fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> (StnPlan, Schedule) {
+    let mut steps: Vec<_> = plan.steps.iter().collect();
+    steps.sort_by(|a, b| a.start.cmp(&b.start));
+    let instances = steps
+        .iter()
+        .enumerate()
+        .map(|(index, step)| Instance {
+            label: format!("n{index}"),
+            action: step.action.clone(),
+        })
+        .collect();
+    let stn_plan = StnPlan::unconstrained(task, instances);
+    let times = stn_plan
+        .nodes
+        .iter()
+        .map(|node| match *node {
+            Node::Zero => Rational::ZERO,
+            Node::Start(id) | Node::Instant(id) => steps[id.index()].start.clone(),
+            Node::End(id) => steps[id.index()].end(),
+            Node::Timed(index) => task.timed()[index].time.clone(),
+        })
+        .collect();
+    (stn_plan, times)
+}
+
+/// The original times, or the earliest that start nothing sooner than the original does, as far
+/// as that is possible.
+fn nominal(
+    task: &Task,
+    plan: &StnPlan,
+    times: Schedule,
+    settings: &Settings,
+) -> Result<Schedule, DeorderError> {
+    let network = plan.network(&[]);
+    let original = elbowroom_stn::Schedule::new(times);
+    if original.holds_in(&network) {
+        return Ok(original.times().to_vec());
+    }
+    let mut network =
+        ConsistentNetwork::try_from(network.clone()).map_err(|cycle| DeorderError::NoSchedule {
+            nodes: cycle
+                .constraints
+                .iter()
+                .map(|&id| NodeId(network.constraint(id).to.0))
+                .filter(|&node| node != NodeId::ZERO)
+                .map(|node| plan.node_words(task, node))
+                .collect(),
+            epsilon: settings.epsilon.to_string(),
+        })?;
+    let zero = network_node(NodeId::ZERO);
+    for (node, what) in plan.nodes() {
+        if matches!(what, Node::Start(_) | Node::Instant(_)) {
+            let time = original[network_node(node)].clone();
+            let start = elbowroom_stn::Constraint::at_least(zero, network_node(node), time);
+            // If it cannot start so late, something else will have to give way.
+            let _ = network.add(start);
+        }
+    }
+    Ok(network.earliest_schedule(zero).times().to_vec())
+}
+
+#[cfg(test)]
+mod tests;

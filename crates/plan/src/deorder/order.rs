@@ -1,0 +1,195 @@
+//! Which happenings interfere, fact by fact and fluent by fluent.
+//!
+//! What a happening does to one fact or fluent is its *use* of it. Uses of the same kind commute,
+//! except assignments; all others interfere. So the uses of one fact, in order of time, fall into
+//! runs of commuting ones, and it is enough to keep each run after the one before it: the rest
+//! follows. That makes about as many constraints as uses, where pairs would make their square.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Footprint;
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_num::Rational;
+
+use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
+
+/// Constraints `to - from >= distance`, the strongest for each pair.
+#[derive(Debug, Default)]
+pub(super) struct Order {
+    distances: BTreeMap<(NodeId, NodeId), (Rational, Reason)>,
+}
+
+impl Order {
+    /// Demands that `to` come at least `distance` after `from`.
+    pub(super) fn demand(&mut self, from: NodeId, to: NodeId, distance: Rational, reason: Reason) {
+        if from == to {
+            return;
+        }
+        let known = self.distances.get(&(from, to));
+        if known.is_none_or(|(known, _)| *known < distance) {
+            self.distances.insert((from, to), (distance, reason));
+        }
+    }
+
+    /// Whether some node is demanded to come after this one.
+    pub(super) fn has_successor(&self, node: NodeId) -> bool {
+        let from_node = (node, NodeId(0))..=(node, NodeId(u32::MAX));
+        self.distances.range(from_node).next().is_some()
+    }
+
+    /// The constraints, by nodes.
+    pub(super) fn into_constraints(self) -> impl Iterator<Item = Constraint> {
+        self.distances
+            .into_iter()
+            .map(|((from, to), (distance, reason))| Constraint {
+                from,
+                to,
+                lower: Bound::Finite(distance),
+                upper: Bound::Infinite,
+                reason,
+            })
+    }
+}
+
+/// A fact or a fluent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Quantity {
+    Fact(FactId),
+    Fluent(FluentId),
+}
+
+/// What happenings do to a quantity; a set of bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Use(u8);
+
+impl Use {
+    const READ: u8 = 1;
+    /// Makes a fact true, increases or decreases a fluent.
+    const ADD: u8 = 2;
+    /// Makes a fact false.
+    const DELETE: u8 = 4;
+    /// Changes a fluent in any other way.
+    const ASSIGN: u8 = 8;
+
+    fn writes(self) -> bool {
+        self.0 != Self::READ
+    }
+
+    /// Whether two uses may fall together in either order.
+    fn commutes_with(self, other: Self) -> bool {
+        self == other && matches!(self.0, Self::READ | Self::ADD | Self::DELETE)
+    }
+}
+
+/// The uses of each quantity in order of time.
+pub(super) struct Timeline<'a> {
+    times: &'a [Rational],
+    uses: BTreeMap<Quantity, Vec<(NodeId, Use)>>,
+}
+
+impl<'a> Timeline<'a> {
+    /// `times` and `footprints` are by node.
+    pub(super) fn new(times: &'a [Rational], footprints: &[Footprint]) -> Self {
+        let mut nodes: Vec<NodeId> = (0..times.len()).map(NodeId::from).collect();
+        nodes.sort_by(|a, b| times[a.index()].cmp(&times[b.index()]));
+        let mut uses: BTreeMap<Quantity, Vec<(NodeId, Use)>> = BTreeMap::new();
+        for node in nodes {
+            for (quantity, bits) in uses_of(&footprints[node.index()]) {
+                uses.entry(quantity).or_default().push((node, Use(bits)));
+            }
+        }
+        Self { times, uses }
+    }
+
+    /// The time of a node.
+    pub(super) fn time(&self, node: NodeId) -> &Rational {
+        &self.times[node.index()]
+    }
+
+    /// Demands that interfering happenings keep their order.
+    ///
+    /// On failure, two of them that have none.
+    pub(super) fn interference(
+        &self,
+        plan: &StnPlan,
+        epsilon: &Rational,
+        order: &mut Order,
+    ) -> Result<(), (NodeId, NodeId)> {
+        let is_fixed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
+        for uses in self.uses.values() {
+            let runs = runs(uses);
+            for (first, second) in runs.iter().zip(runs.iter().skip(1)) {
+                for &from in first {
+                    for &to in second {
+                        if self.time(from) == self.time(to) {
+                            return Err((from, to));
+                        }
+                        if !(is_fixed(from) && is_fixed(to)) {
+                            order.demand(from, to, epsilon.clone(), Reason::Interference);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The writers of a quantity in order of time.
+    pub(super) fn writers(&self, quantity: Quantity) -> Vec<Writer> {
+        let uses = self.uses.get(&quantity).into_iter().flatten();
+        let writers: Vec<_> = uses.copied().filter(|(_, what)| what.writes()).collect();
+        let in_run = |(run, nodes): (usize, Vec<NodeId>)| {
+            nodes.into_iter().map(move |node| Writer { node, run })
+        };
+        runs(&writers)
+            .into_iter()
+            .enumerate()
+            .flat_map(in_run)
+            .collect()
+    }
+}
+
+/// A happening that changes a quantity, and the number of its run of commuting ones.
+pub(super) struct Writer {
+    pub(super) node: NodeId,
+    pub(super) run: usize,
+}
+
+/// Cuts a sequence of uses where neighbours do not commute.
+fn runs(uses: &[(NodeId, Use)]) -> Vec<Vec<NodeId>> {
+    uses.chunk_by(|(_, a), (_, b)| a.commutes_with(*b))
+        .map(|run| run.iter().map(|&(node, _)| node).collect())
+        .collect()
+}
+
+/// What the footprint does to each quantity in it.
+fn uses_of(footprint: &Footprint) -> BTreeMap<Quantity, u8> {
+    let mut uses = BTreeMap::new();
+    let mut note = |quantity: Quantity, bit: u8| *uses.entry(quantity).or_default() |= bit;
+    for (facts, bit) in [
+        (&footprint.reads, Use::READ),
+        (&footprint.adds, Use::ADD),
+        (&footprint.deletes, Use::DELETE),
+    ] {
+        for &fact in facts {
+            note(Quantity::Fact(fact), bit);
+        }
+    }
+    for (fluents, bit) in [
+        (&footprint.reads_fluents, Use::READ),
+        (&footprint.shifts, Use::ADD),
+        (&footprint.assigns, Use::ASSIGN),
+    ] {
+        for &fluent in fluents {
+            note(Quantity::Fluent(fluent), bit);
+        }
+    }
+    uses
+}
+
+/// What the footprint reads.
+pub(super) fn read_by(footprint: &Footprint) -> impl Iterator<Item = Quantity> + '_ {
+    let facts = footprint.reads.iter().map(|&fact| Quantity::Fact(fact));
+    let fluents = footprint.reads_fluents.iter();
+    facts.chain(fluents.map(|&fluent| Quantity::Fluent(fluent)))
+}
