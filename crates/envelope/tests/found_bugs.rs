@@ -101,3 +101,19 @@ fn a_fact_deleted_and_added_at_once_stays_true_inside_an_action() {
     };
     assert_eq!(given.answer(""), "inside");
 }
+
+#[test]
+fn a_proof_about_a_multiplied_parameter_holds_for_its_own_box_only() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action fill :parameters () :duration (= ?duration 3)
+                    :condition (over all (<= (x) 8)) :effect (increase (x) (* #t ?s)))",
+        plan: "parameter ?s default 1; durative-action instance n : (fill);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answers(&["[1, 1]", "[1, 2]"]),
+        ["inside", "(fill) needs (<= (x) 8) throughout"]
+    );
+}

@@ -213,7 +213,7 @@ impl DirectCase {
         };
         proofs.iter().all(|proof| match moved {
             Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
-            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
+            None => proof.holds_in(envelope, None),
         })
     }
 }
