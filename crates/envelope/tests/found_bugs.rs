@@ -117,3 +117,17 @@ fn a_proof_about_a_multiplied_parameter_holds_for_its_own_box_only() {
         ["inside", "(fill) needs (<= (x) 8) throughout"]
     );
 }
+
+#[test]
+fn a_parameter_on_two_constraints_may_grow_for_ever() {
+    let given = Given {
+        domain: "(:action first :parameters () :precondition (and) :effect (and))
+                 (:action second :parameters () :precondition (and) :effect (and))",
+        plan: "parameter g default 5;
+               action instance a : (first); action instance b : (second);
+               c: b - a in [-inf, g]; c: b - .zero in [-inf, g];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer("[5, inf]"), "inside");
+    assert_eq!(given.answer("[-inf, 5]"), "no schedule");
+}
