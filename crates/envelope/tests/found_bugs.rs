@@ -131,3 +131,22 @@ fn a_parameter_on_two_constraints_may_grow_for_ever() {
     assert_eq!(given.answer("[5, inf]"), "inside");
     assert_eq!(given.answer("[-inf, 5]"), "no schedule");
 }
+
+#[test]
+fn a_counterexample_to_separation_has_the_happenings_close_together() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(p)",
+        plan: "action instance s : (set); action instance l : (look);
+               c: s - .zero in [2, inf];",
+        ..Given::default()
+    };
+    let (task, plan) = given.task_and_plan();
+    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+    let Some(Objection::Broken(broken)) = oracle.objection(&envelope("")).unwrap() else {
+        panic!("they may come at the same time");
+    };
+    let found = oracle.counterexample(&envelope(""), &broken).unwrap();
+    assert!((&found.schedule[1] - &found.schedule[2]).abs() < Rational::new(1, 4));
+}
