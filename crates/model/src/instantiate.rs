@@ -6,10 +6,11 @@ use elbowroom_num::Rational;
 
 use crate::ground::{self, FactId, FluentId};
 use crate::problem::{
-    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, Term, TimedChange,
+    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, TimedChange,
     UpdateOperator, Variable,
 };
 use crate::task::{GroundRule, InstantiateError, Task, TimedHappening};
+use crate::terms::{resolve, with_arguments};
 
 /// What is known beforehand, so that quantifiers need not be expanded in full.
 pub(crate) trait Foreknowledge {
@@ -395,31 +396,4 @@ fn is_known_to_fail(
     [&guard.at_start, &guard.over_all, &guard.now]
         .into_iter()
         .any(|part| known.truth(part, binding) == Some(false))
-}
-
-/// The object that a term stands for.
-pub(crate) fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
-    match term {
-        Term::Variable(position) => binding[position],
-        Term::Object(object) => object,
-    }
-}
-
-/// Calls `action` with the objects that the terms stand for.
-pub(crate) fn with_arguments<R>(
-    terms: &[Term],
-    binding: &[ObjectId],
-    action: impl FnOnce(&[ObjectId]) -> R,
-) -> R {
-    // Nearly all predicates are this short; then nothing is allocated.
-    let mut short = [ObjectId(0); 6];
-    if let Some(short) = short.get_mut(..terms.len()) {
-        for (place, &term) in short.iter_mut().zip(terms) {
-            *place = resolve(term, binding);
-        }
-        action(short)
-    } else {
-        let long: Vec<_> = terms.iter().map(|&term| resolve(term, binding)).collect();
-        action(&long)
-    }
 }

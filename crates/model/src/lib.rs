@@ -28,6 +28,7 @@ pub mod problem;
 pub mod reachability;
 mod simplify;
 mod task;
+mod terms;
 pub mod validate;
 
 pub use interference::Footprint;

@@ -49,6 +49,12 @@ fn nothing_need_be_said_about_conditions_and_effects() {
 }
 
 #[test]
+fn a_disjunction_keeps_a_part_that_always_holds() {
+    assert_snapshot!(only_action("(:action a :precondition (or (and) (lit)))"), @"condition (or (and) (lit))");
+    assert_snapshot!(only_action("(:action a :precondition (or))"), @"condition (or)");
+}
+
+#[test]
 fn names_compare_without_case() {
     let action = only_action("(:ACTION A :Parameters (?B - BALL) :EFFECT (AND (In ?b HALL)))");
     assert_snapshot!(action, @"effect (in ?0 hall)");

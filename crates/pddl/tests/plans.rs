@@ -99,6 +99,14 @@ fn actions_without_times_happen_one_after_the_other() {
 }
 
 #[test]
+fn a_time_is_not_left_out_for_some_actions_only() {
+    assert_snapshot!(
+        mistakes("0: (snap b1)\n(snap b2)"),
+        @"plan:2:2: error: an action without a time"
+    );
+}
+
+#[test]
 fn a_missing_duration_is_taken_from_the_domain_only_where_it_is_fixed() {
     assert_snapshot!(rewritten("0: (walk hall kitchen)"), @"0.000: (walk hall kitchen) [4.000]");
     let found = read("0: (carry b1)\n1: (wait)").unwrap_err();

@@ -8,11 +8,12 @@
 use elbowroom_num::Rational;
 
 use crate::domains::Domains;
-use crate::instantiate::{Foreknowledge, resolve, with_arguments};
+use crate::instantiate::Foreknowledge;
 use crate::problem::{
     Atom, Comparison, Condition, DurationConstraint, Expression, Fluent, FunctionId, ObjectId,
     Problem, Variable,
 };
+use crate::terms::{resolve, with_arguments};
 
 use super::event::{Event, EventKey, Symbol, Symbols};
 use super::reached::Reached;
