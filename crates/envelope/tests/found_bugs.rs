@@ -5,6 +5,7 @@ use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::parametrize::vary;
+use elbowroom_plan::soundness::Counterexample;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
 /// A problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, and an STN plan.
@@ -62,6 +63,18 @@ impl Given<'_> {
                 Some(Objection::Broken(broken)) => broken.requirement.describe(&task, &plan.plan),
             })
             .collect()
+    }
+
+    /// What shows that the box is not inside.
+    fn counterexample(&self, text: &str) -> Counterexample {
+        let (task, plan) = self.task_and_plan();
+        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+        match oracle.objection(&envelope(text)).unwrap() {
+            Some(Objection::Broken(broken)) => {
+                oracle.counterexample(&envelope(text), &broken).unwrap()
+            }
+            other => panic!("{other:?}"),
+        }
     }
 
     fn answer(&self, envelope: &str) -> String {
@@ -142,11 +155,21 @@ fn a_counterexample_to_separation_has_the_happenings_close_together() {
                c: s - .zero in [2, inf];",
         ..Given::default()
     };
-    let (task, plan) = given.task_and_plan();
-    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
-    let Some(Objection::Broken(broken)) = oracle.objection(&envelope("")).unwrap() else {
-        panic!("they may come at the same time");
-    };
-    let found = oracle.counterexample(&envelope(""), &broken).unwrap();
+    let found = given.counterexample("");
     assert!((&found.schedule[1] - &found.schedule[2]).abs() < Rational::new(1, 4));
+}
+
+#[test]
+fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action fill :parameters () :duration (= ?duration 3)
+                    :condition (over all (<= (x) 8)) :effect (increase (x) (* #t ?s)))",
+        plan: "parameter ?s default 1; durative-action instance n : (fill);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    let found = given.counterexample("[1, inf]");
+    let duration = &found.moment.unwrap() - &found.schedule[1];
+    assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
 }
