@@ -20,7 +20,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::decoupled::DecoupledEnvelope;
-use crate::obligations::{BadCase, Obligations, Refusal, Requirement};
+use crate::obligations::{BadCase, Difference, Obligations, Refusal, Requirement};
 use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
 use bad_case::{Outcome, Schedules};
@@ -151,26 +151,36 @@ impl<'a> Soundness<'a> {
             schedules: None,
         };
         let first = (*suspect).min(direct.len());
+        let mut found = None;
         for index in (first..direct.len()).chain(0..first) {
             let direct = &mut direct[index];
-            if direct.stands(envelope, moved) {
+            let obligation = &obligations.direct[direct.obligation];
+            let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
+            // What happenings read is known only where those that interfere keep their order, so
+            // that they do not is the better reason, and the only one with a counterexample.
+            if found.is_some() && !is_separation || direct.stands(envelope, moved) {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
                 return Ok(None);
             };
             *refutations += 1;
-            let obligation = &obligations.direct[direct.obligation];
             match schedules.possible(&obligation.bad_cases[direct.case]) {
                 Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
                 Outcome::Possible => {
                     *suspect = index;
-                    return Ok(Some(Broken {
+                    found = Some(Broken {
                         requirement: obligation.requirement.clone(),
                         case: obligation.bad_cases[direct.case].clone(),
-                    }));
+                    });
+                    if is_separation {
+                        return Ok(found);
+                    }
                 }
             }
+        }
+        if found.is_some() {
+            return Ok(found);
         }
         for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
             if proof
@@ -206,6 +216,23 @@ impl<'a> Soundness<'a> {
         envelope: &DecoupledEnvelope,
         broken: &Broken,
     ) -> Option<Counterexample> {
+        if let Requirement::Separation { first, second } = broken.requirement
+            && let [too_near] = &broken.case.differences[..]
+        {
+            // Far apart the wrong way round is no mistake by itself, but then there are schedules
+            // in between.
+            let mut near = broken.case.clone();
+            near.differences.push(Difference {
+                from: second,
+                to: first,
+                bound: too_near.bound.clone(),
+                is_strict: true,
+            });
+            let witness = bad_case::witness(&self.reduction, envelope, &near);
+            if witness.is_some() {
+                return witness;
+            }
+        }
         bad_case::witness(&self.reduction, envelope, &broken.case)
     }
 }
@@ -218,7 +245,7 @@ impl DirectCase {
         };
         proofs.iter().all(|proof| match moved {
             Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
-            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
+            None => proof.holds_in(envelope, None),
         })
     }
 }

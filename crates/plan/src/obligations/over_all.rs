@@ -138,8 +138,11 @@ pub(super) fn literal_cases(
             .take_while(|event| event.1 == wanted)
             .map(|event| event.0);
         let righting: Vec<NodeId> = righting.collect();
-        // Righted at the action's own start, or before it began to be wrong: never inside.
-        if righting.contains(&start) {
+        // Righted at the action's own start, or as it began to be wrong: never inside.
+        if righting
+            .iter()
+            .any(|&right| right == start || Some(right) == since)
+        {
             continue;
         }
         differences.extend(
