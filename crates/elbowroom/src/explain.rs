@@ -157,9 +157,7 @@ impl<'a> Explainer<'a> {
         let epsilon = self.epsilon.to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
         match (kind(first), kind(second)) {
-            (Node::Start(start), Node::End(end)) if start == end => format!(
-                "an action whose start and end interfere takes at least {epsilon}"
-            ),
+            (Node::Start(start), Node::End(end)) if start == end => self.own_separation(),
             (_, Node::Timed(index)) => self.deadline(*first, index),
             (Node::Timed(index), _) => format!(
                 "{} must come {epsilon} after {} at {}",
@@ -196,6 +194,12 @@ impl<'a> Explainer<'a> {
             (Some(end), _) => format!("its range: at most {}", end.to_decimal(6)),
             (None, _) => String::new(),
         }
+    }
+
+    /// Why an action cannot take no time at all.
+    fn own_separation(&self) -> String {
+        let epsilon = self.epsilon.to_decimal(6);
+        format!("an action whose start and end interfere takes at least {epsilon}")
     }
 
     fn action_name(&self, id: InstanceId) -> &'a str {

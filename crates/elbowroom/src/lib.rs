@@ -3,6 +3,7 @@
 mod box_text;
 mod explain;
 pub mod flow;
+pub mod graph;
 mod makespan;
 mod plan_file;
 
