@@ -7,13 +7,16 @@ use elbowroom::num::Rational;
 
 /// How much elbow room does a temporal plan have?
 #[derive(Debug, Parser)]
-#[command(name = "elbowroom", version, propagate_version = true, max_term_width = 100)]
 #[command(
-    long_about = "How much elbow room does a temporal plan have?\n\n\
+    name = "elbowroom",
+    version,
+    propagate_version = true,
+    max_term_width = 100
+)]
+#[command(long_about = "How much elbow room does a temporal plan have?\n\n\
     Elbowroom reads PDDL 2.1 problems with durative actions and a plan for them, and says whether \
     the plan is valid (`check`), which of its orderings and times matter (`stn`), and how far each \
-    duration, rate or deadline may deviate while the plan is still guaranteed to work (`envelope`)."
-)]
+    duration, rate or deadline may deviate while the plan is still guaranteed to work (`envelope`).")]
 #[command(after_help = "\
 Wherever a file is asked for, `-` means standard input.
 
@@ -195,7 +198,15 @@ mod tests {
     #[test]
     fn numbers_are_exact_and_must_make_sense() {
         let parse = |precision| {
-            let line = ["elbowroom", "envelope", "d", "p", "x", "--precision", precision];
+            let line = [
+                "elbowroom",
+                "envelope",
+                "d",
+                "p",
+                "x",
+                "--precision",
+                precision,
+            ];
             CommandLine::try_parse_from(line).map(|_| ())
         };
         assert!(parse("1/3").is_ok());

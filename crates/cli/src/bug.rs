@@ -14,9 +14,7 @@ pub(crate) fn install_hook() {
 }
 
 fn message(panic: &PanicHookInfo<'_>) -> String {
-    let what = panic
-        .payload_as_str()
-        .unwrap_or("no further explanation");
+    let what = panic.payload_as_str().unwrap_or("no further explanation");
     let place = panic
         .location()
         .map_or_else(String::new, |location| format!(" ({location})"));

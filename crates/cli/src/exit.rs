@@ -37,7 +37,10 @@ impl Failure {
     /// A failure with what to do about it.
     pub(crate) fn new(message: impl fmt::Display, help: impl fmt::Display) -> Self {
         let help = help.to_string();
-        let mut text = format!("{}: {message}", crate::look::styled(crate::look::BAD, "error"));
+        let mut text = format!(
+            "{}: {message}",
+            crate::look::styled(crate::look::BAD, "error")
+        );
         if !help.is_empty() {
             let label = crate::look::styled(crate::look::HINT, "help");
             text.push_str(&format!("\n  {label}: {help}"));

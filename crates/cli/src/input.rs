@@ -96,18 +96,28 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             output::tell(&format!("reading the {what} from standard input"));
         }
         let mut bytes = Vec::new();
-        let read = io::stdin().lock().take(LARGEST_FILE).read_to_end(&mut bytes);
+        let read = io::stdin()
+            .lock()
+            .take(LARGEST_FILE)
+            .read_to_end(&mut bytes);
         return match read {
             Ok(_) => Ok(Source::from_bytes("standard input", &bytes)),
             Err(error) => Err(Failure::new(
-                format!("cannot read the {what} from standard input: {}", plain(&error)),
+                format!(
+                    "cannot read the {what} from standard input: {}",
+                    plain(&error)
+                ),
                 "",
             )),
         };
     }
     let refused = |error: &io::Error| {
         Failure::new(
-            format!("cannot read the {what} {}: {}", path.display(), plain(error)),
+            format!(
+                "cannot read the {what} {}: {}",
+                path.display(),
+                plain(error)
+            ),
             advice(path, error),
         )
     };
@@ -126,7 +136,9 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
 fn advice(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let parent = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
             match parent {
                 Some(folder) if !folder.is_dir() => {
                     format!("there is no folder {}", folder.display())

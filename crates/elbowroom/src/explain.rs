@@ -69,7 +69,9 @@ impl<'a> Explainer<'a> {
     pub fn no_schedule(&self, valuation: &[Rational]) -> Explanation {
         let conflict = conflict::find(self, valuation);
         Explanation {
-            reason: conflict.as_ref().map_or_else(String::new, |c| c.reason.clone()),
+            reason: conflict
+                .as_ref()
+                .map_or_else(String::new, |c| c.reason.clone()),
             shortfall: conflict.map(|conflict| conflict.excess),
             valuation: valuation.to_vec(),
             schedule: None,

@@ -76,7 +76,9 @@ pub fn robust_plan(
     let stn_plan = free(task, time_triggered, &settings.epsilon)?;
     let plan = open(task, stn_plan, &settings.vary, &settings.epsilon)?;
     let mut oracle = Oracle::new(task, &plan, &settings.epsilon)?;
-    let run = irr(&mut oracle, &settings.search, &mut |_| ControlFlow::Continue(()))?;
+    let run = irr(&mut oracle, &settings.search, &mut |_| {
+        ControlFlow::Continue(())
+    })?;
     Ok(RobustPlan { plan, run })
 }
 
@@ -191,10 +193,15 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     for inequality in &broken.case.inequalities {
         let expression = &inequality.expression;
         nodes.extend(expression.times.keys());
-        nodes.extend(expression.products.keys().filter_map(|(_, factor)| match factor {
-            Factor::Time(node) => Some(*node),
-            Factor::Parameter(_) => None,
-        }));
+        nodes.extend(
+            expression
+                .products
+                .keys()
+                .filter_map(|(_, factor)| match factor {
+                    Factor::Time(node) => Some(*node),
+                    Factor::Parameter(_) => None,
+                }),
+        );
     }
     // The moment inside an over-all condition is no node of the plan.
     nodes.retain(|node| node.index() < count);

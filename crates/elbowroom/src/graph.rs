@@ -23,7 +23,12 @@ pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
                 (network.node_words(task, id), "box")
             }
         };
-        let _ = writeln!(dot, "  n{} [label={}, shape={shape}];", id.0, quoted(&label));
+        let _ = writeln!(
+            dot,
+            "  n{} [label={}, shape={shape}];",
+            id.0,
+            quoted(&label)
+        );
     }
     for constraint in &network.constraints {
         let style = match constraint.reason {

@@ -55,7 +55,9 @@ fn companions(envelopes: &Path, file: &Path) -> (PathBuf, PathBuf) {
             format!("solar_rover/{version}/prob{}.pddl", two_digits()),
         ),
         ["robot_delivery", scalability, stns] => {
-            let problem = name.trim_start_matches("STN_plan_").replace(".stn", ".pddl");
+            let problem = name
+                .trim_start_matches("STN_plan_")
+                .replace(".stn", ".pddl");
             if stns == "stn_no_params" {
                 (
                     format!("robot_delivery/{scalability}/domain_no_deadline.pddl"),

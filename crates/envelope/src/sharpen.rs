@@ -136,12 +136,17 @@ fn simplest_between(low: &Rational, high: &Rational) -> Rational {
     }
     // Both lie between `whole` and `next`: compare the reciprocals of what is left.
     let (low, high) = (low - &whole, high - &whole);
-    let least = high.reciprocal().expect("greater than `low`, which is not negative");
+    let least = high
+        .reciprocal()
+        .expect("greater than `low`, which is not negative");
     let fraction = match low.reciprocal() {
         Some(most) => simplest_between(&least, &most),
         None => &least.floor() + &Rational::ONE,
     };
-    &whole + &fraction.reciprocal().expect("greater than `least`, which is positive")
+    &whole
+        + &fraction
+            .reciprocal()
+            .expect("greater than `least`, which is positive")
 }
 
 #[cfg(test)]

@@ -129,7 +129,10 @@ fn success(task: &Task, name: &str, report: &Report, look: Look) -> String {
         push_wrapped(&mut text, &line, 2, look.width);
     }
     if margins.len() > MARGINS_SHOWN {
-        let more = format!("  and {} more (--json has all)", margins.len() - MARGINS_SHOWN);
+        let more = format!(
+            "  and {} more (--json has all)",
+            margins.len() - MARGINS_SHOWN
+        );
         text.push_str(&format!("{}\n", styled(FAINT, &more)));
     }
     text

@@ -7,8 +7,8 @@ mod search;
 mod text;
 
 use elbowroom::Explainer;
-use elbowroom::flow::{self, FlowError};
 use elbowroom::envelope::Oracle;
+use elbowroom::flow::{self, FlowError};
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::obligations::Refusal;
 use elbowroom::plan::parametrize::VarySpec;

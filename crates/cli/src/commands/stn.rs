@@ -33,7 +33,10 @@ pub(crate) fn run(arguments: &StnArgs) -> Answer {
     if let Some(path) = &arguments.dot {
         output::write_file(path, &graph::to_dot(&task, &plan))?;
     }
-    let is_dot_on_stdout = arguments.dot.as_ref().is_some_and(|path| path.as_os_str() == "-");
+    let is_dot_on_stdout = arguments
+        .dot
+        .as_ref()
+        .is_some_and(|path| path.as_os_str() == "-");
     if let Some(path) = &arguments.output {
         output::write_file(path, &stn_text(&task, &plan)?)?;
     }

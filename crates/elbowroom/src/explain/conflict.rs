@@ -29,11 +29,7 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
     let plan = &explainer.plan.plan;
     let cycle = plan.network(valuation).consistency().err()?;
     // In the order in which `StnPlan::network` adds them.
-    let mut origins: Vec<Origin<'_>> = plan
-        .nodes()
-        .skip(1)
-        .map(|_| Origin::Beginning)
-        .collect();
+    let mut origins: Vec<Origin<'_>> = plan.nodes().skip(1).map(|_| Origin::Beginning).collect();
     for constraint in &plan.constraints {
         if constraint.lower != Bound::Infinite {
             origins.push(Origin::AtLeast(constraint));
@@ -64,7 +60,10 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
         }
     }
     needs.reverse();
-    let reason = if walked.iter().any(|origin| is_own_separation(explainer, *origin)) {
+    let reason = if walked
+        .iter()
+        .any(|origin| is_own_separation(explainer, *origin))
+    {
         explainer.own_separation()
     } else {
         sentence(&needs, &rooms)

@@ -1,7 +1,7 @@
 //! Timed initials in words: deadlines, and others.
 
-use elbowroom_model::ground::{Change, Condition, FactId};
 use elbowroom_model::Footprint;
+use elbowroom_model::ground::{Change, Condition, FactId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
@@ -87,6 +87,8 @@ impl Explainer<'_> {
     }
 
     fn reads(&self, condition: &Condition) -> impl Iterator<Item = FactId> + use<> {
-        Footprint::of_condition(self.task, condition).reads.into_iter()
+        Footprint::of_condition(self.task, condition)
+            .reads
+            .into_iter()
     }
 }

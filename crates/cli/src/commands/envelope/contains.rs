@@ -65,7 +65,11 @@ pub(super) fn example(subject: &Subject<'_>, explanation: &Explanation, look: Lo
     let Some(schedule) = &explanation.schedule else {
         return text;
     };
-    let plan = subject.plan.plan.at(&explanation.valuation).scheduled(schedule);
+    let plan = subject
+        .plan
+        .plan
+        .at(&explanation.valuation)
+        .scheduled(schedule);
     let _ = write!(text, "\n{}\n", styled(STRONG, "executed as"));
     for line in pddl::write_plan(subject.task, &plan).lines() {
         let _ = writeln!(text, "  {line}");

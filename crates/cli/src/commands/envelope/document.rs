@@ -54,7 +54,11 @@ pub(super) fn contains(
     envelope: &DecoupledEnvelope,
     why_not: Option<&Explanation>,
 ) -> Value {
-    let answer = if why_not.is_some() { "outside" } else { "inside" };
+    let answer = if why_not.is_some() {
+        "outside"
+    } else {
+        "inside"
+    };
     let mut document = header(subject.arguments, subject.task, answer);
     document["parameters"] = Value::Array(parameters(subject, Some(envelope)));
     if let Some(explanation) = why_not {
@@ -121,7 +125,13 @@ fn parameters(subject: &Subject<'_>, envelope: Option<&DecoupledEnvelope>) -> Ve
         }
         value
     };
-    subject.plan.parameters.iter().enumerate().map(each).collect()
+    subject
+        .plan
+        .parameters
+        .iter()
+        .enumerate()
+        .map(each)
+        .collect()
 }
 
 fn kind(kind: ParameterKind) -> &'static str {

@@ -24,7 +24,12 @@ pub(super) fn judged_invalid(
         output::print_json(&document::judged_invalid(arguments, task, violation))?;
     } else {
         let mut text = headline(arguments);
-        push_wrapped(&mut text, &violation.to_string(), 2, Look::of_stdout().width);
+        push_wrapped(
+            &mut text,
+            &violation.to_string(),
+            2,
+            Look::of_stdout().width,
+        );
         output::print(&text)?;
     }
     Ok(Exit::No)
@@ -51,7 +56,10 @@ pub(super) fn at_nominal(
     objection: &Objection,
 ) -> Answer {
     let point = DecoupledEnvelope::point(&subject.plan.nominal());
-    print(subject, &subject.explainer.objection(oracle, &point, objection))
+    print(
+        subject,
+        &subject.explainer.objection(oracle, &point, objection),
+    )
 }
 
 fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
@@ -73,10 +81,18 @@ fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
 pub(super) fn what(explanation: &Explanation) -> String {
     match &explanation.shortfall {
         Some(shortfall) if !shortfall.is_zero() && explanation.schedule.is_none() => {
-            format!("{}: too late by {}", explanation.reason, number::nearest(shortfall))
+            format!(
+                "{}: too late by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
         }
         Some(shortfall) if !shortfall.is_zero() => {
-            format!("{}: short by {}", explanation.reason, number::nearest(shortfall))
+            format!(
+                "{}: short by {}",
+                explanation.reason,
+                number::nearest(shortfall)
+            )
         }
         _ => explanation.reason.clone(),
     }

@@ -13,11 +13,16 @@ use elbowroom::plan::{DecoupledEnvelope, ParameterId};
 use super::{Subject, document, fails, refused, text};
 use crate::args;
 use crate::clock::Clock;
-use crate::exit::{Answer, Exit};
+use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::look::Look;
 use crate::output;
 use crate::progress::Progress;
+
+/// By what part of the precision a sharpened end is moved to see what it touches.
+const SHARP: i64 = 1_000_000_000;
+/// How often the step is doubled to see what stops an end.
+const FARTHER: usize = 3;
 
 /// An envelope, and how it was found.
 pub(super) struct Outcome {
@@ -97,15 +102,14 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
         Err(objection) => return fails::at_nominal(subject, &oracle, &objection),
     };
     if subject.arguments.sharpen && stop == Stop::Converged {
-        envelope = sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
+        envelope =
+            sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
     }
     let seconds = watch.seconds();
     let checks = oracle.checks();
-    let found = limits(&mut oracle, &envelope, &subject.arguments.precision)
-        .map_err(|r| refused(&r))?;
     drop(progress);
     let outcome = Outcome {
-        limits: in_words(subject, &found),
+        limits: what_limits(subject, &mut oracle, &envelope, stop)?,
         envelope,
         widenings,
         checks,
@@ -118,6 +122,47 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
         output::print(&text::envelope(subject, &outcome, Look::of_stdout()))?;
     }
     Ok(Exit::Yes)
+}
+
+/// What keeps the lower and the upper end of each interval from moving, in words.
+fn what_limits(
+    subject: &Subject<'_>,
+    oracle: &mut Oracle<'_>,
+    envelope: &DecoupledEnvelope,
+    stop: Stop,
+) -> Result<Vec<[Option<String>; 2]>, Failure> {
+    let precision = &subject.arguments.precision;
+    // A sharpened end has no room at all, so the smallest step tells what it touches.
+    let mut step = if subject.arguments.sharpen && stop == Stop::Converged {
+        precision * &Rational::new(1, SHARP)
+    } else {
+        precision.clone()
+    };
+    let mut words = in_words(
+        subject,
+        &limits(oracle, envelope, &step).map_err(|r| refused(&r))?,
+    );
+    for _ in 0..FARTHER {
+        // An end that has room for this step may still be stopped by the next larger one.
+        if words.iter().flatten().all(Option::is_some) {
+            break;
+        }
+        step = &step + &step;
+        let farther = in_words(
+            subject,
+            &limits(oracle, envelope, &step).map_err(|r| refused(&r))?,
+        );
+        for (known, found) in words
+            .iter_mut()
+            .flatten()
+            .zip(farther.into_iter().flatten())
+        {
+            if known.is_none() {
+                *known = found;
+            }
+        }
+    }
+    Ok(words)
 }
 
 fn in_words(subject: &Subject<'_>, limits: &[[Option<Limit>; 2]]) -> Vec<[Option<String>; 2]> {
@@ -167,7 +212,8 @@ impl Watch {
     }
 
     fn is_late(&self) -> bool {
-        self.limit.is_some_and(|limit| self.clock.elapsed() >= limit)
+        self.limit
+            .is_some_and(|limit| self.clock.elapsed() >= limit)
     }
 
     fn flow(&self) -> ControlFlow<()> {

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use elbowroom::num::Rational;
 use elbowroom::plan::{ParameterId, ParameterKind, Valuation};
 
 use super::Subject;
@@ -99,10 +98,18 @@ fn makespan(subject: &Subject<'_>, outcome: &Outcome) -> Option<String> {
     let nominal = end(Some(subject.plan.nominal()))?;
     let mut line = format!("Done at {} as planned", number::nearest(&nominal));
     if let Some(shortest) = end(at_least) {
-        let _ = write!(line, ", at {} with all at their lower ends", number::nearest(&shortest));
+        let _ = write!(
+            line,
+            ", at {} with all at their lower ends",
+            number::nearest(&shortest)
+        );
     }
     if let Some(longest) = end(at_most) {
-        let _ = write!(line, ", at {} with all at their upper ends", number::nearest(&longest));
+        let _ = write!(
+            line,
+            ", at {} with all at their upper ends",
+            number::nearest(&longest)
+        );
     }
     line.push_str(", if started as early as possible.");
     Some(line)
@@ -113,11 +120,12 @@ fn course(subject: &Subject<'_>, outcome: &Outcome) -> String {
     let ended = match outcome.stop {
         Stop::Converged if subject.arguments.sharpen => "Each end touches its limit".to_owned(),
         Stop::Converged => format!(
-            "No end can move by {} or more (--sharpen moves each onto its limit)",
+            "Steps below {} were not tried (--sharpen moves each end onto its limit)",
             number::nearest(&subject.arguments.precision)
         ),
         Stop::CheckLimit | Stop::TimeLimit => {
-            "The time limit came before the search was done; the intervals could be wider".to_owned()
+            "The time limit came before the search was done; the intervals could be wider"
+                .to_owned()
         }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
