@@ -27,15 +27,6 @@ pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
     Ok(Task::new(Arc::new(problem)))
 }
 
-/// Reads a plan with fixed times.
-pub(crate) fn time_triggered_plan(
-    task: &mut Task,
-    path: &Path,
-) -> Result<TimeTriggeredPlan, Failure> {
-    let text = source(path, "plan")?;
-    with_warnings(pddl::read_plan(&text, task))
-}
-
 /// A plan of either kind, as it stands in a file.
 pub(crate) enum AnyPlan {
     TimeTriggered(TimeTriggeredPlan),

@@ -62,7 +62,7 @@ pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
 pub use elbowroom_stn as stn;
-pub use explain::{Explainer, Explanation};
+pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;
 pub use plan_file::PlanKind;
 

@@ -2,11 +2,13 @@
 
 use elbowroom::flow::{self, FlowError};
 use elbowroom::model::Task;
+use elbowroom::model::validate::Violation;
 use elbowroom::plan::{Bound, Node, ParametrizedPlan, format};
 use elbowroom::{graph, num::Rational};
 use serde_json::{Value, json};
 
 use crate::args::StnArgs;
+use crate::commands::check::violation_document;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::{self, AnyPlan};
 use crate::limits::push_wrapped;
@@ -21,11 +23,7 @@ pub(crate) fn run(arguments: &StnArgs) -> Answer {
         AnyPlan::TimeTriggered(plan) => match flow::free(&task, &plan, &arguments.epsilon) {
             Ok(freed) => flow::closed(&task, freed, &arguments.epsilon),
             Err(FlowError::Invalid(violation)) => {
-                let file = arguments.plan.display();
-                let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
-                push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
-                output::tell(text.trim_end());
-                return Ok(Exit::No);
+                return invalid(arguments, &violation);
             }
             Err(error) => return Err(Failure::new(error, "")),
         },
@@ -46,6 +44,24 @@ pub(crate) fn run(arguments: &StnArgs) -> Answer {
         output::print(&stn_text(&task, &plan)?)?;
     }
     Ok(Exit::Yes)
+}
+
+/// A plan that is not valid has no room. Standard output is for the network alone.
+fn invalid(arguments: &StnArgs, violation: &Violation) -> Answer {
+    let file = arguments.plan.display();
+    if arguments.json {
+        output::print_json(&json!({
+            "format": "elbowroom-stn",
+            "version": 1,
+            "answer": "invalid",
+            "violation": violation_document(violation),
+        }))?;
+    } else {
+        let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
+        push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
+        output::tell(text.trim_end());
+    }
+    Ok(Exit::No)
 }
 
 fn stn_text(task: &Task, plan: &ParametrizedPlan) -> Result<String, Failure> {
@@ -89,6 +105,7 @@ fn document(task: &Task, plan: &ParametrizedPlan) -> Value {
     json!({
         "format": "elbowroom-stn",
         "version": 1,
+        "answer": "network",
         "domain": task.problem().domain,
         "problem": task.problem().name,
         "nodes": nodes,

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::Subject;
 use super::search::Outcome;
+use super::watch::Stop;
 use crate::args::{EnvelopeArgs, Growth};
 use crate::commands::check::violation_document;
 use crate::json;
@@ -75,6 +76,13 @@ pub(super) fn fails(subject: &Subject<'_>, explanation: &Explanation) -> Value {
     document
 }
 
+/// The answer "nothing is known yet".
+pub(super) fn none(subject: &Subject<'_>, stop: Stop) -> Value {
+    let mut document = header(subject.arguments, subject.task, "none");
+    document["stop"] = json!(stop.name());
+    document
+}
+
 /// The answer "the judge rejects the plan".
 pub(super) fn judged_invalid(
     arguments: &EnvelopeArgs,
@@ -113,7 +121,7 @@ fn parameters(subject: &Subject<'_>, envelope: Option<&DecoupledEnvelope>) -> Ve
     let each = |(index, parameter): (usize, &elbowroom::plan::Parameter)| {
         let mut value = json!({
             "name": parameter.name,
-            "quantity": subject.plan.describe(subject.task, ParameterId::from(index)),
+            "quantity": subject.explainer.quantity(ParameterId::from(index)),
             "kind": kind(parameter.kind),
             "nominal": json::number(&parameter.nominal),
             "weight": json::number(&parameter.weight),
@@ -152,7 +160,7 @@ fn counterexample(subject: &Subject<'_>, explanation: &Explanation) -> Value {
         .collect();
     json!({
         "message": explanation.reason,
-        "shortfall": explanation.shortfall.as_ref().map(json::number),
+        "shortfall": explanation.shortfall.as_ref().map(|gap| json::number(gap.value())),
         "verdict": explanation.verdict,
         "values": values,
         "schedule": schedule(subject, explanation),

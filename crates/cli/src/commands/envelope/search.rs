@@ -1,8 +1,5 @@
 //! The search for an envelope.
 
-use std::ops::ControlFlow;
-use std::time::Duration;
-
 use elbowroom::envelope::{
     Growth, Limit, Oracle, Settings, StopReason, Widening, irr, limits, sharpen,
 };
@@ -10,11 +7,10 @@ use elbowroom::num::Rational;
 use elbowroom::plan::reduction::{BoxEnd, Side};
 use elbowroom::plan::{DecoupledEnvelope, ParameterId};
 
+use super::watch::{Stop, Watch};
 use super::{Subject, document, fails, refused, text};
 use crate::args;
-use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
-use crate::interrupt::Interrupt;
 use crate::look::Look;
 use crate::output;
 use crate::progress::Progress;
@@ -44,29 +40,11 @@ pub(super) struct Step {
     pub(super) seconds: f64,
 }
 
-/// Why the search ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Stop {
-    Converged,
-    CheckLimit,
-    TimeLimit,
-    Cancelled,
-}
-
-impl Stop {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Converged => "converged",
-            Self::CheckLimit => "check limit",
-            Self::TimeLimit => "time limit",
-            Self::Cancelled => "cancelled",
-        }
-    }
-}
-
 /// Searches, and prints what was found.
-pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
-    let watch = Watch::start(subject.arguments.time_limit.as_ref());
+pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) -> Answer {
+    if watch.flow().is_break() {
+        return nothing_yet(subject, watch.stop());
+    }
     let mut progress = Progress::new();
     let mut widenings = Vec::new();
     let mut on_step = |widening: Option<&Widening<'_>>| {
@@ -78,9 +56,7 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
                 seconds: watch.seconds(),
             });
         }
-        progress.show(watch.clock.elapsed(), || {
-            format!("{} widenings", widenings.len())
-        });
+        progress.show(watch.elapsed(), || format!("{} widenings", widenings.len()));
         watch.flow()
     };
     let settings = Settings {
@@ -122,6 +98,16 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>) -> Answer {
         output::print(&text::envelope(subject, &outcome, Look::of_stdout()))?;
     }
     Ok(Exit::Yes)
+}
+
+/// The search was stopped before its start point was checked.
+fn nothing_yet(subject: &Subject<'_>, stop: Stop) -> Answer {
+    if subject.arguments.json {
+        output::print_json(&document::none(subject, stop))?;
+    } else {
+        output::print("nothing is known yet: the search was stopped before it began\n")?;
+    }
+    Ok(Exit::Limit)
 }
 
 /// What keeps the lower and the upper end of each interval from moving, in words.
@@ -186,49 +172,5 @@ fn value_of(envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Rational> {
     match end.side {
         Side::Lower => interval.lower.value().cloned(),
         Side::Upper => interval.upper.value().cloned(),
-    }
-}
-
-/// When to stop: never, at a time limit, or at Ctrl-C.
-struct Watch {
-    clock: Clock,
-    limit: Option<Duration>,
-    interrupt: Interrupt,
-}
-
-impl Watch {
-    fn start(limit: Option<&Rational>) -> Self {
-        Self {
-            clock: Clock::start(),
-            limit: limit.map(|seconds| {
-                Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
-            }),
-            interrupt: Interrupt::listen(),
-        }
-    }
-
-    fn seconds(&self) -> f64 {
-        self.clock.elapsed().as_secs_f64()
-    }
-
-    fn is_late(&self) -> bool {
-        self.limit
-            .is_some_and(|limit| self.clock.elapsed() >= limit)
-    }
-
-    fn flow(&self) -> ControlFlow<()> {
-        if self.interrupt.is_requested() || self.is_late() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-
-    fn stop(&self) -> Stop {
-        if self.interrupt.is_requested() {
-            Stop::Cancelled
-        } else {
-            Stop::TimeLimit
-        }
     }
 }

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use elbowroom::plan::{ParameterId, ParameterKind, Valuation};
 
 use super::Subject;
-use super::search::{Outcome, Stop};
+use super::search::Outcome;
+use super::watch::Stop;
 use crate::limits::{self, Limit, push_paragraph};
 use crate::look::{FAINT, Look, STRONG, styled};
 use crate::table::{self, Row};
@@ -58,7 +59,7 @@ fn quantity(subject: &Subject<'_>, id: ParameterId) -> String {
         ParameterKind::Duration(instance) => {
             subject.plan.plan.instance(instance).action.name.clone()
         }
-        _ => subject.plan.describe(subject.task, id),
+        _ => subject.explainer.quantity(id),
     }
 }
 
