@@ -14,7 +14,12 @@ pub(crate) fn install_hook() {
 }
 
 fn message(panic: &PanicHookInfo<'_>) -> String {
-    let what = panic.payload_as_str().unwrap_or("no further explanation");
+    let payload = panic.payload();
+    let what = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no further explanation");
     let place = panic
         .location()
         .map_or_else(String::new, |location| format!(" ({location})"));

@@ -1,5 +1,6 @@
 //! Reading files.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
@@ -56,23 +57,25 @@ fn stn_mistakes(text: &Source, errors: &FormatErrors) -> String {
         let margin = " ".repeat(line.len());
         let carets = "^".repeat(error.length.max(1));
         let offset = " ".repeat(error.column.saturating_sub(1));
-        shown.push_str(&format!(
+        let _ = write!(
+            shown,
             "{}: {}\n{margin}--> {}:{}:{}\n",
             styled(BAD, "error"),
             error.message,
             text.name(),
             error.line,
             error.column,
-        ));
+        );
         // An excerpt of a long line does not start at its first column.
         if error.column <= error.excerpt.chars().count() + 1 {
             let expected = error.expected.as_deref().unwrap_or_default();
-            shown.push_str(&format!(
+            let _ = write!(
+                shown,
                 "{margin} |\n{line} | {}\n{margin} | {offset}{carets} {expected}\n",
                 error.excerpt
-            ));
+            );
         } else if let Some(expected) = &error.expected {
-            shown.push_str(&format!("{margin} = {expected}\n"));
+            let _ = writeln!(shown, "{margin} = {expected}");
         }
         shown.push('\n');
     }

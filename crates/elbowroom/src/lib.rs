@@ -2,7 +2,7 @@
 //!
 //! Elbowroom reads PDDL 2.1 problems with durative actions, and a plan for one, and computes how
 //! far each duration, rate or deadline may deviate while the plan is still guaranteed to work.
-//! [`flow::robust_plan`] is the whole way; the [tutorial](tutorial) walks it with an example.
+//! [`flow::robust_plan`] is the whole way; the [`tutorial`] walks it with an example.
 //!
 //! ```
 //! use elbowroom::flow::{Settings, robust_plan};
@@ -38,7 +38,7 @@
 //! The crates behind it, each under its own name:
 //!
 //! - [`num`]: exact rationals and intervals.
-//! - [`model`]: problems, plans with fixed times, and the judge ([`model::validate`]).
+//! - [`model`]: problems, plans with fixed times, and the judge ([`model::validate()`]).
 //! - [`pddl`]: PDDL and plan text to the model and back.
 //! - [`stn`]: temporal networks.
 //! - [`plan`]: plans that leave room, and their parameters.

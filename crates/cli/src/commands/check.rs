@@ -1,6 +1,7 @@
 //! `elbowroom check`: is the plan valid?
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 
 use elbowroom::model::ground::FluentId;
 use elbowroom::model::validate::{self, Margin, Report, Settings, Verdict, Violation};
@@ -141,19 +142,20 @@ fn success(
         .filter(|(fluent, _)| touched.contains(fluent))
         .collect();
     if !changed.is_empty() {
-        text.push_str(&format!("\n{}\n", styled(STRONG, "Values at the end")));
+        let _ = write!(text, "\n{}\n", styled(STRONG, "Values at the end"));
         for (fluent, value) in changed {
-            text.push_str(&format!(
-                "  {} = {}\n",
+            let _ = writeln!(
+                text,
+                "  {} = {}",
                 task.fluent_name(*fluent),
                 number::nearest(value)
-            ));
+            );
         }
     }
     let mut margins: Vec<&Margin> = report.margins.iter().collect();
     margins.sort_by(|a, b| a.margin.cmp(&b.margin));
     if !margins.is_empty() {
-        text.push_str(&format!("\n{}\n", styled(STRONG, "Smallest margins")));
+        let _ = write!(text, "\n{}\n", styled(STRONG, "Smallest margins"));
     }
     for margin in margins.iter().take(MARGINS_SHOWN) {
         let of = match &margin.action {
@@ -174,7 +176,7 @@ fn success(
             "  and {} more (--json has all)",
             margins.len() - MARGINS_SHOWN
         );
-        text.push_str(&format!("{}\n", styled(FAINT, &more)));
+        let _ = writeln!(text, "{}", styled(FAINT, &more));
     }
     text
 }

@@ -10,6 +10,7 @@ use elbowroom::plan::{DecoupledEnvelope, ParameterId};
 use super::watch::{Stop, Watch};
 use super::{Subject, document, fails, refused, text};
 use crate::args;
+use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::Look;
 use crate::output;
@@ -45,6 +46,8 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
     if watch.flow().is_break() {
         return nothing_yet(subject, watch.stop());
     }
+    let clock = Clock::start();
+    let seconds = || clock.elapsed().as_secs_f64();
     let mut progress = Progress::new();
     let mut widenings = Vec::new();
     let mut on_step = |widening: Option<&Widening<'_>>| {
@@ -53,10 +56,10 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
                 end: widening.end,
                 value: value_of(widening.envelope, widening.end),
                 checks: widening.checks,
-                seconds: watch.seconds(),
+                seconds: seconds(),
             });
         }
-        progress.show(watch.elapsed(), || format!("{} widenings", widenings.len()));
+        progress.show(clock.elapsed(), || format!("{} widenings", widenings.len()));
         watch.flow()
     };
     let settings = Settings {
@@ -81,7 +84,7 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
         envelope =
             sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
     }
-    let seconds = watch.seconds();
+    let seconds = seconds();
     let checks = oracle.checks();
     drop(progress);
     let outcome = Outcome {
@@ -119,24 +122,24 @@ fn what_limits(
 ) -> Result<Vec<[Option<String>; 2]>, Failure> {
     let precision = &subject.arguments.precision;
     // A sharpened end has no room at all, so the smallest step tells what it touches.
-    let mut step = if subject.arguments.sharpen && stop == Stop::Converged {
+    let mut distance = if subject.arguments.sharpen && stop == Stop::Converged {
         precision * &Rational::new(1, SHARP)
     } else {
         precision.clone()
     };
     let mut words = in_words(
         subject,
-        &limits(oracle, envelope, &step).map_err(|r| refused(&r))?,
+        &limits(oracle, envelope, &distance).map_err(|r| refused(&r))?,
     );
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
         if words.iter().flatten().all(Option::is_some) {
             break;
         }
-        step = &step + &step;
+        distance = &distance + &distance;
         let farther = in_words(
             subject,
-            &limits(oracle, envelope, &step).map_err(|r| refused(&r))?,
+            &limits(oracle, envelope, &distance).map_err(|r| refused(&r))?,
         );
         for (known, found) in words
             .iter_mut()

@@ -47,16 +47,6 @@ impl Watch {
         }
     }
 
-    /// How long ago that was.
-    pub(super) fn elapsed(&self) -> Duration {
-        self.clock.elapsed()
-    }
-
-    /// The same in seconds.
-    pub(super) fn seconds(&self) -> f64 {
-        self.elapsed().as_secs_f64()
-    }
-
     fn is_late(&self) -> bool {
         self.limit
             .is_some_and(|limit| self.clock.elapsed() >= limit)
