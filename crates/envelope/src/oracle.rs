@@ -3,7 +3,7 @@
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::reduction::{BoxEnd, Reduction};
+use elbowroom_plan::reduction::BoxEnd;
 use elbowroom_plan::soundness::{Broken, Counterexample, Soundness};
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
@@ -46,7 +46,7 @@ impl<'a> Oracle<'a> {
     ) -> Result<Self, Refusal> {
         let soundness = Soundness::new(task, plan, epsilon)?;
         let feasibility =
-            Feasibility::new(plan, &Reduction::new(plan)).map_err(|_| Refusal::TooManyCases {
+            Feasibility::new(plan, soundness.reduction()).map_err(|_| Refusal::TooManyCases {
                 place: "parameters on constraints in both directions".to_owned(),
                 limit: crate::feasibility::MOST_CORNERS,
             })?;

@@ -35,11 +35,4 @@ impl Domains {
             }
         }
     }
-
-    /// Whether the object is of any of the types.
-    pub(crate) fn contains(&self, types: &[TypeId], object: ObjectId) -> bool {
-        types
-            .iter()
-            .any(|id| self.by_type[id.index()].binary_search(&object).is_ok())
-    }
 }

@@ -6,10 +6,26 @@ use elbowroom_num::Rational;
 
 use crate::ground::{self, FactId, FluentId};
 use crate::problem::{
-    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, Term, TimedChange,
+    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, TimedChange,
     UpdateOperator, Variable,
 };
 use crate::task::{GroundRule, InstantiateError, Task, TimedHappening};
+use crate::terms::{resolve, with_arguments};
+
+/// What is known beforehand, so that quantifiers need not be expanded in full.
+pub(crate) trait Foreknowledge {
+    /// The truth of a condition that is the same in every state; `None` for all others.
+    fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool>;
+}
+
+/// Nothing is known beforehand.
+struct Nothing;
+
+impl Foreknowledge for Nothing {
+    fn truth(&self, _: &Condition, _: &[ObjectId]) -> Option<bool> {
+        None
+    }
+}
 
 impl Task {
     /// The ground action of a schema with these arguments.
@@ -24,12 +40,23 @@ impl Task {
         arguments: &[ObjectId],
     ) -> Result<ground::Action, InstantiateError> {
         self.check_arguments(schema, arguments)?;
+        Ok(self.instantiate_knowing(schema, arguments, &Nothing))
+    }
+
+    /// The ground action of a schema with these arguments, which must fit. Quantified conditions
+    /// and effects are expanded only as far as they are not decided by what is known.
+    pub(crate) fn instantiate_knowing(
+        &mut self,
+        schema: SchemaId,
+        arguments: &[ObjectId],
+        known: &dyn Foreknowledge,
+    ) -> ground::Action {
         let problem = self.problem.clone();
         let mut binding = arguments.to_vec();
         let binding = &mut binding;
         let body = match &problem.schemas[schema.index()].body {
             Body::Instantaneous { condition, effects } => {
-                ground::Body::Instantaneous(self.ground_snap(condition, effects, binding))
+                ground::Body::Instantaneous(self.ground_snap(condition, effects, binding, known))
             }
             Body::Durative {
                 duration,
@@ -48,19 +75,19 @@ impl Task {
                         at_end: constraint.at_end,
                     })
                     .collect(),
-                start: self.ground_snap(at_start, start_effects, binding),
-                over_all: self.ground_condition(over_all, binding),
-                end: self.ground_snap(at_end, end_effects, binding),
-                continuous: self.ground_continuous(continuous, binding),
+                start: self.ground_snap(at_start, start_effects, binding, known),
+                over_all: self.expand(over_all, binding, known),
+                end: self.ground_snap(at_end, end_effects, binding, known),
+                continuous: self.ground_continuous(continuous, binding, known),
             }),
         };
         let name = self.action_name(schema, arguments);
-        Ok(ground::Action {
+        ground::Action {
             schema,
             arguments: arguments.to_vec(),
             name,
             body,
-        })
+        }
     }
 
     fn check_arguments(
@@ -99,12 +126,16 @@ impl Task {
         condition: &Condition,
         effects: &[problem::Effect],
         binding: &mut Vec<ObjectId>,
+        known: &dyn Foreknowledge,
     ) -> ground::SnapAction {
-        let condition = self.ground_condition(condition, binding);
+        let condition = self.expand(condition, binding, known);
         let mut ground_effects = Vec::with_capacity(effects.len());
         for effect in effects {
             self.for_all(&effect.variables, binding, &mut |task, binding| {
-                let guard = task.ground_guard(&effect.guard, binding);
+                if is_known_to_fail(&effect.guard, binding, known) {
+                    return;
+                }
+                let guard = task.ground_guard(&effect.guard, binding, known);
                 let change = task.ground_change(&effect.change, binding);
                 ground_effects.push(ground::Effect { guard, change });
             });
@@ -119,12 +150,16 @@ impl Task {
         &mut self,
         effects: &[problem::ContinuousEffect],
         binding: &mut Vec<ObjectId>,
+        known: &dyn Foreknowledge,
     ) -> Vec<ground::ContinuousEffect> {
         let mut ground_effects = Vec::with_capacity(effects.len());
         for effect in effects {
             self.for_all(&effect.variables, binding, &mut |task, binding| {
+                if is_known_to_fail(&effect.guard, binding, known) {
+                    return;
+                }
                 ground_effects.push(ground::ContinuousEffect {
-                    guard: task.ground_guard(&effect.guard, binding),
+                    guard: task.ground_guard(&effect.guard, binding, known),
                     fluent: task.ground_fluent(&effect.fluent, binding),
                     rate: task.ground_expression(&effect.rate, binding),
                 });
@@ -137,11 +172,12 @@ impl Task {
         &mut self,
         guard: &problem::Guard,
         binding: &mut Vec<ObjectId>,
+        known: &dyn Foreknowledge,
     ) -> ground::Guard {
         ground::Guard {
-            at_start: self.ground_condition(&guard.at_start, binding),
-            over_all: self.ground_condition(&guard.over_all, binding),
-            now: self.ground_condition(&guard.now, binding),
+            at_start: self.expand(&guard.at_start, binding, known),
+            over_all: self.expand(&guard.over_all, binding, known),
+            now: self.expand(&guard.now, binding, known),
         }
     }
 
@@ -169,14 +205,21 @@ impl Task {
         condition: &Condition,
         binding: &mut Vec<ObjectId>,
     ) -> ground::Condition {
+        self.expand(condition, binding, &Nothing)
+    }
+
+    /// As [`Self::ground_condition`], with `known` as for [`Self::instantiate_knowing`].
+    fn expand(
+        &mut self,
+        condition: &Condition,
+        binding: &mut Vec<ObjectId>,
+        known: &dyn Foreknowledge,
+    ) -> ground::Condition {
         match condition {
             Condition::Atom(atom) => ground::Condition::Fact(self.ground_atom(atom, binding)),
             Condition::Equal(left, right) => {
-                if resolve(*left, binding) == resolve(*right, binding) {
-                    ground::Condition::TRUE
-                } else {
-                    ground::Condition::FALSE
-                }
+                let are_equal = resolve(*left, binding) == resolve(*right, binding);
+                ground::Condition::always(are_equal)
             }
             Condition::Compare(comparison, left, right) => ground::Condition::Compare(
                 *comparison,
@@ -184,38 +227,42 @@ impl Task {
                 self.ground_expression(right, binding),
             ),
             Condition::Not(part) => {
-                ground::Condition::Not(Box::new(self.ground_condition(part, binding)))
+                ground::Condition::Not(Box::new(self.expand(part, binding, known)))
             }
             Condition::And(parts) => ground::Condition::And(
                 parts
                     .iter()
-                    .map(|part| self.ground_condition(part, binding))
+                    .map(|part| self.expand(part, binding, known))
                     .collect(),
             ),
             Condition::Or(parts) => ground::Condition::Or(
                 parts
                     .iter()
-                    .map(|part| self.ground_condition(part, binding))
+                    .map(|part| self.expand(part, binding, known))
                     .collect(),
             ),
             Condition::Forall(variables, part) => {
-                ground::Condition::And(self.ground_each(variables, part, binding))
+                ground::Condition::And(self.expand_each(variables, part, binding, known))
             }
             Condition::Exists(variables, part) => {
-                ground::Condition::Or(self.ground_each(variables, part, binding))
+                ground::Condition::Or(self.expand_each(variables, part, binding, known))
             }
         }
     }
 
-    fn ground_each(
+    fn expand_each(
         &mut self,
         variables: &[Variable],
         part: &Condition,
         binding: &mut Vec<ObjectId>,
+        known: &dyn Foreknowledge,
     ) -> Vec<ground::Condition> {
         let mut parts = Vec::new();
         self.for_all(variables, binding, &mut |task, binding| {
-            parts.push(task.ground_condition(part, binding));
+            parts.push(match known.truth(part, binding) {
+                Some(truth) => ground::Condition::always(truth),
+                None => task.expand(part, binding, known),
+            });
         });
         parts
     }
@@ -256,21 +303,15 @@ impl Task {
     }
 
     fn ground_atom(&mut self, atom: &Atom, binding: &[ObjectId]) -> FactId {
-        let arguments = atom
-            .arguments
-            .iter()
-            .map(|&term| resolve(term, binding))
-            .collect();
-        self.fact(atom.predicate, arguments)
+        with_arguments(&atom.arguments, binding, |arguments| {
+            self.fact(atom.predicate, arguments)
+        })
     }
 
     fn ground_fluent(&mut self, fluent: &Fluent, binding: &[ObjectId]) -> FluentId {
-        let arguments = fluent
-            .arguments
-            .iter()
-            .map(|&term| resolve(term, binding))
-            .collect();
-        self.fluent(fluent.function, arguments)
+        with_arguments(&fluent.arguments, binding, |arguments| {
+            self.fluent(fluent.function, arguments)
+        })
     }
 
     /// Calls `action` once for each way to append objects for `variables` to the binding.
@@ -284,8 +325,8 @@ impl Task {
             action(self, binding);
             return;
         };
-        let problem = self.problem.clone();
-        for object in problem.objects_of(&first.types) {
+        let domains = self.domains.clone();
+        for &object in &*domains.objects(&first.types) {
             binding.push(object);
             self.for_all(rest, binding, action);
             binding.pop();
@@ -327,14 +368,14 @@ impl Task {
         for timed in &problem.timed {
             let change = match &timed.change {
                 TimedChange::Add(predicate, arguments) => {
-                    ground::Change::Add(self.fact(*predicate, arguments.clone()))
+                    ground::Change::Add(self.fact(*predicate, arguments))
                 }
                 TimedChange::Delete(predicate, arguments) => {
-                    ground::Change::Delete(self.fact(*predicate, arguments.clone()))
+                    ground::Change::Delete(self.fact(*predicate, arguments))
                 }
                 TimedChange::Assign(function, arguments, value) => ground::Change::Update {
                     operator: UpdateOperator::Assign,
-                    fluent: self.fluent(*function, arguments.clone()),
+                    fluent: self.fluent(*function, arguments),
                     value: ground::Expression::Constant(value.clone()),
                 },
             };
@@ -347,9 +388,12 @@ impl Task {
     }
 }
 
-fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
-    match term {
-        Term::Variable(position) => binding[position],
-        Term::Object(object) => object,
-    }
+fn is_known_to_fail(
+    guard: &problem::Guard,
+    binding: &[ObjectId],
+    known: &dyn Foreknowledge,
+) -> bool {
+    [&guard.at_start, &guard.over_all, &guard.now]
+        .into_iter()
+        .any(|part| known.truth(part, binding) == Some(false))
 }

@@ -20,6 +20,7 @@
 mod describe;
 mod domains;
 pub mod ground;
+mod hash;
 mod instantiate;
 mod interference;
 mod plan;
@@ -27,6 +28,7 @@ pub mod problem;
 pub mod reachability;
 mod simplify;
 mod task;
+mod terms;
 pub mod validate;
 
 pub use interference::Footprint;

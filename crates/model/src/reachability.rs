@@ -22,7 +22,6 @@ mod constants;
 mod effects;
 mod event;
 mod fixpoint;
-mod hash;
 mod join;
 mod reached;
 mod relaxation;
@@ -36,6 +35,7 @@ mod writes;
 
 use std::collections::BTreeSet;
 
+use crate::domains::Domains;
 use crate::ground::{Action, Condition, FactId};
 use crate::problem::{self, ObjectId, Problem, SchemaId, TimedChange};
 use crate::task::{GroundRule, Task};
@@ -94,9 +94,9 @@ pub struct Grounding {
 /// Finds all ground actions that can be reached, and enters the facts and fluents that they
 /// mention into the task's table.
 pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
-    let problem = task.problem.clone();
+    let (problem, domains) = (task.problem.clone(), task.domains.clone());
     let mut steps = settings.step_limit;
-    let Some(reachable) = reach(&problem, settings, &mut steps) else {
+    let Some(reachable) = reach(&problem, &domains, settings, &mut steps) else {
         return Answer::LimitReached;
     };
     let facts = enter_facts(task, &reachable.relaxation);
@@ -134,11 +134,16 @@ pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
 }
 
 /// The fixpoint in which all that starts can also end.
-fn reach<'a>(problem: &'a Problem, settings: &Settings, steps: &mut u64) -> Option<Reachable<'a>> {
+fn reach<'a>(
+    problem: &'a Problem,
+    domains: &'a Domains,
+    settings: &Settings,
+    steps: &mut u64,
+) -> Option<Reachable<'a>> {
     let read = writes::read(problem);
     let mut banned: Vec<BTreeSet<Arguments>> = vec![BTreeSet::new(); problem.schemas.len()];
     loop {
-        let mut relaxation = Relaxation::initially(problem);
+        let mut relaxation = Relaxation::initially(problem, domains);
         let rules = rule::rules_of(&relaxation, |schema| writes::is_start_silent(schema, &read));
         add_timed(&mut relaxation);
         let reachable = fixpoint(relaxation, &rules, &banned, settings, steps)?;
@@ -171,7 +176,7 @@ fn add_timed(relaxation: &mut Relaxation) {
 fn enter_facts(task: &mut Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
     let facts = relaxation.reached.facts();
     facts
-        .map(|(predicate, arguments)| task.fact(predicate, arguments.to_vec()))
+        .map(|(predicate, arguments)| task.fact(predicate, arguments))
         .collect()
 }
 
@@ -182,9 +187,8 @@ fn actions(task: &mut Task, reachable: &Reachable, memory: &mut Memory) -> Vec<A
         let mut instances: Vec<&[ObjectId]> = instances.iter().map(|a| &**a).collect();
         instances.sort_unstable();
         for arguments in instances {
-            let action = task
-                .instantiate(SchemaId::from(index), arguments)
-                .expect("variables range over objects of their types");
+            let schema = SchemaId::from(index);
+            let action = task.instantiate_knowing(schema, arguments, &reachable.relaxation);
             let action = action.simplified(&mut Unwritten {
                 task,
                 relaxation: &reachable.relaxation,

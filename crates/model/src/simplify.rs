@@ -69,7 +69,8 @@ impl Condition {
         }
     }
 
-    fn always(truth: bool) -> Self {
+    /// [`Condition::TRUE`] or [`Condition::FALSE`].
+    pub(crate) fn always(truth: bool) -> Self {
         if truth { Self::TRUE } else { Self::FALSE }
     }
 }
@@ -204,4 +205,91 @@ fn simplify_condition(condition: &mut Condition, constants: &mut impl Constants)
 
 fn simplify_expression(expression: &mut Expression, constants: &mut impl Constants) {
     *expression = std::mem::replace(expression, Expression::Duration).simplified(constants);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Comparison;
+
+    /// Fact 0 is true, fact 1 false, fluent 0 is 2; all others change.
+    struct Some0And1;
+
+    impl Constants for Some0And1 {
+        fn truth(&mut self, fact: FactId) -> Option<bool> {
+            [Some(true), Some(false)]
+                .get(fact.index())
+                .copied()
+                .flatten()
+        }
+
+        fn value(&mut self, fluent: FluentId) -> Option<Rational> {
+            (fluent.index() == 0).then(|| Rational::from(2))
+        }
+    }
+
+    const ALWAYS: Condition = Condition::Fact(FactId(0));
+    const NEVER: Condition = Condition::Fact(FactId(1));
+    const OPEN: Condition = Condition::Fact(FactId(2));
+
+    fn not(condition: Condition) -> Condition {
+        Condition::Not(Box::new(condition))
+    }
+
+    #[test]
+    fn what_always_holds_is_left_out_of_a_conjunction() {
+        let condition = Condition::And(vec![ALWAYS, Condition::And(vec![OPEN, not(NEVER)])]);
+        assert_eq!(condition.simplified(&mut Some0And1), OPEN);
+    }
+
+    #[test]
+    fn one_part_decides_a_conjunction_or_disjunction() {
+        let condition = Condition::And(vec![OPEN, NEVER]);
+        assert_eq!(condition.simplified(&mut Some0And1), Condition::FALSE);
+        let condition = Condition::Or(vec![OPEN, not(NEVER)]);
+        assert_eq!(condition.simplified(&mut Some0And1), Condition::TRUE);
+    }
+
+    #[test]
+    fn constant_numbers_are_compared_and_others_computed_as_far_as_possible() {
+        let two = Expression::Fluent(FluentId(0));
+        let open = Expression::Fluent(FluentId(1));
+        let three = Expression::Constant(Rational::from(3));
+        let compare = |left| Condition::Compare(Comparison::Less, left, three.clone());
+        assert_eq!(
+            compare(two.clone()).simplified(&mut Some0And1),
+            Condition::TRUE
+        );
+        let twice = Expression::Add(vec![two.clone(), two]);
+        let sum = Expression::Add(vec![open.clone(), twice]);
+        let four = Expression::Constant(Rational::from(4));
+        assert_eq!(
+            compare(sum).simplified(&mut Some0And1),
+            compare(Expression::Add(vec![open, four]))
+        );
+    }
+
+    #[test]
+    fn a_division_by_zero_is_left_as_it_is() {
+        let zero = || Box::new(Expression::Constant(Rational::ZERO));
+        let quotient = Expression::Divide(zero(), zero());
+        assert_eq!(quotient.clone().simplified(&mut Some0And1), quotient);
+    }
+
+    #[test]
+    fn an_effect_that_never_happens_is_dropped() {
+        let effect = |now| Effect {
+            guard: Guard {
+                now,
+                ..Guard::ALWAYS
+            },
+            change: Change::Add(FactId(3)),
+        };
+        let mut snap = SnapAction {
+            condition: Condition::TRUE,
+            effects: vec![effect(NEVER), effect(OPEN)],
+        };
+        snap.simplify(&mut Some0And1);
+        assert_eq!(snap.effects, [effect(OPEN)]);
+    }
 }

@@ -4,9 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
-use indexmap::IndexSet;
+use indexmap::Equivalent;
 
+use crate::domains::Domains;
 use crate::ground::{Change, Condition, FactId, FluentId};
+use crate::hash::Set;
 use crate::problem::{FunctionId, ObjectId, PredicateId, Problem, SchemaId};
 
 /// A problem, and the ground facts and fluents met so far.
@@ -16,8 +18,9 @@ use crate::problem::{FunctionId, ObjectId, PredicateId, Problem, SchemaId};
 #[derive(Clone, Debug)]
 pub struct Task {
     pub(crate) problem: Arc<Problem>,
-    pub(crate) facts: IndexSet<(PredicateId, Vec<ObjectId>)>,
-    pub(crate) fluents: IndexSet<(FunctionId, Vec<ObjectId>)>,
+    pub(crate) domains: Arc<Domains>,
+    pub(crate) facts: Set<(PredicateId, Vec<ObjectId>)>,
+    pub(crate) fluents: Set<(FunctionId, Vec<ObjectId>)>,
     pub(crate) initial: State,
     pub(crate) timed: Vec<TimedHappening>,
     pub(crate) goal: Condition,
@@ -86,8 +89,9 @@ impl Task {
         let problem = problem.into();
         let mut task = Self {
             problem: Arc::clone(&problem),
-            facts: IndexSet::new(),
-            fluents: IndexSet::new(),
+            domains: Arc::new(Domains::of(&problem)),
+            facts: Set::default(),
+            fluents: Set::default(),
             initial: State::default(),
             timed: Vec::new(),
             goal: Condition::TRUE,
@@ -95,11 +99,11 @@ impl Task {
             derived: BTreeSet::new(),
         };
         for (predicate, arguments) in &problem.initial_facts {
-            let fact = task.fact(*predicate, arguments.clone());
+            let fact = task.fact(*predicate, arguments);
             task.initial.facts.insert(fact);
         }
         for (function, arguments, value) in &problem.initial_values {
-            let fluent = task.fluent(*function, arguments.clone());
+            let fluent = task.fluent(*function, arguments);
             task.initial.values.insert(fluent, value.clone());
         }
         task.timed = task.ground_timed();
@@ -182,17 +186,15 @@ impl Task {
 
     /// The fluent in the table, if something has mentioned it.
     pub fn find_fluent(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<FluentId> {
-        let key = (function, arguments.to_vec());
         self.fluents
-            .get_index_of(&key)
+            .get_index_of(&Key(function, arguments))
             .map(|index| FluentId(narrow(index)))
     }
 
     /// The fact in the table, if something has mentioned it.
     pub fn find_fact(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<FactId> {
-        let key = (predicate, arguments.to_vec());
         self.facts
-            .get_index_of(&key)
+            .get_index_of(&Key(predicate, arguments))
             .map(|index| FactId(narrow(index)))
     }
 
@@ -202,18 +204,34 @@ impl Task {
             .apply_name(&self.problem.schemas[schema.index()].name, arguments)
     }
 
-    pub(crate) fn fact(&mut self, predicate: PredicateId, arguments: Vec<ObjectId>) -> FactId {
-        let (index, is_new) = self.facts.insert_full((predicate, arguments));
+    pub(crate) fn fact(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> FactId {
+        if let Some(fact) = self.find_fact(predicate, arguments) {
+            return fact;
+        }
+        let (index, _) = self.facts.insert_full((predicate, arguments.to_vec()));
         let fact = FactId(narrow(index));
-        if is_new && self.problem.predicates[predicate.index()].is_derived {
+        if self.problem.predicates[predicate.index()].is_derived {
             self.ground_rules(fact);
         }
         fact
     }
 
-    pub(crate) fn fluent(&mut self, function: FunctionId, arguments: Vec<ObjectId>) -> FluentId {
-        let (index, _) = self.fluents.insert_full((function, arguments));
+    pub(crate) fn fluent(&mut self, function: FunctionId, arguments: &[ObjectId]) -> FluentId {
+        if let Some(fluent) = self.find_fluent(function, arguments) {
+            return fluent;
+        }
+        let (index, _) = self.fluents.insert_full((function, arguments.to_vec()));
         FluentId(narrow(index))
+    }
+}
+
+/// A symbol with its arguments, to look up in a table without a vector of its own.
+#[derive(Hash)]
+struct Key<'a, S>(S, &'a [ObjectId]);
+
+impl<S: PartialEq> Equivalent<(S, Vec<ObjectId>)> for Key<'_, S> {
+    fn equivalent(&self, (symbol, arguments): &(S, Vec<ObjectId>)) -> bool {
+        self.0 == *symbol && self.1 == arguments
     }
 }
 

@@ -1,4 +1,45 @@
 //! PDDL and plan text to the model, and back.
+//!
+//! In: texts, as [`Source`]s. Out: a [`Problem`](elbowroom_model::Problem), a
+//! [`TimeTriggeredPlan`](elbowroom_model::TimeTriggeredPlan), and [`Diagnostic`]s that say with
+//! line, column and excerpt what is wrong and what was expected.
+//!
+//! The way through the crate:
+//!
+//! 1. `syntax`: text to words to nested lists, each with its place. Deep nesting is refused
+//!    here, so that everything after may recurse.
+//! 2. `lower`: lists to the model, names resolved. One file for each part of the language.
+//!    After a mistake, reading goes on and reports the next one.
+//! 3. `plan_text`: what planners print, to a plan and back.
+//!
+//! PDDL 2.1 levels 1 to 4 and PDDL 2.2 are read. What we do not execute ([`Feature`]) is refused
+//! by name and place, or ignored with a warning where it cannot affect validity. No bytes make
+//! the readers panic. They may not know files: who opened a text gives it a name.
+//!
+//! ```
+//! use elbowroom_model::Task;
+//! use elbowroom_pddl::{Source, read_plan, read_problem, write_plan};
+//!
+//! let domain = Source::new(
+//!     "lamp.pddl",
+//!     "(define (domain lamp) (:predicates (lit))
+//!        (:durative-action glow :duration (= ?duration 5) :effect (at start (lit))))",
+//! );
+//! let problem = Source::new(
+//!     "evening.pddl",
+//!     "(define (problem evening) (:domain lamp) (:init) (:goal (lit)))",
+//! );
+//! let (problem, warnings) = read_problem(&domain, &problem)?;
+//! assert!(warnings.is_empty());
+//!
+//! let mut task = Task::new(problem);
+//! let (plan, _) = read_plan(&Source::new("plan", "0.5: (GLOW)"), &mut task)?;
+//! assert_eq!(write_plan(&task, &plan), "0.500: (glow) [5.000]\n");
+//!
+//! let mistaken = read_plan(&Source::new("plan", "0.5: (glwo)"), &mut task).unwrap_err();
+//! assert_eq!(mistaken.to_string(), "plan:1:7: error: unknown action `glwo`");
+//! # Ok::<(), elbowroom_pddl::Diagnostics>(())
+//! ```
 
 mod diagnostic;
 mod feature;

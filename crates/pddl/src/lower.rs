@@ -9,6 +9,7 @@ mod derived;
 mod domain;
 mod duration;
 mod effect;
+mod expansion;
 mod expression;
 mod hierarchy;
 mod init;
@@ -30,7 +31,7 @@ use crate::lower::names::Names;
 use crate::lower::sections::Sections;
 use crate::lower::typed_list::TypeNames;
 use crate::report::Report;
-use crate::source::{FileId, Source};
+use crate::source::{FileId, Source, Span};
 use crate::syntax;
 
 /// Reads a planning problem from the texts of its domain and problem files.
@@ -71,6 +72,10 @@ struct Reader {
     copied: usize,
     /// The types resolved last.
     resolved_types: Option<(TypeNames, Vec<TypeId>)>,
+    /// Where each schema's name stands.
+    schema_spans: Vec<Span>,
+    /// Where each rule's head stands.
+    rule_spans: Vec<Span>,
 }
 
 impl Reader {
@@ -81,6 +86,8 @@ impl Reader {
             names: Names::default(),
             copied: 0,
             resolved_types: None,
+            schema_spans: Vec::new(),
+            rule_spans: Vec::new(),
         }
     }
 

@@ -7,6 +7,9 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source(Arc<Inner>);
 
+/// Some editors put it before a text.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 #[derive(Debug, PartialEq, Eq)]
 struct Inner {
     name: String,
@@ -18,7 +21,10 @@ struct Inner {
 impl Source {
     /// A text under a name, usually the path of the file it comes from.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
-        let text = text.into();
+        let mut text = text.into();
+        if text.starts_with(BYTE_ORDER_MARK) {
+            text.remove(0);
+        }
         let lines = std::iter::once(0)
             .chain(text.match_indices('\n').map(|(at, _)| at + 1))
             .collect();
@@ -32,8 +38,7 @@ impl Source {
     /// The same from bytes. What is not UTF-8 becomes U+FFFD, which the readers report unless it
     /// stands in a comment.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
-        let text = String::from_utf8_lossy(bytes);
-        Self::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text))
+        Self::new(name, String::from_utf8_lossy(bytes))
     }
 
     /// The name it is reported under.

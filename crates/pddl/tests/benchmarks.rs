@@ -1,63 +1,65 @@
-//! Reads all of the benchmark set.
-use elbowroom_pddl::{Source, read_problem};
-use std::path::PathBuf;
+//! What becomes of the benchmark set.
+
+#[allow(dead_code, reason = "the test needs a part of what the example shows")]
+#[path = "../examples/pddl_support/document.rs"]
+mod document;
+#[path = "../examples/pddl_support/survey.rs"]
+mod survey;
+
+use insta::assert_snapshot;
 
 #[test]
-fn scan() {
-    let root = PathBuf::from(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/data/pddl"
-    ));
-    let text = std::fs::read_to_string(root.join("manifest.csv")).unwrap();
-    let mut read = 0;
-    for line in text.lines().skip(1) {
-        let f: Vec<_> = line.split(',').collect();
-        let load = |p: &str| Source::from_bytes(p, &std::fs::read(root.join(p)).unwrap());
-        match read_problem(&load(f[3]), &load(f[4])) {
-            Ok((_, w)) => {
-                read += 1;
-                for w in w {
-                    println!("W {} {}", f[5], w);
-                }
-            }
-            Err(d) => {
-                for d in d.errors() {
-                    println!(
-                        "E{} {} {}",
-                        if d.is_unsupported() { "U" } else { "M" },
-                        f[5],
-                        d
-                    );
-                }
-            }
-        }
-    }
-    let text = std::fs::read_to_string(root.join("plans.csv")).unwrap();
-    for line in text.lines().skip(1) {
-        let f: Vec<_> = line.split(',').collect();
-        let load = |p: &str| Source::from_bytes(p, &std::fs::read(root.join(p)).unwrap());
-        match read_problem(&load(f[3]), &load(f[4])) {
-            Ok((p, _)) => {
-                let mut t = elbowroom_model::Task::new(p);
-                match elbowroom_pddl::read_plan(&load(f[5]), &mut t) {
-                    Ok((p, w)) => {
-                        let n: usize = f[7].parse().unwrap();
-                        println!("P {} {} {}", p.steps.len() == n, n, f[5]);
-                        for w in w {
-                            println!("PW {w}")
-                        }
-                        let text = elbowroom_pddl::write_plan(&t, &p);
-                        let (again, _) =
-                            elbowroom_pddl::read_plan(&Source::new("w", text), &mut t).unwrap();
-                        let mut p = p;
-                        p.steps.sort_by(|a, b| a.start.cmp(&b.start));
-                        assert_eq!(again, p);
-                    }
-                    Err(e) => println!("PE {} {e}", f[8]),
-                }
-            }
-            Err(_) => println!("PX {}", f[5]),
-        }
-    }
-    println!("READ {read}");
+fn every_benchmark_is_read_unless_it_is_wrong_or_uses_a_refused_feature() {
+    let Some(folder) = survey::folder() else {
+        println!("skipped: there is no benchmark set; set ELBOWROOM_SHARED to its folder");
+        return;
+    };
+    let survey = survey::survey(&folder);
+    let instances: usize = survey.domains.iter().map(|domain| domain.instances).sum();
+    let read: usize = survey.domains.iter().map(|domain| domain.read).sum();
+    assert_eq!((instances, read), (827, 720));
+    assert_eq!(survey.plans, (159, 159));
+    let reasons: Vec<_> = document::reasons(&survey)
+        .iter()
+        .map(|(reason, count)| format!("{count} {reason}"))
+        .collect();
+    assert_snapshot!(reasons.join("\n"), @r"
+    8 control parameters
+    24 events
+    15 mistakes
+    8 object fluents
+    1 processes
+    26 processes, events
+    5 processes, global constraints
+    20 trajectory constraints
+    ");
+    let mistaken: Vec<_> = survey
+        .domains
+        .iter()
+        .flat_map(|domain| &domain.refused)
+        .filter(|(_, errors)| survey::reason(errors) == "mistakes")
+        .map(|(path, _)| path.as_str())
+        .collect();
+    assert_snapshot!(mistaken.join("\n"), @r"
+    pddl-plus/1d-powered-descent/instances/prob_earth07.pddl
+    pddl-plus/1d-powered-descent/instances/prob_earth14.pddl
+    pddl-plus/1d-powered-descent/instances/prob_earth20.pddl
+    pddl-plus/generator/instances/instance_1.pddl
+    pddl-plus/generator/instances/instance_3.pddl
+    pddl-plus/generator/instances/instance_6.pddl
+    pddl-plus/generator/instances/instance_8.pddl
+    rosplan/test_domain/instances/test_problem_invalid_syntax.pddl
+    strathclyde/crew-planning-temporal-satisficing-2011/instances/instance-9.pddl
+    tfd/rovers-object-fluent/instances/pfile2.pddl
+    tfd/rovers-object-fluent/instances/pfile4.pddl
+    tfd/rovers-object-fluent/instances/pfile6.pddl
+    tfd/rovers-object-fluent/instances/pfile7.pddl
+    tfd/rovers-object-fluent/instances/pfile9.pddl
+    tfd/timed-initials-test/instances/problem.pddl
+    ");
+    let written = include_str!("../../../docs/pddl-support.md");
+    assert!(
+        written == document::document(Some(&survey)),
+        "docs/pddl-support.md is out of date: run the example pddl_support"
+    );
 }

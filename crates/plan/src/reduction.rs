@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 
 use elbowroom_num::{Delta, End, Rational};
-use elbowroom_stn::{ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId};
+use elbowroom_stn::{
+    ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Weight,
+};
 
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::Substitution;
@@ -159,16 +161,13 @@ impl Reduction {
                 .collect(),
         };
         let BoxNetwork { network, edges } = self.network(&ranges);
-        // No schedule for any values: nothing to gain, and the nominal check will say so.
-        let Ok(network) = ConsistentNetwork::try_from(network) else {
-            return;
-        };
         let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
-        let implied: Vec<usize> = network
-            .implied(has_parameter)
-            .into_iter()
-            .map(|id| edges[id.index()])
-            .collect();
+        // Whole numbers are several times faster; sums of paths must stay far from overflow.
+        let implied = match scaled(&network) {
+            Some(network) => implied(network, has_parameter),
+            None => implied(network, has_parameter),
+        };
+        let implied: Vec<usize> = implied.into_iter().map(|id| edges[id.index()]).collect();
         let mut index = 0;
         self.edges.retain(|_| {
             index += 1;
@@ -316,6 +315,43 @@ impl Edge {
             Some(end) => end.reach(envelope).map(|reach| &self.constant + reach),
         }
     }
+}
+
+/// The constraints that others imply; none if the network is inconsistent (then there is nothing
+/// to gain, and the check of the nominal values will say so).
+fn implied<W: Weight>(
+    network: Network<W>,
+    keep: impl Fn(ConstraintId) -> bool,
+) -> Vec<ConstraintId> {
+    ConsistentNetwork::try_from(network).map(|network| network.implied(keep)).unwrap_or_default()
+}
+
+/// The network with all bounds multiplied by their common denominator, if that gives numbers so
+/// small that no sum of them overflows.
+fn scaled(network: &Network<Delta>) -> Option<Network<i128>> {
+    const LARGEST: i128 = 1 << 80;
+    let mut denominator: i128 = 1;
+    for constraint in network.constraints() {
+        let own = i128::from(constraint.bound.real.denominator()?);
+        denominator = denominator.checked_mul(own / gcd(denominator, own))?;
+        if denominator > LARGEST {
+            return None;
+        }
+    }
+    let mut whole = Network::with_nodes(network.node_count());
+    for constraint in network.constraints() {
+        let (numerator, own) = constraint.bound.real.as_small()?;
+        let bound = i128::from(numerator).checked_mul(denominator / i128::from(own))?;
+        if bound.abs() > LARGEST {
+            return None;
+        }
+        whole.add(Constraint { from: constraint.from, to: constraint.to, bound });
+    }
+    Some(whole)
+}
+
+fn gcd(a: i128, b: i128) -> i128 {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 fn parameter_of(bound: &Bound) -> Option<ParameterId> {

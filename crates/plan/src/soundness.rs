@@ -109,6 +109,11 @@ impl<'a> Soundness<'a> {
         })
     }
 
+    /// The plan's network with rigidly connected nodes taken together.
+    pub fn reduction(&self) -> &Reduction {
+        &self.reduction
+    }
+
     /// The obligations.
     pub fn obligations(&self) -> &Obligations {
         &self.obligations

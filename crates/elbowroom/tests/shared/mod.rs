@@ -1,5 +1,9 @@
 //! Benchmark files beside the repository. Tests that need them say so and pass where they are
 //! absent.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+pub(crate) mod draw;
+pub(crate) mod instances;
 
 use std::path::{Path, PathBuf};
 

@@ -9,11 +9,19 @@ use crate::task::Task;
 use super::relaxation::Relaxation;
 use super::value::Value;
 
-/// Answers given before, by position of the fact or fluent.
+/// Knowns given before, by position of the fact or fluent.
 #[derive(Default)]
 pub(super) struct Memory {
-    facts: Vec<Option<Option<bool>>>,
-    fluents: Vec<Option<Option<Rational>>>,
+    facts: Vec<Known<bool>>,
+    fluents: Vec<Known<Rational>>,
+}
+
+#[derive(Clone, Default)]
+enum Known<T> {
+    #[default]
+    NotAsked,
+    Varies,
+    Always(T),
 }
 
 /// The facts and fluents of a task that no reached event writes.
@@ -28,7 +36,7 @@ pub(super) struct Unwritten<'u> {
 
 impl Constants for Unwritten<'_> {
     fn truth(&mut self, fact: FactId) -> Option<bool> {
-        *remembered(&mut self.memory.facts, fact.index(), || {
+        remembered(&mut self.memory.facts, fact.index(), || {
             let (predicate, arguments) = self.task.facts.get_index(fact.index())?;
             // A derived fact changes with those that its rules mention.
             if self.task.problem.predicates[predicate.index()].is_derived {
@@ -46,13 +54,22 @@ impl Constants for Unwritten<'_> {
                 Value::Varies | Value::Undefined => None,
             }
         })
-        .clone()
     }
 }
 
-fn remembered<T>(memory: &mut Vec<Option<T>>, position: usize, find: impl FnOnce() -> T) -> &T {
+fn remembered<T: Clone>(
+    memory: &mut Vec<Known<T>>,
+    position: usize,
+    find: impl FnOnce() -> Option<T>,
+) -> Option<T> {
     if memory.len() <= position {
-        memory.resize_with(position + 1, || None);
+        memory.resize(position + 1, Known::NotAsked);
     }
-    memory[position].get_or_insert_with(find)
+    if let Known::NotAsked = memory[position] {
+        memory[position] = find().map_or(Known::Varies, Known::Always);
+    }
+    match &memory[position] {
+        Known::Always(value) => Some(value.clone()),
+        Known::Varies | Known::NotAsked => None,
+    }
 }

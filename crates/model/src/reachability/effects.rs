@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 
 use crate::problem::{Body, Guard, ObjectId, SchemaId, Term, Variable};
+use crate::terms::with_arguments;
 
 use super::event::{Event, Symbol};
 use super::fixpoint::Fixpoint;
-use super::relaxation::with_arguments;
 use super::waiting::Pending;
 use super::writes;
 
@@ -103,8 +103,8 @@ impl Fixpoint<'_, '_> {
             let pending = |binding: &[ObjectId]| Pending::Effect(id, binding.into());
             return self.wait(blockers, || pending(binding));
         };
-        let objects = self.relaxation().domains.objects(&first.types);
-        for object in objects.into_owned() {
+        let domains = self.relaxation().domains;
+        for &object in &*domains.objects(&first.types) {
             binding.push(object);
             self.apply_effect(id, rest, binding)?;
             binding.pop();

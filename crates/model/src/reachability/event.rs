@@ -49,3 +49,42 @@ impl Equivalent<Event> for EventKey<'_> {
         self.symbol == event.symbol && *self.arguments == *event.arguments
     }
 }
+
+/// A set of kinds of events.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Symbols {
+    /// True, false, changed; each by predicate or function.
+    members: [Vec<bool>; 3],
+}
+
+impl Symbols {
+    pub(super) fn insert(&mut self, symbol: Symbol) {
+        let (kind, index) = Self::place(symbol);
+        let members = &mut self.members[kind];
+        if members.len() <= index {
+            members.resize(index + 1, false);
+        }
+        members[index] = true;
+    }
+
+    pub(super) fn contains(&self, symbol: Symbol) -> bool {
+        let (kind, index) = Self::place(symbol);
+        self.members[kind].get(index) == Some(&true)
+    }
+
+    fn place(symbol: Symbol) -> (usize, usize) {
+        match symbol {
+            Symbol::True(predicate) => (0, predicate.index()),
+            Symbol::False(predicate) => (1, predicate.index()),
+            Symbol::Changed(function) => (2, function.index()),
+        }
+    }
+}
+
+impl Extend<Symbol> for Symbols {
+    fn extend<I: IntoIterator<Item = Symbol>>(&mut self, symbols: I) {
+        for symbol in symbols {
+            self.insert(symbol);
+        }
+    }
+}

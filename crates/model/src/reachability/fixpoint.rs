@@ -13,11 +13,11 @@ use crate::problem::{Body, ObjectId, PredicateId, SchemaId};
 use super::Settings;
 use super::effects::List;
 use super::event::{Event, Symbol};
-use super::hash::Set;
 use super::join::{Trigger, join};
 use super::relaxation::Relaxation;
 use super::rule::{Head, Rule};
 use super::waiting::{Pending, Ticket, WaitingRoom};
+use crate::hash::Set;
 
 /// The objects for a schema's parameters.
 pub(super) type Arguments = Box<[ObjectId]>;

@@ -3,7 +3,7 @@
 use crate::problem::{FunctionId, ObjectId, PredicateId};
 
 use super::event::{Event, EventKey, Symbol};
-use super::hash::Set;
+use crate::hash::Set;
 
 /// All events that can come about, in the order in which they were found.
 ///

@@ -5,41 +5,41 @@
 //! value. So a condition that is impossible here is impossible in every plan made of the actions
 //! reached so far, and what is possible stays so as more events are reached.
 
-use std::collections::BTreeSet;
-
 use elbowroom_num::Rational;
 
 use crate::domains::Domains;
+use crate::instantiate::Foreknowledge;
 use crate::problem::{
     Atom, Comparison, Condition, DurationConstraint, Expression, Fluent, FunctionId, ObjectId,
-    Problem, Term, Variable,
+    Problem, Variable,
 };
+use crate::terms::{resolve, with_arguments};
 
-use super::event::{Event, EventKey, Symbol};
-use super::hash::Map;
+use super::event::{Event, EventKey, Symbol, Symbols};
 use super::reached::Reached;
 use super::value::Value;
 use super::writes;
+use crate::hash::Map;
 
 /// The events reached so far, and what never changes.
 pub(super) struct Relaxation<'a> {
     pub(super) problem: &'a Problem,
-    pub(super) domains: Domains,
+    pub(super) domains: &'a Domains,
     pub(super) reached: Reached,
     /// The kinds of events that may be reached after time 0.
-    written: BTreeSet<Symbol>,
+    written: Symbols,
     /// The initial values, by the event that would change them.
     values: Map<Event, Rational>,
 }
 
 impl<'a> Relaxation<'a> {
     /// At time 0.
-    pub(super) fn initially(problem: &'a Problem) -> Self {
+    pub(super) fn initially(problem: &'a Problem, domains: &'a Domains) -> Self {
         let facts = problem.initial_facts.iter();
         let values = problem.initial_values.iter();
         Self {
             problem,
-            domains: Domains::of(problem),
+            domains,
             reached: Reached::initially(
                 problem.predicates.len(),
                 facts.map(|(predicate, arguments)| (*predicate, arguments.as_slice())),
@@ -59,7 +59,7 @@ impl<'a> Relaxation<'a> {
 
     /// Whether such an event may be reached after time 0.
     pub(super) fn is_written(&self, symbol: Symbol) -> bool {
-        self.written.contains(&symbol)
+        self.written.contains(symbol)
     }
 
     /// Whether no event can make the condition possible that is not possible at time 0 (`wanted`),
@@ -302,29 +302,51 @@ impl<'a> Relaxation<'a> {
     }
 }
 
-/// The object that a term stands for.
-pub(super) fn resolve(term: Term, binding: &[ObjectId]) -> ObjectId {
-    match term {
-        Term::Variable(position) => binding[position],
-        Term::Object(object) => object,
+impl Foreknowledge for Relaxation<'_> {
+    /// Decided by the basic facts and the fluents that nothing reached so far writes. Quantifiers
+    /// are left alone: what they range over will be asked for one by one.
+    fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool> {
+        match condition {
+            Condition::Atom(atom) if self.problem.predicates[atom.predicate.index()].is_derived => {
+                None
+            }
+            Condition::Atom(atom) => with_arguments(&atom.arguments, binding, |arguments| {
+                self.reached.constant(atom.predicate, arguments)
+            }),
+            Condition::Equal(left, right) => {
+                Some(resolve(*left, binding) == resolve(*right, binding))
+            }
+            Condition::Compare(comparison, left, right) => {
+                match (self.value(left, binding), self.value(right, binding)) {
+                    (Value::Number(left), Value::Number(right)) => {
+                        Some(comparison.holds(&left, &right))
+                    }
+                    _ => None,
+                }
+            }
+            Condition::Not(part) => self.truth(part, binding).map(|truth| !truth),
+            Condition::And(parts) => self.joint_truth(parts, true, binding),
+            Condition::Or(parts) => self.joint_truth(parts, false, binding),
+            Condition::Forall(..) | Condition::Exists(..) => None,
+        }
     }
 }
 
-/// Calls `action` with the objects that the terms stand for.
-pub(super) fn with_arguments<R>(
-    terms: &[Term],
-    binding: &[ObjectId],
-    action: impl FnOnce(&[ObjectId]) -> R,
-) -> R {
-    // Nearly all predicates are this short; then nothing is allocated.
-    let mut short = [ObjectId(0); 6];
-    if let Some(short) = short.get_mut(..terms.len()) {
-        for (place, &term) in short.iter_mut().zip(terms) {
-            *place = resolve(term, binding);
+impl Relaxation<'_> {
+    /// Of a conjunction, or a disjunction: `neutral` is what no part changes.
+    fn joint_truth(
+        &self,
+        parts: &[Condition],
+        neutral: bool,
+        binding: &[ObjectId],
+    ) -> Option<bool> {
+        let mut is_known = true;
+        for part in parts {
+            match self.truth(part, binding) {
+                Some(truth) if truth != neutral => return Some(truth),
+                truth => is_known &= truth.is_some(),
+            }
         }
-        action(short)
-    } else {
-        let long: Vec<_> = terms.iter().map(|&term| resolve(term, binding)).collect();
-        action(&long)
+        is_known.then_some(neutral)
     }
 }

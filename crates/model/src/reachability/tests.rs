@@ -1,8 +1,6 @@
-//! Sentences about reachability, and the comparison with a plainly right twin.
+//! The comparison with a plainly right twin, and limits.
 
-mod build;
 mod random;
-mod sentences;
 mod twin;
 
 use proptest::prelude::*;

@@ -6,7 +6,7 @@ use crate::problem::{ObjectId, SchemaId};
 
 use super::effects::EffectId;
 use super::event::Event;
-use super::hash::{Map, Set};
+use crate::hash::{Map, Set};
 
 /// Everything that waits, with a ticket each.
 pub(super) struct WaitingRoom {

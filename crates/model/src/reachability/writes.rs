@@ -1,15 +1,13 @@
 //! Which kinds of events a problem's actions and timed initials can bring about at all, and which
 //! kinds its conditions ask for.
 
-use std::collections::BTreeSet;
-
 use crate::problem::{Body, Change, Condition, Expression, Problem, Schema, Term, TimedChange};
 
-use super::event::Symbol;
+use super::event::{Symbol, Symbols};
 
 /// All kinds of events that something in the problem can bring about after time 0.
-pub(super) fn written(problem: &Problem) -> BTreeSet<Symbol> {
-    let mut written = BTreeSet::new();
+pub(super) fn written(problem: &Problem) -> Symbols {
+    let mut written = Symbols::default();
     for schema in &problem.schemas {
         match &schema.body {
             Body::Instantaneous { effects, .. } => {
@@ -59,7 +57,7 @@ pub(super) fn terms_of(change: &Change) -> &[Term] {
 
 /// Whether no condition can tell that the action has started: none asks for any of the events that
 /// it brings about before its end.
-pub(super) fn is_start_silent(schema: &Schema, read: &BTreeSet<Symbol>) -> bool {
+pub(super) fn is_start_silent(schema: &Schema, read: &Symbols) -> bool {
     match &schema.body {
         Body::Instantaneous { .. } => true,
         Body::Durative {
@@ -70,14 +68,14 @@ pub(super) fn is_start_silent(schema: &Schema, read: &BTreeSet<Symbol>) -> bool 
             let changes = start_effects.iter().map(|effect| symbol_of(&effect.change));
             let fluents = continuous.iter().map(|effect| effect.fluent.function);
             let mut events = changes.chain(fluents.map(Symbol::Changed));
-            events.all(|event| !read.contains(&event))
+            events.all(|event| !read.contains(event))
         }
     }
 }
 
 /// All kinds of events that could make some condition of the problem true, the goal included.
-pub(super) fn read(problem: &Problem) -> BTreeSet<Symbol> {
-    let mut read = BTreeSet::new();
+pub(super) fn read(problem: &Problem) -> Symbols {
+    let mut read = Symbols::default();
     let mut visit = |symbol| {
         read.insert(symbol);
     };

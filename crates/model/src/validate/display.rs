@@ -8,6 +8,7 @@ use super::violation::{
     ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
 };
 use crate::describe::decimal;
+use crate::problem::Comparison;
 
 /// A time as planners print it, with at least three decimals where that is exact.
 pub(super) fn clock(time: &Rational) -> String {
@@ -158,6 +159,7 @@ impl fmt::Display for Reason {
             }
             Self::Comparison {
                 comparison,
+                operator,
                 values,
                 left,
                 right,
@@ -172,6 +174,9 @@ impl fmt::Display for Reason {
                 }
                 let gap = (left - right).abs();
                 match (is_true, gap.is_zero()) {
+                    (false, false) if *operator == Comparison::Equal => {
+                        write!(f, ", off by {}", decimal(&gap))
+                    }
                     (false, false) => write!(f, ", short by {}", decimal(&gap)),
                     (false, true) => write!(f, ", not strictly so"),
                     (true, _) => write!(f, ", so that {comparison} is true"),

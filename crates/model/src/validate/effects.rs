@@ -38,6 +38,7 @@ pub(super) fn rates<'b>(judge: &Judge<'b>) -> Vec<Rate<'b>> {
             .filter(|(_, on)| **on)
         {
             rates.push(Rate {
+                step: position,
                 fluent: effect.fluent,
                 per_time: &effect.rate,
                 duration: step.duration.as_ref(),

@@ -40,10 +40,11 @@ impl Witness<'_> {
                 is_true,
                 since: (self.since)(*fact),
             }),
-            Condition::Compare(_, left, right) => {
+            Condition::Compare(operator, left, right) => {
                 let value = |side| self.reading.value(side).unwrap_or_default();
                 reasons.push(Reason::Comparison {
                     comparison: self.task.describe_condition(condition),
+                    operator: *operator,
                     values: self.values([left, right]),
                     left: value(left),
                     right: value(right),

@@ -8,14 +8,14 @@ use elbowroom_num::Rational;
 use super::derived::{Derivation, Derived};
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
-use super::piece::{Piece, mentions_derived};
+use super::piece::{Break, Piece, mentions_derived};
 use super::reading::{Fault, Moment, holds};
 use super::state::{Motion, Now, Reading};
 use super::stop::{Place, Stop};
 use super::timeline::{Group, What};
-use super::violation::{Mistake, When};
-use super::{Settings, interference};
-use crate::ground::{Condition, DurativeBody, FactId, SnapAction};
+use super::violation::{Mistake, Reason, When};
+use super::{Settings, effects, interference};
+use crate::ground::{Body, Condition, DurativeBody, FactId, SnapAction};
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::task::Task;
 
@@ -66,9 +66,9 @@ impl<'a> Judge<'a> {
 
     /// From just after the group at `from` to the arrival at the next one.
     fn pass(&mut self, from: &Rational, to: &Rational) -> Result<(), Stop> {
-        let rates = super::effects::rates(self);
+        let rates = effects::rates(self);
         let motion = Motion::from(&self.now, &rates)
-            .map_err(|fault| self.stop(fault, &Place::rates(from)))?;
+            .map_err(|(step, fault)| self.stop(fault, &Place::rate(from, step)))?;
         let length = to - from;
         self.watch_over_all(from, &motion, &length)?;
         motion.carry(&mut self.now, &length);
@@ -96,6 +96,7 @@ impl<'a> Judge<'a> {
             derivation: &self.derivation,
             slack: &self.settings.slack,
         };
+        let mut first: Option<(Break, Place<'_>)> = None;
         for (&position, state) in &mut running {
             let (step, body) = self.durative(position);
             let duration = step.duration.as_ref();
@@ -104,10 +105,12 @@ impl<'a> Judge<'a> {
                 let broken = piece
                     .first_break(conjunct, duration, !state.is_new)
                     .map_err(|fault| self.stop(fault, &place))?;
-                if let Some(broken) = broken {
-                    let mut then = self.now.clone();
-                    motion.carry(&mut then, &broken.witness);
-                    return Err(self.fails(&place, &then, Some(&broken)));
+                if let Some(broken) = broken
+                    && first
+                        .as_ref()
+                        .is_none_or(|(earlier, _)| broken.is_before(earlier))
+                {
+                    first = Some((broken, place));
                 }
                 if let Some(demand) = Demand::of(conjunct) {
                     let key = (Some(position), When::OverAll, index);
@@ -125,6 +128,11 @@ impl<'a> Judge<'a> {
                 }
             }
         }
+        if let Some((broken, place)) = first {
+            let mut then = self.now.clone();
+            motion.carry(&mut then, &broken.witness);
+            return Err(self.fails(&place, &then, Some(&broken)));
+        }
         self.running = running;
         self.margins = margins;
         Ok(())
@@ -137,12 +145,9 @@ impl<'a> Judge<'a> {
             match happening.what {
                 What::Timed(_) => {}
                 What::Instant(position) => {
-                    let crate::ground::Body::Instantaneous(snap) =
-                        &self.plan.steps[position].action.body
-                    else {
-                        continue;
-                    };
-                    self.require(&snap.condition, When::Now, Some(position), time)?;
+                    if let Body::Instantaneous(snap) = &self.plan.steps[position].action.body {
+                        self.require(&snap.condition, When::Now, Some(position), time)?;
+                    }
                 }
                 What::Start(position) => {
                     let (_, body) = self.durative(position);
@@ -285,7 +290,7 @@ impl<'a> Judge<'a> {
         condition: &Condition,
         now: &Now,
         step: Option<usize>,
-    ) -> Vec<super::violation::Reason> {
+    ) -> Vec<Reason> {
         self.with_moment(
             condition,
             (now, &OnceCell::new()),
@@ -321,9 +326,9 @@ impl<'a> Judge<'a> {
     pub(super) fn snap(&self, what: What<'a>) -> Option<&'a SnapAction> {
         let action = &self.plan.steps[what.step()?].action;
         match (&action.body, what) {
-            (crate::ground::Body::Instantaneous(snap), _) => Some(snap),
-            (crate::ground::Body::Durative(body), What::End(_)) => Some(&body.end),
-            (crate::ground::Body::Durative(body), _) => Some(&body.start),
+            (Body::Instantaneous(snap), _) => Some(snap),
+            (Body::Durative(body), What::End(_)) => Some(&body.end),
+            (Body::Durative(body), _) => Some(&body.start),
         }
     }
 }

@@ -37,6 +37,13 @@ pub(super) struct Break {
     pub(super) witness: Rational,
 }
 
+impl Break {
+    /// Whether this one comes first.
+    pub(super) fn is_before(&self, other: &Self) -> bool {
+        (&self.at, self.is_after) < (&other.at, other.is_after)
+    }
+}
+
 impl Piece<'_> {
     /// Where `condition`, of an action with this duration, first fails. The very beginning counts
     /// only if `includes_start`.
@@ -57,7 +64,7 @@ impl Piece<'_> {
                 witness: self.length.clone(),
             }));
         }
-        let cuts = self.cuts(condition, duration, reads_derived)?;
+        let cuts = self.cuts(condition, duration, reads_derived);
         for cell in cells(&cuts, self.length, includes_start) {
             let view = self.view(duration, cell.place);
             if self.look(condition, &view, reads_derived)? {
@@ -137,23 +144,19 @@ impl Piece<'_> {
         condition: &Condition,
         duration: Option<&Rational>,
         reads_derived: bool,
-    ) -> Result<Cuts, Fault> {
+    ) -> Cuts {
         let mut polynomials = Vec::new();
-        let mut fault = None;
         let mut add = |left: &Expression, right: &Expression, duration: Option<&Rational>| {
-            match self.difference(left, right, duration) {
-                Ok(difference) => {
-                    for slack in [self.slack.clone(), -self.slack] {
-                        let shifted = difference.plus(&Polynomial::constant(slack));
-                        if shifted.degree() > 0 && !polynomials.contains(&shifted) {
-                            polynomials.push(shifted);
-                        }
-                    }
+            // A comparison that says nothing cuts nothing: it says nothing in each cell, where the
+            // other parts of the condition decide whether that matters.
+            let Ok(difference) = self.difference(left, right, duration) else {
+                return;
+            };
+            for slack in [self.slack.clone(), -self.slack] {
+                let shifted = difference.plus(&Polynomial::constant(slack));
+                if shifted.degree() > 0 && !polynomials.contains(&shifted) {
+                    polynomials.push(shifted);
                 }
-                // A part that divides by what moves may not matter; one that does is met again
-                // when the condition is read. But then nothing says where it changes.
-                Err(new @ Fault::Quotient(_)) => fault = Some(new),
-                Err(_) => {}
             }
         };
         visit_comparisons(condition, &mut |left, right| add(left, right, duration));
@@ -162,12 +165,9 @@ impl Piece<'_> {
                 visit_comparisons(body, &mut |left, right| add(left, right, None));
             });
         }
-        match fault {
-            Some(fault) => Err(fault),
-            None => Ok(Cuts {
-                roots: product(&polynomials).roots_within(self.length),
-                polynomials,
-            }),
+        Cuts {
+            roots: product(&polynomials).roots_within(self.length),
+            polynomials,
         }
     }
 }

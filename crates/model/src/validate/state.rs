@@ -89,8 +89,9 @@ impl Moment for Reading<'_> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
 
-/// `d fluent / dt` has the term `per_time`, of an action with this duration.
+/// `d fluent / dt` has the term `per_time`, of a step with this duration.
 pub(super) struct Rate<'a> {
+    pub(super) step: usize,
     pub(super) fluent: FluentId,
     pub(super) per_time: &'a Expression,
     pub(super) duration: Option<&'a Rational>,
@@ -101,32 +102,34 @@ impl Motion {
     ///
     /// A rate may itself read fluents that move (the values are then polynomials of a higher
     /// degree), as long as no fluent's rate depends on the fluent itself.
-    pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, Fault> {
+    /// If it cannot be read, the step to blame.
+    pub(super) fn from(now: &Now, rates: &[Rate<'_>]) -> Result<Self, (usize, Fault)> {
         let mut terms: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
         for rate in rates {
             terms.entry(rate.fluent).or_default().push(rate);
         }
         let mut motion = Self::default();
-        while let Some(&stuck) = terms.keys().next() {
-            let is_ready = |rates: &Vec<&Rate<'_>>| {
+        while let Some((&stuck, unread)) = terms.first_key_value() {
+            let is_ready = |rate: &&Rate<'_>| {
                 let mut is_ready = true;
-                for rate in rates {
-                    rate.per_time.visit_fluents(&mut |fluent| {
-                        is_ready &= !terms.contains_key(&fluent);
-                    });
-                }
+                rate.per_time
+                    .visit_fluents(&mut |fluent| is_ready &= !terms.contains_key(&fluent));
                 is_ready
             };
-            let ready = terms.iter().find(|(_, rates)| is_ready(rates));
-            let fluent = *ready.ok_or(Fault::Circular(stuck))?.0;
+            let Some((&fluent, _)) = terms.iter().find(|(_, rates)| rates.iter().all(is_ready))
+            else {
+                return Err((unread[0].step, Fault::Circular(stuck)));
+            };
             let mut speed = Polynomial::constant(Rational::ZERO);
+            let mut step = 0;
             for rate in terms.remove(&fluent).into_iter().flatten() {
                 let read = |fluent| motion.value(now, fluent);
-                speed = speed.plus(&evaluate(rate.per_time, rate.duration, &read)?);
+                let term = evaluate(rate.per_time, rate.duration, &read);
+                speed = speed.plus(&term.map_err(|fault| (rate.step, fault))?);
+                step = rate.step;
             }
-            motion
-                .0
-                .insert(fluent, speed.integral(now.value(fluent)?.clone()));
+            let initial = now.value(fluent).map_err(|fault| (step, fault))?;
+            motion.0.insert(fluent, speed.integral(initial.clone()));
         }
         Ok(motion)
     }

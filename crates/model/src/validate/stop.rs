@@ -42,7 +42,7 @@ enum Subject<'a> {
     Condition(When, &'a Condition),
     Bound(&'a DurationConstraint),
     Value(&'a Expression),
-    Rates,
+    Rate,
 }
 
 impl<'a> Place<'a> {
@@ -75,11 +75,11 @@ impl<'a> Place<'a> {
         }
     }
 
-    pub(super) fn rates(time: &'a Rational) -> Self {
+    pub(super) fn rate(time: &'a Rational, step: usize) -> Self {
         Self {
             time,
-            step: None,
-            subject: Subject::Rates,
+            step: Some(step),
+            subject: Subject::Rate,
         }
     }
 }
@@ -144,7 +144,7 @@ impl<'a> Judge<'a> {
                 "the effect's value {}",
                 self.task.describe_expression(value)
             ),
-            Subject::Rates => "a rate of continuous change".to_owned(),
+            Subject::Rate => "a rate of continuous change".to_owned(),
         };
         let difficulty = match fault {
             Fault::Undefined(fluent) => {

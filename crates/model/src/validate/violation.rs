@@ -135,6 +135,8 @@ pub enum Reason {
     Comparison {
         /// The comparison.
         comparison: String,
+        /// Its operator.
+        operator: Comparison,
         /// The values of the fluents (and of `?duration`) in it.
         values: Vec<(String, Rational)>,
         /// The value of its left side.

@@ -58,7 +58,6 @@ impl Reader {
         } else {
             self.instantaneous_body(&fields, &mut scope)
         };
-        scope.unknowns.shrink_to_fit();
         let id = SchemaId::from(self.problem.schemas.len());
         let span = section.content[0].span;
         if self.names.schemas.insert(name.to_string(), id).is_some() {
@@ -66,6 +65,7 @@ impl Reader {
                 .error(span, format!("an action `{name}` is declared already"))
                 .help("give each action its own name");
         }
+        self.schema_spans.push(span);
         self.problem.schemas.push(Schema {
             name: name.into_owned(),
             parameters: scope.variables,

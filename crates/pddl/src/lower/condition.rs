@@ -30,7 +30,11 @@ impl Reader {
                 .map_or(Condition::TRUE, Condition::Atom);
         }
         match (head.as_ref(), parts) {
-            ("and", _) => Condition::And(self.conditions(parts, scope)),
+            ("and", _) => {
+                let mut parts = self.conditions(parts, scope);
+                parts.retain(|part| !part.is_trivial());
+                Condition::And(parts)
+            }
             ("or", _) => {
                 without_preferences(scope, |scope| Condition::Or(self.conditions(parts, scope)))
             }
@@ -82,7 +86,6 @@ impl Reader {
         parts
             .iter()
             .map(|part| self.condition(part, scope))
-            .filter(|part| !part.is_trivial())
             .collect()
     }
 

@@ -8,21 +8,16 @@ use crate::syntax::Node;
 impl Reader {
     /// Trajectory constraints decide validity, so they are refused, unless all are preferences.
     pub(super) fn constraints(&mut self, section: &Section) {
-        if section.content.iter().all(is_preference) {
-            if let Some(first) = section.content.first() {
+        let Some(place) = section.content.iter().find_map(first_hard) else {
+            if section.content.iter().any(|node| !is_nothing(node)) {
                 self.report.ignored(
                     Feature::Preferences,
-                    first.span,
+                    section.span,
                     "preferences do not make plans invalid, and are ignored",
                 );
             }
             return;
-        }
-        let place = section
-            .content
-            .iter()
-            .find_map(first_hard)
-            .unwrap_or(&section.content[0]);
+        };
         self.report
             .unsupported(
                 Feature::TrajectoryConstraints,
@@ -36,9 +31,10 @@ impl Reader {
     }
 }
 
-/// Whether nothing in it must hold.
-fn is_preference(node: &Node) -> bool {
-    first_hard(node).is_none()
+/// Whether it is `()` or `(and)`.
+fn is_nothing(node: &Node) -> bool {
+    node.list()
+        .is_some_and(|nodes| nodes.is_empty() || nodes.len() == 1 && nodes[0].is("and"))
 }
 
 /// The first part of a constraint that must hold.

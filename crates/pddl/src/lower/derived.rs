@@ -71,7 +71,6 @@ impl Reader {
 
     /// Reads the bodies of rules, and refuses those that negate themselves.
     pub(super) fn rules(&mut self, heads: Vec<Head>) {
-        let mut spans = Vec::with_capacity(heads.len());
         for head in heads {
             let mut scope = Scope {
                 variables: head.parameters,
@@ -79,7 +78,7 @@ impl Reader {
                 ..Scope::default()
             };
             let body = self.condition(head.body, &mut scope);
-            spans.push(head.span);
+            self.rule_spans.push(head.span);
             self.problem.rules.push(Rule {
                 predicate: head.predicate,
                 parameters: scope.variables,
@@ -89,7 +88,10 @@ impl Reader {
         for rule in negative_circles(&self.problem) {
             let name = &self.problem.predicates[self.problem.rules[rule].predicate.index()].name;
             self.report
-                .error(spans[rule], format!("`{name}` depends on its own negation"))
+                .error(
+                    self.rule_spans[rule],
+                    format!("`{name}` depends on its own negation"),
+                )
                 .help("a derived predicate may not be negated in what it is derived from");
         }
     }

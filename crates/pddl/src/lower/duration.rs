@@ -7,6 +7,7 @@ use crate::lower::Reader;
 use crate::lower::condition::comparison;
 use crate::lower::scope::Scope;
 use crate::lower::timed::{Time, time_specifier};
+use crate::suggest::nearest;
 use crate::syntax::{Kind, Node};
 
 impl Reader {
@@ -73,12 +74,20 @@ impl Reader {
     }
 
     fn wrong_duration(&mut self, node: &Node) {
+        let near = node
+            .list()
+            .into_iter()
+            .flatten()
+            .filter_map(Node::word)
+            .find_map(|word| nearest(word, ["?duration"]))
+            .filter(|_| !mentions_duration(node));
         self.report
             .error(
                 node.span,
                 format!("`{}` does not bound the duration", node.quote()),
             )
-            .help("expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such");
+            .help("expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such")
+            .suggest(near);
     }
 }
 

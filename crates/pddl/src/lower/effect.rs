@@ -6,7 +6,7 @@ use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
 use crate::lower::scope::Scope;
 use crate::lower::shift::shift;
-use crate::lower::timed::{Time, Timed, both, time_specifier};
+use crate::lower::timed::{Time, Timed, both, near_specifier, time_specifier};
 use crate::source::Span;
 use crate::syntax::Node;
 
@@ -336,6 +336,7 @@ impl Reader {
     }
 
     pub(super) fn missing_moment(&mut self, node: &Node) {
+        let near = near_specifier(node);
         self.report
             .error(
                 node.span,
@@ -344,7 +345,8 @@ impl Reader {
             .help(
                 "expected `(at start …)` or `(at end …)`, or for continuous change \
                  `(increase (f) (* #t rate))`",
-            );
+            )
+            .suggest(near);
     }
 }
 

@@ -98,7 +98,13 @@ impl Reader {
                     let (predicate, arguments) = self.initial_fact(atom, &scope)?;
                     return Some(TimedChange::Delete(predicate, arguments));
                 }
-                ("=" | "assign" | "not" | "increase" | "decrease", _) => {
+                (change @ ("increase" | "decrease" | "scale-up" | "scale-down"), _) => {
+                    self.report
+                        .error(node.span, format!("a timed `{change}`"))
+                        .help("only values can be given for a time, as in `(at 10 (= (f) 3))`");
+                    return None;
+                }
+                ("=" | "assign" | "not" | "<" | "<=" | ">" | ">=", _) => {
                     self.not_initial(node);
                     return None;
                 }

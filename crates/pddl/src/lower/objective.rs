@@ -39,7 +39,8 @@ impl Reader {
                     .help("nothing is true at time 0");
             }
         }
-        match sections.only(":goal", &mut self.report) {
+        let goal = sections.only(":goal", &mut self.report);
+        match goal {
             Some(section) => self.goal(section),
             None => {
                 self.report
@@ -47,6 +48,7 @@ impl Reader {
                     .help("every plan reaches it; expected `(:goal condition)`");
             }
         }
+        self.check_expansion(goal.map(|section| section.span));
         for section in sections.all(":constraints") {
             self.constraints(section);
         }

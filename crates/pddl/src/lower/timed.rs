@@ -6,6 +6,7 @@ use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
 use crate::lower::scope::Scope;
+use crate::suggest::nearest;
 use crate::syntax::Node;
 
 /// When a part of a durative action is read or done.
@@ -210,13 +211,25 @@ impl Reader {
     }
 
     fn missing_time(&mut self, node: &Node) {
+        let near = near_specifier(node);
         self.report
             .error(
                 node.span,
                 format!("`{}` does not say when it must hold", node.quote()),
             )
-            .help("expected `(at start …)`, `(over all …)` or `(at end …)`");
+            .help("expected `(at start …)`, `(over all …)` or `(at end …)`")
+            .suggest(near);
     }
+}
+
+/// The time specifier that a list like `(at strat x)` is probably meant to begin with.
+pub(super) fn near_specifier(node: &Node) -> Option<&'static str> {
+    let [at, when, what] = node.list()? else {
+        return None;
+    };
+    what.list()?;
+    let specifier = format!("{} {}", at.word()?, when.word()?);
+    nearest(&specifier, ["at start", "over all", "at end"])
 }
 
 impl Timed {

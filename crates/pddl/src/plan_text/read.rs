@@ -33,8 +33,9 @@ pub fn read_plan(
     let mut reader = PlanReader::new(source, task);
     let steps = reader.last_plan();
     let mut plan = TimeTriggeredPlan::default();
+    let is_timed = steps.iter().any(|step| step.time.is_some());
     for (index, step) in steps.iter().enumerate() {
-        plan.steps.extend(reader.step(step, index));
+        plan.steps.extend(reader.step(step, index, is_timed));
     }
     let plan = (!reader.report.is_failed()).then_some(plan);
     Diagnostics::outcome(plan, reader.report.into_diagnostics())
@@ -74,7 +75,7 @@ impl<'a> PlanReader<'a> {
         let mut plans: Vec<Vec<Line>> = vec![Vec::new()];
         let mut start = 0;
         for text in self.source.text().split_inclusive('\n') {
-            let line = line(text, start);
+            let line = line(text.trim_end(), start);
             start += text.len();
             match line {
                 Line::Blank => {}
@@ -121,10 +122,18 @@ impl<'a> PlanReader<'a> {
         steps
     }
 
-    /// The step that a line describes, the `index`th of its plan.
-    fn step(&mut self, raw: &RawStep, index: usize) -> Option<Step> {
+    /// The step that a line describes, the `index`th of its plan. In a plan that `is_timed`, it
+    /// needs a time.
+    fn step(&mut self, raw: &RawStep, index: usize, is_timed: bool) -> Option<Step> {
         let start = match &raw.time {
             Some(time) => self.time(time),
+            None if is_timed => {
+                self.report
+                    .error(span(&raw.words[0].range), "an action without a time")
+                    .label("other actions of this plan have one")
+                    .help("expected `time: (action argument …) [duration]`");
+                None
+            }
             None => Some(Rational::from(u32::try_from(index).unwrap_or(u32::MAX))),
         };
         let (name, arguments) = raw.words.split_first()?;

@@ -33,7 +33,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
-pub use pin::pin_until_sound;
+pub use pin::{pin_until_sound, pinned_to};
 
 use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Instance, Node, NodeId, StnPlan};

@@ -34,6 +34,22 @@ pub fn pin_until_sound(
     Some(plan)
 }
 
+/// The plan with every time point where it is in the nominal schedule: for plans about whose other
+/// schedules nothing can be told.
+#[must_use]
+pub fn pinned_to(mut plan: StnPlan, nominal: &[Rational]) -> StnPlan {
+    let pins = plan.nodes().skip(1).map(|(node, _)| Constraint {
+        from: NodeId::ZERO,
+        to: node,
+        lower: Bound::Finite(nominal[node.index()].clone()),
+        upper: Bound::Finite(nominal[node.index()].clone()),
+        reason: Reason::Pinned,
+    });
+    let pins: Vec<_> = pins.collect();
+    plan.constraints.extend(pins);
+    plan
+}
+
 /// The gentlest constraint about these nodes that is not implied yet.
 fn next_pin(plan: &StnPlan, nominal: &[Rational], nodes: &[NodeId]) -> Option<Constraint> {
     let network = ConsistentNetwork::try_from(plan.network(&[])).ok()?;

@@ -1,1 +1,204 @@
+mod random;
 
+use elbowroom_model::Step;
+use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_num::Rational;
+
+use super::{DeorderError, Deordered, Settings, deorder, pin_until_sound, pinned_to};
+use crate::format;
+use crate::parameter::ParametrizedPlan;
+use crate::stn_plan::{Bound, NodeId, Reason};
+use crate::testing::{number, rover};
+
+/// A plan of the rover: `start: action [duration]` on each line.
+fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {
+    let mut task = rover();
+    let mut plan = TimeTriggeredPlan::default();
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        let (start, rest) = line.split_once(':').unwrap();
+        let (action, duration) = rest.split_once('[').unwrap_or((rest, ""));
+        let mut words = action.split_whitespace();
+        let schema = task.problem().schema(words.next().unwrap()).unwrap();
+        let objects: Vec<_> = words
+            .map(|name| task.problem().object(name).unwrap())
+            .collect();
+        plan.steps.push(Step {
+            start: number(start.trim()),
+            action: task.instantiate(schema, &objects).unwrap(),
+            duration: duration.strip_suffix(']').map(number),
+        });
+    }
+    (task, plan)
+}
+
+fn deordered(text: &str) -> Deordered {
+    let (task, plan) = plan(text);
+    deorder(&task, &plan, &Settings::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The constraints as an STN plan file has them.
+fn constraints(text: &str) -> String {
+    let (task, _) = plan(text);
+    let closed = ParametrizedPlan::closed(&task, deordered(text).plan);
+    let file = format::write(&task, &closed).unwrap();
+    let lines = file.lines().filter(|line| line.starts_with("c:"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn a_duration_obeys_the_domain_rather_than_the_plan() {
+    assert_eq!(
+        constraints("3: collect s1 [15]"),
+        "c: n0.end - n0.start in [15, 15];"
+    );
+    assert_eq!(
+        constraints("3: navigate [7]"),
+        // What starts with making a fact true and ends with making it false takes time.
+        "c: n0.end - n0.start in [5, 15];"
+    );
+}
+
+#[test]
+fn actions_that_do_not_interfere_lose_their_order() {
+    assert_eq!(
+        constraints(
+            "0: collect s1 [15]
+             20: collect s2 [15]"
+        ),
+        "\
+c: n0.end - n0.start in [15, 15];
+c: n1.end - n1.start in [15, 15];"
+    );
+}
+
+#[test]
+fn a_writer_of_an_over_all_condition_stays_outside() {
+    assert_eq!(
+        constraints(
+            "0: navigate [7]
+             7: collect s1 [15]
+             22: navigate [7]"
+        ),
+        "\
+c: n0.end - n0.start in [5, 15];
+c: n1.end - n1.start in [15, 15];
+c: n2.end - n2.start in [5, 15];
+c: n1.start - n0.end in [0, inf];
+c: n2.start - n0.end in [0.001, inf];
+c: n2.start - n1.end in [0, inf];"
+    );
+}
+
+#[test]
+fn a_deadline_becomes_a_constraint() {
+    assert_eq!(constraints("40: beep"), "c: n0 - .zero in [-inf, 99.999];");
+}
+
+#[test]
+fn a_fluent_that_is_read_and_changed_keeps_the_order_of_its_users() {
+    // Refuelling needs 3 at the start, takes them, and gives some at the end.
+    assert_eq!(
+        constraints(
+            "0: refuel s1 [10]
+             5: refuel s2 [10]"
+        ),
+        "\
+c: n0.end - n0.start in [10, 10];
+c: n1.end - n1.start in [10, 10];
+c: n1.start - n0.start in [0.001, inf];
+c: n0.end - n1.start in [0.001, inf];"
+    );
+}
+
+#[test]
+fn the_nominal_schedule_is_the_original_plan() {
+    let text = "0: navigate [7]
+                7.5: collect s1 [15]";
+    let nominal = deordered(text).nominal;
+    let times: Vec<_> = nominal.iter().map(ToString::to_string).collect();
+    assert_eq!(times, ["0", "0", "7", "15/2", "45/2", "100"]);
+}
+
+#[test]
+fn rounded_times_are_mended_in_the_nominal_schedule() {
+    // The duration is one ten-thousandth too long, the gap half a thousandth.
+    let text = "0: refuel s1 [10.0001]
+                10.0005: refuel s2 [10]";
+    let Deordered { plan, nominal } = deordered(text);
+    let schedule = elbowroom_stn::Schedule::new(nominal);
+    assert!(schedule.holds_in(&plan.network(&[])));
+    assert_eq!(schedule.times()[2], number("10"));
+    assert_eq!(schedule.times()[3], number("10.001"));
+}
+
+#[test]
+fn interfering_happenings_at_one_time_are_refused() {
+    let (task, plan) = plan(
+        "0: navigate [7]
+         7: navigate [7]",
+    );
+    let error = deorder(&task, &plan, &Settings::default()).unwrap_err();
+    assert_eq!(
+        error,
+        DeorderError::Simultaneous {
+            first: "end of (navigate)".to_owned(),
+            second: "start of (navigate)".to_owned(),
+            time: "7".to_owned(),
+        }
+    );
+}
+
+#[test]
+fn a_plan_past_its_deadline_has_no_schedule() {
+    let (task, plan) = plan("99.9995: beep");
+    let mut settings = Settings::default();
+    assert!(
+        deorder(&task, &plan, &settings).is_ok(),
+        "rounded, and mended"
+    );
+    settings.epsilon = Rational::from(101);
+    let error = deorder(&task, &plan, &settings).unwrap_err();
+    assert!(matches!(error, DeorderError::NoSchedule { .. }), "{error}");
+}
+
+#[test]
+fn pins_are_as_few_as_the_oracle_needs() {
+    let text = "0: collect s1 [15]
+                3: collect s2 [15]";
+    let Deordered { plan, nominal } = deordered(text);
+    let (first, second) = (NodeId(1), NodeId(3));
+    // Content once the second start is known to come no sooner than the first.
+    let mut oracle = |plan: &crate::StnPlan| {
+        let network = elbowroom_stn::ConsistentNetwork::try_from(plan.network(&[])).unwrap();
+        let node = crate::network_node;
+        let back = network.distance(node(second), node(first));
+        let is_ordered = back.is_some_and(|back| !back.is_positive());
+        (!is_ordered).then(|| vec![second, first, NodeId(4)])
+    };
+    let pinned = pin_until_sound(plan.clone(), &nominal, &mut oracle).unwrap();
+    let pins: Vec<_> = pinned
+        .constraints
+        .iter()
+        .filter(|constraint| constraint.reason == Reason::Pinned)
+        .collect();
+    assert_eq!(pins.len(), 1);
+    assert_eq!((pins[0].from, pins[0].to), (first, second));
+    assert_eq!(
+        (&pins[0].lower, &pins[0].upper),
+        (&Bound::Finite(Rational::ZERO), &Bound::Infinite)
+    );
+}
+
+#[test]
+fn an_oracle_that_is_never_content_gets_the_nominal_schedule_and_then_nothing() {
+    let Deordered { plan, nominal } = deordered("0: collect s1 [15]\n3: navigate [7]");
+    let rigid = pinned_to(plan.clone(), &nominal).network(&[]);
+    assert!(elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&rigid));
+    let mut asked = 0;
+    let nothing = pin_until_sound(plan, &nominal, &mut |_| {
+        asked += 1;
+        Some(vec![NodeId(2)])
+    });
+    assert!(nothing.is_none());
+    assert!(asked < 20, "{asked}");
+}

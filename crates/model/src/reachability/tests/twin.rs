@@ -32,7 +32,7 @@ pub(super) fn ground(problem: &Problem) -> Expected {
     let mut task = Task::new(problem.clone());
     for rule in &problem.rules {
         for arguments in bindings(problem, &rule.parameters) {
-            task.fact(rule.predicate, arguments);
+            task.fact(rule.predicate, &arguments);
         }
     }
     let mut candidates: Vec<Action> = (0..problem.schemas.len())
@@ -128,7 +128,7 @@ impl Possible {
             Body::Durative(body) => {
                 let at_start = body.duration.iter().filter(|constraint| !constraint.at_end);
                 self.holds(task, &body.start.condition, true)
-                    && self.leaves_room(task, at_start.collect())
+                    && self.leaves_room(task, &at_start.collect::<Vec<_>>())
             }
         }
     }
@@ -139,7 +139,7 @@ impl Possible {
             Body::Durative(body) => {
                 self.holds(task, &body.over_all, true)
                     && self.holds(task, &body.end.condition, true)
-                    && self.leaves_room(task, body.duration.iter().collect())
+                    && self.leaves_room(task, &body.duration.iter().collect::<Vec<_>>())
             }
         }
     }
@@ -244,7 +244,7 @@ impl Possible {
     }
 
     /// Whether there is a duration that satisfies all constraints with a known bound.
-    fn leaves_room(&self, task: &Task, constraints: Vec<&DurationConstraint>) -> bool {
+    fn leaves_room(&self, task: &Task, constraints: &[&DurationConstraint]) -> bool {
         let is_defined = constraints.iter().all(|c| self.is_defined(task, &c.bound));
         let bounds: Vec<_> = constraints
             .iter()

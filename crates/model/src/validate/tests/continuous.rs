@@ -48,7 +48,7 @@ fn at_a_happening_in_between_the_state_after_it_counts() {
 fn an_equation_holds_only_as_long_as_nothing_moves() {
     assert_eq!(
         drain("(= x 10)").judge("0: a [1]"),
-        "just after 0.000: (a) needs (= (x) 10) over all: (x) = 9, short by 1"
+        "just after 0.000: (a) needs (= (x) 10) over all: (x) = 9, off by 1"
     );
     let world = World::new("(= x 1) (= y 1)")
         .durative("a", &[("rate", "x 2 y 2"), ("over all", "(= x y)")]);
@@ -139,6 +139,34 @@ fn a_quotient_by_something_that_moves_cannot_be_judged() {
         drain("(< (/ 1 x) 1)").judge("0: a [4]"),
         "undecided: at 0.000: nonlinear change: (< (/ 1 (x)) 1) divides by (x), which changes \
          with time"
+    );
+}
+
+#[test]
+fn a_quotient_by_something_that_moves_does_not_matter_where_the_rest_decides() {
+    assert_eq!(
+        drain("(or (< (/ 1 x) 1) (> x 3))").judge("0: a [6]"),
+        "valid"
+    );
+}
+
+#[test]
+fn of_several_breaks_the_earliest_is_told() {
+    let world = World::new("(= x 10)")
+        .durative("keep", &[("over all", "(>= x 3)")])
+        .durative("drain", &[("rate", "x -1"), ("over all", "(>= x 5)")]);
+    assert_eq!(
+        world.judge("0: keep [9]\n0: drain [9]"),
+        "just after 5.000: (drain) needs (>= (x) 5) over all: (x) = 1, short by 4"
+    );
+}
+
+#[test]
+fn a_rate_that_cannot_be_read_is_blamed_on_its_action() {
+    let world = World::new("(= x 10)").durative("a", &[("rate", "x speed")]);
+    assert_eq!(
+        world.judge("2: a [5]"),
+        "at 2.000: (a) reads (speed), which has no value, in a rate of continuous change"
     );
 }
 

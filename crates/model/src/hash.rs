@@ -8,13 +8,13 @@ use std::hash::{BuildHasherDefault, Hasher};
 use indexmap::{IndexMap, IndexSet};
 
 /// A map in insertion order.
-pub(super) type Map<K, V> = IndexMap<K, V, BuildHasherDefault<MixHasher>>;
+pub(crate) type Map<K, V> = IndexMap<K, V, BuildHasherDefault<MixHasher>>;
 /// A set in insertion order.
-pub(super) type Set<K> = IndexSet<K, BuildHasherDefault<MixHasher>>;
+pub(crate) type Set<K> = IndexSet<K, BuildHasherDefault<MixHasher>>;
 
 /// Rotates, mixes in, multiplies: the scheme that Firefox and the Rust compiler use.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct MixHasher(u64);
+pub(crate) struct MixHasher(u64);
 
 impl MixHasher {
     fn mix(&mut self, word: u64) {

@@ -1,0 +1,62 @@
+//! From a read plan to its box, on the instances of the paper's Figures 3 and 4.
+//!
+//! `whole` compiles the obligations and searches with the authors' settings (β = 1, doubling);
+//! `first_widening` stops when the box has grown for the first time. Without the benchmark files
+//! beside the repository there is nothing to measure.
+
+#[path = "../tests/shared/mod.rs"]
+mod shared;
+
+use std::ops::ControlFlow;
+
+use divan::Bencher;
+use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::{ParametrizedPlan, format};
+use shared::instances::{Instance, figure_3, figure_4};
+
+fn main() {
+    divan::main();
+}
+
+/// Every instance of both figures.
+fn instances() -> Vec<Instance> {
+    let Some(data) = shared::data() else { return Vec::new() };
+    [figure_3(&data), figure_4(&data)].concat()
+}
+
+fn names() -> Vec<String> {
+    instances().into_iter().map(|instance| instance.name).collect()
+}
+
+fn read(name: &str) -> (Task, ParametrizedPlan) {
+    let instance = instances().into_iter().find(|i| i.name == name).expect("a known instance");
+    let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
+    let bytes = std::fs::read(&instance.plan).expect("a plan file");
+    let plan = format::read(&bytes, &mut task).expect("a readable plan");
+    (task, plan)
+}
+
+/// Searches until `enough` widenings.
+fn search(task: &Task, plan: &ParametrizedPlan, enough: usize) -> usize {
+    let mut oracle = Oracle::new(task, plan, &Rational::new(1, 1000)).expect("within reach");
+    let mut widenings = 0;
+    let run = irr(&mut oracle, &Settings::default(), &mut |widening| {
+        widenings += usize::from(widening.is_some());
+        if widenings >= enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    run.expect("within reach").checks
+}
+
+#[divan::bench(args = names(), sample_count = 20)]
+fn whole(bencher: Bencher<'_, '_>, name: &String) {
+    let (task, plan) = read(name);
+    bencher.bench_local(|| search(&task, &plan, usize::MAX));
+}
+
+#[divan::bench(args = names(), sample_count = 20)]
+fn first_widening(bencher: Bencher<'_, '_>, name: &String) {
+    let (task, plan) = read(name);
+    bencher.bench_local(|| search(&task, &plan, 1));
+}

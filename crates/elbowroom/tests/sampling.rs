@@ -1,0 +1,74 @@
+//! Every box is attacked with the judge: random values in it, random schedules for them.
+//!
+//! `ELBOWROOM_SAMPLES` says how many per box; a few by default.
+
+mod shared;
+
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_model::validate::{self, validate};
+use elbowroom_num::Rational;
+use elbowroom_plan::{ParametrizedPlan, format};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use shared::draw;
+use shared::instances::{Instance, figure_3, figure_4};
+
+fn samples() -> usize {
+    std::env::var("ELBOWROOM_SAMPLES")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(20)
+}
+
+#[test]
+fn values_and_schedules_in_the_boxes_of_figure_3_pass_the_judge() {
+    let Some(data) = shared::data() else { return };
+    let attacked = figure_3(&data)
+        .iter()
+        .filter(|instance| attack(instance))
+        .count();
+    println!("{attacked} boxes withstood {} samples each", samples());
+    assert_eq!(attacked, 52);
+}
+
+#[test]
+fn values_and_schedules_in_the_boxes_of_figure_4_pass_the_judge() {
+    let Some(data) = shared::data() else { return };
+    let attacked = figure_4(&data)
+        .iter()
+        .filter(|instance| attack(instance))
+        .count();
+    println!("{attacked} boxes withstood {} samples each", samples());
+    assert!(attacked >= 25);
+}
+
+/// Samples the instance's box; false if the plan does not work at its nominal values.
+fn attack(instance: &Instance) -> bool {
+    let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
+    let bytes = std::fs::read(&instance.plan).expect("a plan file");
+    let plan: ParametrizedPlan = format::read(&bytes, &mut task).expect("a readable plan");
+    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 1000)).expect("within reach");
+    let run = irr(&mut oracle, &Settings::default(), &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .expect("within reach");
+    let Ok(envelope) = run.envelope else {
+        return false;
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for _ in 0..samples() {
+        let valuation = draw::valuation(&envelope, &mut rng);
+        let schedule = draw::schedule(&plan.plan, &valuation, &mut rng)
+            .unwrap_or_else(|| panic!("{}: no schedule at {valuation:?}", instance.name));
+        let fixed = plan.plan.at(&valuation).scheduled(&schedule);
+        let verdict = validate(&task, &fixed, &validate::Settings::default());
+        assert!(
+            verdict.is_valid(),
+            "{}: {valuation:?} {verdict:?}",
+            instance.name
+        );
+    }
+    true
+}

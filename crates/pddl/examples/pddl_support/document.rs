@@ -1,0 +1,159 @@
+//! The document about what is supported.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use elbowroom_pddl::Feature;
+
+use crate::survey::{Domain, Survey, reason};
+
+/// What is executed, in the words of the field.
+const SUPPORTED: &[(&str, &str)] = &[
+    (
+        "Types",
+        "hierarchies, `either` for types, variables and objects, `object`",
+    ),
+    (
+        "Objects",
+        "constants and objects; names compare without case",
+    ),
+    (
+        "Conditions",
+        "`and`, `or`, `not`, `imply`, `forall`, `exists`, `=` of objects, comparisons of numbers",
+    ),
+    (
+        "Numeric fluents",
+        "`assign`, `increase`, `decrease`, `scale-up`, `scale-down`; `+ - * /` with any number of operands where that makes sense; exact numbers",
+    ),
+    (
+        "Conditional and quantified effects",
+        "`when`, `forall`, nested; also in durative actions, with conditions at start, over all and at end for effects at end",
+    ),
+    ("Instantaneous actions", "beside durative ones"),
+    (
+        "Durative actions",
+        "conditions and effects at start, over all, at end; `forall` around time specifiers; `or`, `not`, `exists` over parts of one time",
+    ),
+    (
+        "Durations",
+        "`=`, `<=`, `>=`, several of them, read at start or at end, dependent on fluents; `?duration` in conditions and effects",
+    ),
+    (
+        "Continuous effects",
+        "any form linear in `#t`; the rate may depend on fluents",
+    ),
+    (
+        "Timed initial literals and fluents",
+        "`(at 10 (p))`, `(at 10 (not (p)))`, `(at 10 (= (f) 3))`",
+    ),
+    ("Derived predicates", "stratified rules"),
+    ("Metrics", "read; they have no bearing on validity"),
+    (
+        "Open numbers",
+        "`:synth-parameters`, of a domain or of an action",
+    ),
+];
+
+/// The document. Without a survey it has no tables.
+pub(crate) fn document(survey: Option<&Survey>) -> String {
+    let mut text = String::from(
+        "# PDDL support\n\n\
+         <!-- Written by `cargo run --release -p elbowroom-pddl --example pddl_support`. -->\n\n\
+         PDDL 2.1 levels 1 to 4, with the timed initial literals and derived predicates of PDDL \
+         2.2. Requirement flags switch nothing on or off.\n\n## Executed\n\n",
+    );
+    for (name, what) in SUPPORTED {
+        line(&mut text, format_args!("- **{name}**: {what}"));
+    }
+    text.push_str("\n## Refused or ignored\n\nA refusal names the feature and its place. What is ignored never affects validity.\n\n");
+    for feature in Feature::ALL {
+        line(
+            &mut text,
+            format_args!("- **{}**: {}", feature.name(), feature.summary()),
+        );
+    }
+    if let Some(survey) = survey {
+        benchmarks(survey, &mut text);
+    }
+    text
+}
+
+fn benchmarks(survey: &Survey, text: &mut String) {
+    let instances: usize = survey.domains.iter().map(|domain| domain.instances).sum();
+    let read: usize = survey.domains.iter().map(|domain| domain.read).sum();
+    let (plans, plans_read) = survey.plans;
+    line(
+        text,
+        format_args!(
+            "\n## Benchmarks\n\nOf {instances} instances {read} are read; of the {plans} plans for \
+             these, {plans_read}. The others, by reason:\n"
+        ),
+    );
+    line(text, format_args!("|reason|instances|\n|---|---:|"));
+    for (reason, count) in reasons(survey) {
+        line(text, format_args!("|{reason}|{count}|"));
+    }
+    text.push_str("\n### By domain\n\n<!-- Room for columns on grounding. -->\n\n");
+    text.push_str("|domain|instances|read|refused|why|\n|---|---:|---:|---:|---|\n");
+    for domain in &survey.domains {
+        line(
+            text,
+            format_args!(
+                "|{}|{}|{}|{}|{}|",
+                domain.name,
+                domain.instances,
+                domain.read,
+                domain.refused.len(),
+                why(domain)
+            ),
+        );
+    }
+    text.push_str("\n### Mistakes in the files\n\nThe first mistake of each file; refused features beside them are not shown.\n\n");
+    for domain in &survey.domains {
+        let mut shown = BTreeMap::new();
+        for (path, errors) in &domain.refused {
+            if let Some(error) = errors.iter().find(|error| !error.is_unsupported()) {
+                shown
+                    .entry(error.to_string())
+                    .or_insert_with(Vec::new)
+                    .push(path);
+            }
+        }
+        for (error, paths) in shown {
+            let count = match paths.len() {
+                1 => String::new(),
+                count => format!(" ({count} instances)"),
+            };
+            line(text, format_args!("- {error}{count}"));
+        }
+    }
+    text.push_str("\n### Warnings\n\n");
+    for domain in &survey.domains {
+        for (message, count) in &domain.warnings {
+            line(text, format_args!("- {}: {message} ({count})", domain.name));
+        }
+    }
+}
+
+/// How many instances are refused for each reason.
+pub(crate) fn reasons(survey: &Survey) -> BTreeMap<String, usize> {
+    let mut reasons = BTreeMap::new();
+    for domain in &survey.domains {
+        for (_, errors) in &domain.refused {
+            *reasons.entry(reason(errors)).or_default() += 1;
+        }
+    }
+    reasons
+}
+
+fn why(domain: &Domain) -> String {
+    let mut reasons: Vec<_> = domain.refused.iter().map(|(_, e)| reason(e)).collect();
+    reasons.sort();
+    reasons.dedup();
+    reasons.join("; ")
+}
+
+fn line(text: &mut String, line: std::fmt::Arguments) {
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{line}");
+}

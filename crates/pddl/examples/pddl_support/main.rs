@@ -1,0 +1,14 @@
+//! Writes `docs/pddl-support.md`: which of PDDL is executed, refused, ignored, and what becomes
+//! of each domain of the benchmark set.
+//!
+//! `cargo run --release -p elbowroom-pddl --example pddl_support > docs/pddl-support.md`
+
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+mod document;
+mod survey;
+
+fn main() {
+    let survey = survey::folder().map(|folder| survey::survey(&folder));
+    print!("{}", document::document(survey.as_ref()));
+}

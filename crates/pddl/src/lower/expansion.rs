@@ -1,0 +1,131 @@
+//! How large conditions and effects become when quantifiers are expanded.
+//!
+//! The model expands quantifiers over objects. A few nested ones over many objects would use up
+//! all memory there, so they are refused here, where the text can be shown.
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Problem;
+use elbowroom_model::problem::{Body, Condition, Effect, Guard, TypeId, Variable};
+
+use crate::lower::Reader;
+use crate::source::Span;
+
+/// Most parts that one condition, or the effects of one action, may have when expanded.
+const MOST_PARTS: u64 = 10_000_000;
+
+/// Counts parts.
+struct Sizes<'a> {
+    problem: &'a Problem,
+    /// How many objects each set of types has.
+    objects: BTreeMap<&'a [TypeId], u64>,
+}
+
+impl Reader {
+    /// Reports what is too large when expanded. Objects must have been read.
+    pub(super) fn check_expansion(&mut self, goal: Option<Span>) {
+        let problem = &self.problem;
+        let mut sizes = Sizes {
+            problem,
+            objects: BTreeMap::new(),
+        };
+        let mut too_large: Vec<(Span, String)> = Vec::new();
+        let mut check = |size: u64, span: Span, what: String| {
+            if size > MOST_PARTS {
+                too_large.push((span, what));
+            }
+        };
+        if let Some(span) = goal {
+            check(
+                sizes.of_condition(&problem.goal),
+                span,
+                "the goal".to_owned(),
+            );
+        }
+        for (rule, span) in problem.rules.iter().zip(&self.rule_spans) {
+            let name = &problem.predicates[rule.predicate.index()].name;
+            let size = sizes.of_condition(&rule.body);
+            check(size, *span, format!("this rule of `{name}`"));
+        }
+        for (schema, span) in problem.schemas.iter().zip(&self.schema_spans) {
+            let size = sizes.of_body(&schema.body);
+            check(size, *span, format!("action `{}`", schema.name));
+        }
+        for (span, what) in too_large {
+            self.report
+                .error(span, format!("{what} has more than {MOST_PARTS} parts"))
+                .label("when its quantifiers are expanded")
+                .help("use fewer nested quantifiers, or narrower types");
+        }
+    }
+}
+
+impl<'a> Sizes<'a> {
+    fn of_body(&mut self, body: &'a Body) -> u64 {
+        match body {
+            Body::Instantaneous { condition, effects } => self
+                .of_condition(condition)
+                .saturating_add(self.of_effects(effects)),
+            Body::Durative {
+                at_start,
+                over_all,
+                at_end,
+                start_effects,
+                end_effects,
+                continuous,
+                ..
+            } => {
+                let mut size = 0_u64;
+                for condition in [at_start, over_all, at_end] {
+                    size = size.saturating_add(self.of_condition(condition));
+                }
+                for effects in [start_effects, end_effects] {
+                    size = size.saturating_add(self.of_effects(effects));
+                }
+                for effect in continuous {
+                    size = size.saturating_add(self.of_guarded(&effect.variables, &effect.guard));
+                }
+                size
+            }
+        }
+    }
+
+    fn of_effects(&mut self, effects: &'a [Effect]) -> u64 {
+        effects.iter().fold(0, |size, effect| {
+            size.saturating_add(self.of_guarded(&effect.variables, &effect.guard))
+        })
+    }
+
+    fn of_guarded(&mut self, variables: &'a [Variable], guard: &'a Guard) -> u64 {
+        let mut size = 1_u64;
+        for part in [&guard.at_start, &guard.over_all, &guard.now] {
+            size = size.saturating_add(self.of_condition(part));
+        }
+        size.saturating_mul(self.combinations(variables))
+    }
+
+    fn of_condition(&mut self, condition: &'a Condition) -> u64 {
+        match condition {
+            Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => 1,
+            Condition::Not(part) => self.of_condition(part),
+            Condition::And(parts) | Condition::Or(parts) => parts
+                .iter()
+                .fold(0, |size, part| size.saturating_add(self.of_condition(part))),
+            Condition::Forall(variables, part) | Condition::Exists(variables, part) => self
+                .of_condition(part)
+                .saturating_mul(self.combinations(variables)),
+        }
+    }
+
+    /// How many ways there are to choose objects for the variables.
+    fn combinations(&mut self, variables: &'a [Variable]) -> u64 {
+        let problem = self.problem;
+        variables.iter().fold(1, |product: u64, variable| {
+            let types = variable.types.as_slice();
+            let objects = self.objects.entry(types).or_insert_with(|| {
+                u64::try_from(problem.objects_of(types).count()).unwrap_or(u64::MAX)
+            });
+            product.saturating_mul(*objects)
+        })
+    }
+}

@@ -1,0 +1,204 @@
+//! What is said about texts that are wrong.
+
+mod reading;
+
+use elbowroom_pddl::{Severity, Source, read_problem};
+use insta::assert_snapshot;
+use reading::{domain, mistakes, problem, read_actions, read_sections};
+
+fn rendered(actions: &str) -> String {
+    let diagnostics = read_actions(actions).expect_err("a mistake");
+    diagnostics.render(false)
+}
+
+#[test]
+fn a_misspelt_name_is_shown_with_the_likely_one() {
+    assert_snapshot!(rendered("(:action a :parameters (?r - roon) :effect (opne ?r))"), @r"
+    error: unknown type `roon`
+     --> domain.pddl:6:30
+      |
+    6 | (:action a :parameters (?r - roon) :effect (opne ?r)))
+      |                              ^^^^
+      |
+      = help: did you mean `room`?
+
+    error: unknown predicate `opne`
+     --> domain.pddl:6:45
+      |
+    6 | (:action a :parameters (?r - roon) :effect (opne ?r)))
+      |                                             ^^^^
+      |
+      = help: did you mean `open`?
+    ");
+}
+
+#[test]
+fn a_wrong_number_of_arguments_is_shown_with_the_declaration() {
+    assert_snapshot!(rendered("(:action a :parameters (?r - room) :effect (in ?r))"), @r"
+    error: `in` takes 2 arguments, not 1
+     --> domain.pddl:6:44
+      |
+    6 | (:action a :parameters (?r - room) :effect (in ?r)))
+      |                                            ^^^^^^^
+      |
+      = help: expected `(in ?b ?r)`
+    ");
+}
+
+#[test]
+fn a_missing_time_specifier_is_asked_for() {
+    assert_snapshot!(
+        rendered("(:durative-action a :duration (= ?duration 1) :condition (lit) :effect (at end (not (lit))))"),
+        @r"
+    error: `(lit)` does not say when it must hold
+     --> domain.pddl:6:58
+      |
+    6 | (:durative-action a :duration (= ?duration 1) :condition (lit) :effect (at end (not (lit)))))
+      |                                                          ^^^^^
+      |
+      = help: expected `(at start …)`, `(over all …)` or `(at end …)`
+    "
+    );
+}
+
+#[test]
+fn all_mistakes_of_an_action_are_reported() {
+    let found = mistakes(read_actions(
+        "(:durative-action a :parameters (?x) :duration (= ?dur 1)
+           :condition (at start (blue ?x))
+           :effect (and (at end (in ?x nowhere)) (lit) (at strat (lit))))
+         (:action b :precondition (>= (level) ?z))",
+    ));
+    assert_snapshot!(found, @r"
+    domain.pddl:6:48: error: `(= …)` does not bound the duration
+    domain.pddl:7:34: error: unknown predicate `blue`
+    domain.pddl:8:40: error: unknown object `nowhere`
+    domain.pddl:8:50: error: `(lit)` does not say when it happens
+    domain.pddl:8:56: error: `(at …)` does not say when it happens
+    domain.pddl:9:47: error: unknown number `?z`
+    ");
+}
+
+#[test]
+fn a_forgotten_parenthesis_is_found_where_the_next_section_begins() {
+    let actions = "(:action a :effect (and (lit) (open hall))\n(:action b :effect (lit))";
+    assert_snapshot!(rendered(actions), @r"
+    error: `(` without a matching `)`
+     --> domain.pddl:6:1
+      |
+    6 | (:action a :effect (and (lit) (open hall))
+      | ^ this list is still open …
+      |
+     ::: domain.pddl:7:1
+      |
+    7 | (:action b :effect (lit)))
+      | - … where `(:action` begins
+      |
+      = help: close it before the next section
+    ");
+}
+
+#[test]
+fn files_in_the_wrong_order_are_recognized() {
+    let read = read_problem(&problem("(:init) (:goal (and))"), &domain(""));
+    assert_snapshot!(mistakes(read), @r"
+    problem.pddl:1:9: error: this is a problem, not a domain
+    domain.pddl:1:9: error: this is a domain, not a problem
+    ");
+}
+
+#[test]
+fn an_empty_file_is_no_domain() {
+    let empty = Source::new("empty.pddl", "");
+    let read = read_problem(&empty, &problem("(:init) (:goal (and))"));
+    assert_snapshot!(mistakes(read), @"empty.pddl:1:1: error: this is not a PDDL domain");
+}
+
+#[test]
+fn a_condition_of_a_durative_action_is_not_called_a_precondition() {
+    let found = read_actions("(:durative-action a :duration () :precondition (at start (lit)))");
+    let found = found.unwrap_err();
+    let first = found.errors().next().unwrap();
+    assert_eq!(first.help.as_deref(), Some("did you mean `:condition`?"));
+    assert_eq!((first.line(), first.column()), (6, 34));
+}
+
+#[test]
+fn an_effect_cannot_depend_on_what_comes_later() {
+    let found = mistakes(read_actions(
+        "(:durative-action a :duration () :effect (when (at end (lit)) (at start (open hall))))",
+    ));
+    assert_snapshot!(found, @"domain.pddl:6:48: error: a condition that is read after its effect happens");
+}
+
+#[test]
+fn derived_predicates_cannot_be_set_nor_negate_themselves() {
+    let found = mistakes(read_actions(
+        "(:derived (lit) (exists (?r - room) (not (dark ?r))))
+         (:derived (dark ?r - room) (not (lit)))
+         (:action a :effect (lit))",
+    ));
+    assert_snapshot!(found, @r"
+    domain.pddl:8:29: error: `lit` is defined by rules, and cannot be set
+    domain.pddl:6:11: error: `lit` depends on its own negation
+    domain.pddl:7:20: error: `dark` depends on its own negation
+    ");
+}
+
+#[test]
+fn negation_of_another_derived_predicate_is_fine() {
+    let read = read_actions(
+        "(:derived (lit) (exists (?r - room) (open ?r)))
+         (:derived (dark ?r - room) (and (not (lit)) (not (open ?r))))",
+    );
+    assert_eq!(read.unwrap().0.rules.len(), 2);
+}
+
+#[test]
+fn a_type_cannot_be_its_own_supertype() {
+    let domain = Source::new("d", "(define (domain d) (:types a - b b - c c - a d - a))");
+    let problem = problem("(:init) (:goal (and))");
+    assert!(mistakes(read_problem(&domain, &problem)).contains("subtype of itself"));
+}
+
+#[test]
+fn the_initial_state_is_facts_and_numbers() {
+    let found = mistakes(read_sections(
+        "(:init (in b1 kitchn) (= (size b1) (level)) (>= (level) 3) (at -3 (lit)) lit) (:goal (and))",
+    ));
+    assert_snapshot!(found, @r"
+    problem.pddl:2:15: error: unknown object `kitchn`
+    problem.pddl:2:36: error: `(level)` is not a constant
+    problem.pddl:2:45: error: unexpected `(>= …)`
+    problem.pddl:2:64: error: a time before 0
+    problem.pddl:2:74: error: unexpected `lit`
+    ");
+}
+
+#[test]
+fn an_argument_of_the_wrong_type_is_a_warning() {
+    let (_, warnings) = read_sections("(:init (open b1)) (:goal (in b1 kitchen))").unwrap();
+    assert_eq!(warnings.len(), 1);
+    assert_eq!(warnings[0].severity, Severity::Warning);
+    assert_snapshot!(
+        warnings[0].message,
+        @"`b1` is of type ball, but `open` asks for room"
+    );
+}
+
+#[test]
+fn bytes_that_are_not_text_are_reported_unless_commented_out() {
+    let text = b"(define (problem p) ;\xff\n (:domain d) (:init \xff\xfe \0) (:goal (and)))";
+    let read = read_problem(&domain(""), &Source::from_bytes("problem.pddl", text));
+    assert_snapshot!(mistakes(read), @r"
+    problem.pddl:2:21: error: this is not UTF-8 text
+    problem.pddl:2:24: error: unexpected character U+0000
+    ");
+}
+
+#[test]
+fn colored_output_says_the_same() {
+    let diagnostics = read_actions("(:action a :effect (opne hall))").unwrap_err();
+    assert!(diagnostics.render(true).contains("\u{1b}["));
+    assert!(!diagnostics.render(false).contains('\u{1b}'));
+}

@@ -1,0 +1,105 @@
+//! Problem files: objects, initial states, goals, metrics.
+
+mod reading;
+
+use elbowroom_model::problem::{ObjectId, TimedChange};
+use insta::assert_snapshot;
+use reading::{Printer, read_sections};
+
+#[test]
+fn facts_numbers_and_what_comes_later_are_told_apart() {
+    let (problem, _) = read_sections(
+        "(:init (in b1 kitchen) (not (lit)) (= (size b1) 2.5) (= (level) (- 3))
+               (at 10 (lit)) (at 12.5 (not (lit))) (at 20 (= (level) 7)))
+         (:goal (and))",
+    )
+    .unwrap();
+    assert_eq!(problem.initial_facts.len(), 1);
+    let values: Vec<_> = problem
+        .initial_values
+        .iter()
+        .map(|(_, _, value)| value.to_string())
+        .collect();
+    assert_eq!(values, ["5/2", "-3"]);
+    let times: Vec<_> = problem.timed.iter().map(|t| t.time.to_string()).collect();
+    assert_eq!(times, ["10", "25/2", "20"]);
+    assert!(matches!(problem.timed[1].change, TimedChange::Delete(..)));
+    assert!(matches!(problem.timed[2].change, TimedChange::Assign(..)));
+}
+
+#[test]
+fn what_happens_at_time_zero_is_initial() {
+    let (problem, warnings) =
+        read_sections("(:init (lit) (at 0 (not (lit))) (at 0 (= (level) 1))) (:goal (and))")
+            .unwrap();
+    assert!(problem.initial_facts.is_empty());
+    assert_eq!(problem.initial_values.len(), 1);
+    assert_eq!(warnings.len(), 2);
+}
+
+#[test]
+fn objects_keep_their_case_and_compare_without() {
+    let (problem, _) = read_sections("(:init (in b2 KITCHEN)) (:goal (and))").unwrap();
+    assert_eq!(problem.objects[3].name, "B2");
+    assert_eq!(problem.initial_facts[0].1, [ObjectId(3), ObjectId(1)]);
+}
+
+#[test]
+fn goals_may_be_any_condition() {
+    let (problem, _) = read_sections(
+        "(:init) (:goal (and (or (lit) (not (open hall)))
+             (forall (?b - ball) (exists (?r - room) (in ?b ?r))) (= b1 b1) (< (level) 3)))",
+    )
+    .unwrap();
+    assert_snapshot!(
+        Printer(&problem).condition(&problem.goal),
+        @"(and (or (lit) (not (open hall))) (forall (?b - ball) (exists (?r - room) (in ?0 ?1))) (= b1 b1) (< (level) 3))"
+    );
+}
+
+#[test]
+fn metrics_are_read_but_not_those_of_preferences() {
+    let metric = |text: &str| {
+        let (problem, warnings) =
+            read_sections(&format!("(:init) (:goal (and)) (:metric {text})")).unwrap();
+        let metric = problem.metric.clone().unwrap();
+        let expression = metric.expression.map(|e| Printer(&problem).expression(&e));
+        (metric.maximize, expression, warnings.len())
+    };
+    assert_eq!(
+        metric("minimize (+ (total-time) (* 2 (level)))"),
+        (false, Some("(+ (total-time) (* 2 (level)))".to_owned()), 0)
+    );
+    assert_eq!(metric("maximize (is-violated p)"), (true, None, 1));
+}
+
+#[test]
+fn sections_that_say_nothing_about_validity_are_ignored_with_a_warning() {
+    let (_, warnings) = read_sections(
+        "(:requirements :strips :mystery) (:init) (:goal (and)) (:length (:serial 3)) (:wibble 1)",
+    )
+    .unwrap();
+    let features: Vec<_> = warnings.iter().map(|w| w.feature.unwrap().name()).collect();
+    assert_eq!(
+        features,
+        ["unknown requirements", "other sections", "other sections"]
+    );
+}
+
+#[test]
+fn a_problem_of_another_domain_is_read_with_a_warning() {
+    let problem = elbowroom_pddl::Source::new(
+        "problem.pddl",
+        "(define (problem p) (:domain e) (:objects hall - room) (:init) (:goal (and)))",
+    );
+    let (problem, warnings) = elbowroom_pddl::read_problem(&reading::domain(""), &problem).unwrap();
+    assert_eq!(problem.objects.len(), 1);
+    let messages: Vec<_> = warnings.iter().map(|w| w.message.as_str()).collect();
+    assert_eq!(
+        messages,
+        [
+            "a problem of domain `e`, read with `d`",
+            "`hall` is declared already"
+        ]
+    );
+}

@@ -1,0 +1,127 @@
+//! What is understood but refused, by name and position.
+
+mod reading;
+
+use elbowroom_pddl::{Diagnostics, Feature};
+use reading::{read_actions, read_sections};
+
+/// The refused features with their lines; panics if there is a mistake among them.
+fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, usize)> {
+    let diagnostics = read.expect_err("refused");
+    assert!(diagnostics.is_unsupported(), "{diagnostics}");
+    diagnostics
+        .errors()
+        .map(|d| (d.feature.expect("a feature"), d.line()))
+        .collect()
+}
+
+/// The refused features of a durative action's effect.
+fn of_effect(text: &str) -> Vec<(Feature, usize)> {
+    refused(read_actions(&format!(
+        "(:durative-action a :duration () :effect {text})"
+    )))
+}
+
+#[test]
+fn pddl_plus_is_refused() {
+    let found = refused(read_actions(
+        "(:process p :precondition (lit) :effect (increase (level) (* #t 1)))
+(:event e :precondition (lit) :effect (not (lit)))
+(:constraint c :condition (lit))",
+    ));
+    assert_eq!(
+        found,
+        [
+            (Feature::Processes, 6),
+            (Feature::Events, 7),
+            (Feature::GlobalConstraints, 8)
+        ]
+    );
+}
+
+#[test]
+fn object_fluents_are_refused_once_where_they_are_declared() {
+    let domain = elbowroom_pddl::Source::new(
+        "domain.pddl",
+        "(define (domain d) (:types place robot)
+           (:functions (fuel ?r - robot) (position ?r - robot) - place)
+           (:durative-action go :parameters (?r - robot ?p - place) :duration (= ?duration 1)
+              :condition (at start (not (= (position ?r) ?p)))
+              :effect (and (change (position ?r) ?p) (at end (assign (position ?r) ?p)))))",
+    );
+    let problem = elbowroom_pddl::Source::new(
+        "problem.pddl",
+        "(define (problem p) (:domain d) (:objects r - robot a - place)
+           (:init (= (position r) a)) (:goal (= (position r) a)))",
+    );
+    let found = refused(elbowroom_pddl::read_problem(&domain, &problem));
+    // Functions written before a type all have it.
+    assert_eq!(
+        found,
+        [(Feature::ObjectFluents, 2), (Feature::ObjectFluents, 2)]
+    );
+}
+
+#[test]
+fn control_parameters_are_refused() {
+    let found = refused(read_actions(
+        "(:durative-action a :control (?n - number) :duration (>= ?duration ?n)
+           :condition (at start (>= ?n 2)))",
+    ));
+    assert_eq!(found, [(Feature::ControlParameters, 6)]);
+}
+
+#[test]
+fn trajectory_constraints_are_refused_unless_they_are_preferences() {
+    let sections = |constraints: &str| {
+        read_sections(&format!(
+            "(:init) (:goal (and)) (:constraints {constraints})"
+        ))
+    };
+    assert_eq!(
+        refused(sections(
+            "(and (preference (always (lit))) (sometime (lit)))"
+        )),
+        [(Feature::TrajectoryConstraints, 2)]
+    );
+    let (_, warnings) = sections(
+        "(and (preference (always (lit))) (forall (?b - ball) (preference p (sometime (lit)))))",
+    )
+    .unwrap();
+    assert_eq!(warnings[0].feature, Some(Feature::Preferences));
+    assert!(sections("(and)").unwrap().1.is_empty());
+}
+
+#[test]
+fn change_that_is_not_linear_in_time_is_refused() {
+    assert_eq!(
+        of_effect("(increase (level) (* #t #t))"),
+        [(Feature::NonlinearTime, 6)]
+    );
+    assert_eq!(
+        of_effect("(increase (level) (/ 1 #t))"),
+        [(Feature::NonlinearTime, 6)]
+    );
+}
+
+#[test]
+fn a_disjunction_over_several_times_is_refused() {
+    let found = refused(read_actions(
+        "(:durative-action a :duration () :condition (or (at start (lit)) (at end (lit))))",
+    ));
+    assert_eq!(found, [(Feature::MixedTimes, 6)]);
+}
+
+#[test]
+fn strict_bounds_on_a_duration_are_refused() {
+    let found = refused(read_actions(
+        "(:durative-action a :duration (< ?duration 3))",
+    ));
+    assert_eq!(found, [(Feature::StrictDurations, 6)]);
+}
+
+#[test]
+fn a_mistake_beside_a_refused_feature_is_still_a_mistake() {
+    let read = read_actions("(:process p) (:action a :effect (opne hall))");
+    assert!(!read.unwrap_err().is_unsupported());
+}

@@ -1,0 +1,18 @@
+(define (domain house)
+  (:requirements :typing :fluents :durative-actions)
+  (:types room ball - thing)
+  (:constants hall - room)
+  (:predicates (in ?b - ball ?r - room) (lit) (dark))
+  (:functions (size ?b - ball) (level))
+  (:synth-parameters ?u)
+  (:derived (dark) (not (lit)))
+  (:action throw
+    :parameters (?b - ball ?r - room)
+    :precondition (and (in ?b ?r) (or (lit) (dark)))
+    :effect (and (not (in ?b ?r)) (forall (?x - ball) (when (in ?x hall) (increase (level) (size ?x))))))
+  (:durative-action roll
+    :parameters (?b - ball)
+    :duration (and (>= ?duration ?u) (<= ?duration (/ (size ?b) 2)))
+    :condition (and (at start (exists (?r - room) (in ?b ?r))) (over all (> (level) -1.5)))
+    :effect (and (at start (not (lit))) (at end (assign (level) (- ?duration)))
+      (when (at start (dark)) (at end (lit))) (decrease (level) (* #t (+ 1 (size ?b)))))))

@@ -1,0 +1,6 @@
+(define (problem evening)
+  (:domain house)
+  (:objects b1 b2 - ball)
+  (:init (in b1 hall) (= (size b1) 4) (= (level) 100) (at 5 (lit)) (at 7 (= (level) 3)))
+  (:goal (and (imply (dark) (< (level) 7)) (forall (?b - ball) (in ?b hall))))
+  (:metric minimize (+ (total-time) (* 2 (level)))))
