@@ -91,6 +91,7 @@ pub(crate) struct StnArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(after_long_help = VARY_HELP)]
 pub(crate) struct EnvelopeArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
@@ -131,6 +132,21 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long)]
     pub(crate) json: bool,
 }
+
+const VARY_HELP: &str = "\
+What --vary can leave open:
+  durations                              all durations (the default)
+  duration ACTIONS                       the durations of these
+  constant ACTIONS FUNCTION [VALUE]      a number in their effects on the function
+  condition ACTIONS FUNCTION [VALUE]     a number that their conditions compare it with
+  initial (FUNCTION object ...)          a value at time 0
+  deadline (PREDICATE object ...)        when timed initials make the fact false
+  timed (NAME object ...)                when timed initials change it in any way
+  ?s=VALUE, n0.?r=VALUE                  a :synth-parameters number, nominally VALUE
+
+ACTIONS is an action's name, a label (n0), or (NAME object _ ...), where _ is any object. After any
+of these, `weight W` says how strongly to favour it, `in [LB, UB]` which values it can take at all,
+and after a constant or condition `shared` makes one number of it for all instances.";
 
 /// How to search for an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -1,6 +1,6 @@
 //! How the command ends: `docs/exit-codes.md`.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::process::ExitCode;
 
 /// The meaning of an exit code.
@@ -43,7 +43,7 @@ impl Failure {
         );
         if !help.is_empty() {
             let label = crate::look::styled(crate::look::HINT, "help");
-            text.push_str(&format!("\n  {label}: {help}"));
+            let _ = write!(text, "\n  {label}: {help}");
         }
         Self(text)
     }

@@ -1,5 +1,6 @@
 //! Reading files.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
@@ -25,15 +26,6 @@ pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
     let problem = source(&arguments.problem, "problem")?;
     let problem: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
     Ok(Task::new(Arc::new(problem)))
-}
-
-/// Reads a plan with fixed times.
-pub(crate) fn time_triggered_plan(
-    task: &mut Task,
-    path: &Path,
-) -> Result<TimeTriggeredPlan, Failure> {
-    let text = source(path, "plan")?;
-    with_warnings(pddl::read_plan(&text, task))
 }
 
 /// A plan of either kind, as it stands in a file.
@@ -65,23 +57,25 @@ fn stn_mistakes(text: &Source, errors: &FormatErrors) -> String {
         let margin = " ".repeat(line.len());
         let carets = "^".repeat(error.length.max(1));
         let offset = " ".repeat(error.column.saturating_sub(1));
-        shown.push_str(&format!(
+        let _ = write!(
+            shown,
             "{}: {}\n{margin}--> {}:{}:{}\n",
             styled(BAD, "error"),
             error.message,
             text.name(),
             error.line,
             error.column,
-        ));
+        );
         // An excerpt of a long line does not start at its first column.
         if error.column <= error.excerpt.chars().count() + 1 {
             let expected = error.expected.as_deref().unwrap_or_default();
-            shown.push_str(&format!(
+            let _ = write!(
+                shown,
                 "{margin} |\n{line} | {}\n{margin} | {offset}{carets} {expected}\n",
                 error.excerpt
-            ));
+            );
         } else if let Some(expected) = &error.expected {
-            shown.push_str(&format!("{margin} = {expected}\n"));
+            let _ = writeln!(shown, "{margin} = {expected}");
         }
         shown.push('\n');
     }
@@ -96,18 +90,28 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
             output::tell(&format!("reading the {what} from standard input"));
         }
         let mut bytes = Vec::new();
-        let read = io::stdin().lock().take(LARGEST_FILE).read_to_end(&mut bytes);
+        let read = io::stdin()
+            .lock()
+            .take(LARGEST_FILE)
+            .read_to_end(&mut bytes);
         return match read {
             Ok(_) => Ok(Source::from_bytes("standard input", &bytes)),
             Err(error) => Err(Failure::new(
-                format!("cannot read the {what} from standard input: {}", plain(&error)),
+                format!(
+                    "cannot read the {what} from standard input: {}",
+                    plain(&error)
+                ),
                 "",
             )),
         };
     }
     let refused = |error: &io::Error| {
         Failure::new(
-            format!("cannot read the {what} {}: {}", path.display(), plain(error)),
+            format!(
+                "cannot read the {what} {}: {}",
+                path.display(),
+                plain(error)
+            ),
             advice(path, error),
         )
     };
@@ -126,7 +130,9 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
 fn advice(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
-            let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let parent = path
+                .parent()
+                .filter(|folder| !folder.as_os_str().is_empty());
             match parent {
                 Some(folder) if !folder.is_dir() => {
                     format!("there is no folder {}", folder.display())

@@ -57,9 +57,18 @@ pub(crate) fn render(limits: &[Limit], look: Look) -> String {
     text
 }
 
-/// Appends the words of `words`, in lines of at most `width` columns; the first is indented by
-/// `indent`, the others by two more.
+/// Appends the words of `words` as a list item: in lines of at most `width` columns, the first
+/// indented by `indent`, the others by two more.
 pub(crate) fn push_wrapped(text: &mut String, words: &str, indent: usize, width: usize) {
+    push_lines(text, words, [indent, indent + 2], width);
+}
+
+/// Appends the words of `words` as a paragraph, in lines of at most `width` columns.
+pub(crate) fn push_paragraph(text: &mut String, words: &str, width: usize) {
+    push_lines(text, words, [0, 0], width);
+}
+
+fn push_lines(text: &mut String, words: &str, [indent, hanging]: [usize; 2], width: usize) {
     let mut line = " ".repeat(indent);
     let mut is_empty = true;
     for word in words.split_whitespace() {
@@ -67,7 +76,7 @@ pub(crate) fn push_wrapped(text: &mut String, words: &str, indent: usize, width:
         if !is_empty && needed > width {
             text.push_str(&line);
             text.push('\n');
-            line = " ".repeat(indent + 2);
+            line = " ".repeat(hanging);
             is_empty = true;
         }
         if !is_empty {

@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     bug::install_hook();
     let answer = match CommandLine::parse().command {
         Command::Check(arguments) => commands::check::run(&arguments),
-        Command::Stn(_) => todo!(),
+        Command::Stn(arguments) => commands::stn::run(&arguments),
         Command::Envelope(arguments) => commands::envelope::run(&arguments),
     };
     let exit = answer.unwrap_or_else(|failure| {

@@ -29,14 +29,32 @@ pub struct Explanation {
     /// What goes wrong, without the numbers of the example: several boxes that fail for one
     /// reason have the same text here.
     pub reason: String,
-    /// By how much, where that is one number: a deadline is missed, or a condition fails, by it.
-    pub shortfall: Option<Rational>,
+    /// By how much, where that is one number.
+    pub shortfall: Option<Shortfall>,
     /// Values of the parameters at which it goes wrong.
     pub valuation: Valuation,
     /// A time for each node at which it goes wrong; `None` if there is no schedule at all.
     pub schedule: Option<Schedule>,
     /// What the judge says about that schedule.
     pub verdict: Option<String>,
+}
+
+/// By how much something fails.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Shortfall {
+    /// Something happens so much too late.
+    Time(Rational),
+    /// A comparison fails by so much.
+    Amount(Rational),
+}
+
+impl Shortfall {
+    /// The number.
+    pub fn value(&self) -> &Rational {
+        match self {
+            Self::Time(value) | Self::Amount(value) => value,
+        }
+    }
 }
 
 impl<'a> Explainer<'a> {
@@ -72,7 +90,7 @@ impl<'a> Explainer<'a> {
             reason: conflict
                 .as_ref()
                 .map_or_else(String::new, |c| c.reason.clone()),
-            shortfall: conflict.map(|conflict| conflict.excess),
+            shortfall: conflict.map(|conflict| Shortfall::Time(conflict.excess)),
             valuation: valuation.to_vec(),
             schedule: None,
             verdict: None,
@@ -112,10 +130,10 @@ impl<'a> Explainer<'a> {
     }
 
     /// By how much the example breaks the requirement.
-    fn shortfall(&self, broken: &Broken, example: &Counterexample) -> Option<Rational> {
+    fn shortfall(&self, broken: &Broken, example: &Counterexample) -> Option<Shortfall> {
         if let Requirement::Separation { first, second } = &broken.requirement {
             let gap = &example.schedule[second.index()] - &example.schedule[first.index()];
-            return Some(self.epsilon - &gap);
+            return Some(Shortfall::Time(self.epsilon - &gap));
         }
         let [inequality] = broken.case.inequalities.as_slice() else {
             return None;
@@ -123,7 +141,7 @@ impl<'a> Explainer<'a> {
         let mut times = example.schedule.clone();
         times.extend(example.moment.clone());
         let value = inequality.expression.value(&times, &example.valuation);
-        Some(value.abs())
+        Some(Shortfall::Amount(value.abs())).filter(|gap| !gap.value().is_zero())
     }
 
     /// What the judge says about the example; `None` where it cannot be asked, because something
@@ -159,21 +177,27 @@ impl<'a> Explainer<'a> {
         let epsilon = self.epsilon.to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
         match (kind(first), kind(second)) {
-            (Node::Start(start), Node::End(end)) if start == end => {
-                format!("an action whose start and end interfere takes at least {epsilon}")
-            }
+            (Node::Start(start), Node::End(end)) if start == end => self.own_separation(),
             (_, Node::Timed(index)) => self.deadline(*first, index),
             (Node::Timed(index), _) => format!(
-                "{} must come {epsilon} after {} at {}",
+                "{} must come {epsilon} after {}{}",
                 plan.node_words(self.task, *second),
                 self.timed_change(*second, index),
-                self.timed_time(index),
+                self.at_time(index),
             ),
             _ => format!(
                 "{} must come {epsilon} before {}",
                 plan.node_words(self.task, *first),
                 plan.node_words(self.task, *second),
             ),
+        }
+    }
+
+    /// A parameter in plain words: `duration of (drive rover depot shelf)`.
+    pub fn quantity(&self, id: ParameterId) -> String {
+        match self.plan.parameter(id).kind {
+            ParameterKind::Timed(index) => self.timed_quantity(index),
+            _ => self.plan.describe(self.task, id),
         }
     }
 
@@ -198,6 +222,12 @@ impl<'a> Explainer<'a> {
             (Some(end), _) => format!("its range: at most {}", end.to_decimal(6)),
             (None, _) => String::new(),
         }
+    }
+
+    /// Why an action cannot take no time at all.
+    fn own_separation(&self) -> String {
+        let epsilon = self.epsilon.to_decimal(6);
+        format!("an action whose start and end interfere takes at least {epsilon}")
     }
 
     fn action_name(&self, id: InstanceId) -> &'a str {

@@ -124,6 +124,13 @@ pub fn open(
     Ok(pinned(task, plan, &freed.nominal, epsilon))
 }
 
+/// The plan with nothing left open. Where needed, differences of times are fixed so that every
+/// schedule works.
+pub fn closed(task: &Task, freed: Deordered, epsilon: &Rational) -> ParametrizedPlan {
+    let plan = ParametrizedPlan::closed(task, freed.plan);
+    pinned(task, plan, &freed.nominal, epsilon)
+}
+
 /// An STN plan, which may have parameters already, with more left open.
 ///
 /// # Errors

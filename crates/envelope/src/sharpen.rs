@@ -71,21 +71,20 @@ fn push(
     if accepts(border.clone())? {
         return Ok(on_step());
     }
-    let mut outside = match border {
-        Some(border) => border,
-        None => {
-            // Something stops it: go out until there.
-            let mut step = Rational::ONE;
-            loop {
-                let farther = &inside + &step;
-                if !accepts(Some(farther.clone()))? {
-                    break farther;
-                }
-                inside = farther;
-                step = &step + &step;
-                if on_step().is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
+    let mut outside = if let Some(border) = border {
+        border
+    } else {
+        // Something stops it: go out until there.
+        let mut step = Rational::ONE;
+        loop {
+            let farther = &inside + &step;
+            if !accepts(Some(farther.clone()))? {
+                break farther;
+            }
+            inside = farther;
+            step = &step + &step;
+            if on_step().is_break() {
+                return Ok(ControlFlow::Break(()));
             }
         }
     };

@@ -1,13 +1,19 @@
 //! `elbowroom check`: is the plan valid?
 
-use elbowroom::model::Task;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use elbowroom::model::ground::FluentId;
 use elbowroom::model::validate::{self, Margin, Report, Settings, Verdict, Violation};
+use elbowroom::model::{Footprint, Task, TimeTriggeredPlan};
 use serde_json::{Value, json};
 
 use crate::args::CheckArgs;
 use crate::exit::{Answer, Exit, Failure};
+use crate::input::AnyPlan;
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
+use crate::output::counted;
 use crate::{input, json, number, output};
 
 /// Only the tightest margins are shown to people; `--json` has all.
@@ -19,7 +25,19 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
     let Some(path) = &arguments.plan else {
         return readable(&task, arguments.json);
     };
-    let plan = input::time_triggered_plan(&mut task, path)?;
+    let plan = match input::any_plan(&mut task, path)? {
+        AnyPlan::TimeTriggered(plan) => plan,
+        AnyPlan::Stn(_) => {
+            return Err(Failure::new(
+                format!(
+                    "{} is an STN plan file, which stands for many plans",
+                    path.display()
+                ),
+                "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
+                 fixed times",
+            ));
+        }
+    };
     let settings = match &arguments.tolerance {
         Some(tolerance) => Settings::like_val(tolerance.clone()),
         None => Settings {
@@ -42,7 +60,8 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
     if arguments.json {
         output::print_json(&document(&task, &name, &verdict))?;
     } else {
-        output::print(&text(&task, &name, &verdict, Look::of_stdout()))?;
+        let touched = touched(&task, &plan);
+        output::print(&text(&task, &name, &verdict, &touched, Look::of_stdout()))?;
     }
     Ok(exit)
 }
@@ -60,24 +79,41 @@ fn readable(task: &Task, as_json: bool) -> Answer {
         }))?;
     } else {
         output::print(&format!(
-            "{}: domain {} and problem {} can be read\n  \
-             {} actions, {} predicates, {} functions, {} objects, {} timed initials\n",
+            "{}: domain {} and problem {} can be read\n  {}, {}, {}, {}, {}\n",
             styled(GOOD, "ok"),
             problem.domain,
             problem.name,
-            problem.schemas.len(),
-            problem.predicates.len(),
-            problem.functions.len(),
-            problem.objects.len(),
-            problem.timed.len(),
+            counted(problem.schemas.len(), "action"),
+            counted(problem.predicates.len(), "predicate"),
+            counted(problem.functions.len(), "function"),
+            counted(problem.objects.len(), "object"),
+            counted(problem.timed.len(), "timed initial"),
         ))?;
     }
     Ok(Exit::Yes)
 }
 
-fn text(task: &Task, name: &str, verdict: &Verdict, look: Look) -> String {
+/// The fluents that the plan's actions change.
+fn touched(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
+    let steps = plan.steps.iter();
+    steps
+        .flat_map(|step| {
+            let start = Footprint::of_start(task, &step.action);
+            [start, Footprint::of_end(task, &step.action)]
+        })
+        .flat_map(|footprint| footprint.shifts.into_iter().chain(footprint.assigns))
+        .collect()
+}
+
+fn text(
+    task: &Task,
+    name: &str,
+    verdict: &Verdict,
+    touched: &BTreeSet<FluentId>,
+    look: Look,
+) -> String {
     match verdict {
-        Verdict::Valid(report) => success(task, name, report, look),
+        Verdict::Valid(report) => success(task, name, report, touched, look),
         Verdict::Invalid(violation) => {
             let mut text = format!("{}: {name} does not work\n", styled(BAD, "invalid"));
             push_wrapped(&mut text, &violation.to_string(), 2, look.width);
@@ -87,7 +123,13 @@ fn text(task: &Task, name: &str, verdict: &Verdict, look: Look) -> String {
     }
 }
 
-fn success(task: &Task, name: &str, report: &Report, look: Look) -> String {
+fn success(
+    task: &Task,
+    name: &str,
+    report: &Report,
+    touched: &BTreeSet<FluentId>,
+    look: Look,
+) -> String {
     let mut text = format!(
         "{}: {name} reaches the goal at {}\n",
         styled(GOOD, "valid"),
@@ -97,22 +139,23 @@ fn success(task: &Task, name: &str, report: &Report, look: Look) -> String {
         .state
         .values
         .iter()
-        .filter(|(fluent, value)| task.initial().values.get(fluent) != Some(value))
+        .filter(|(fluent, _)| touched.contains(fluent))
         .collect();
     if !changed.is_empty() {
-        text.push_str(&format!("\n{}\n", styled(STRONG, "Values at the end")));
+        let _ = write!(text, "\n{}\n", styled(STRONG, "Values at the end"));
         for (fluent, value) in changed {
-            text.push_str(&format!(
-                "  {} = {}\n",
+            let _ = writeln!(
+                text,
+                "  {} = {}",
                 task.fluent_name(*fluent),
                 number::nearest(value)
-            ));
+            );
         }
     }
     let mut margins: Vec<&Margin> = report.margins.iter().collect();
     margins.sort_by(|a, b| a.margin.cmp(&b.margin));
     if !margins.is_empty() {
-        text.push_str(&format!("\n{}\n", styled(STRONG, "Smallest margins")));
+        let _ = write!(text, "\n{}\n", styled(STRONG, "Smallest margins"));
     }
     for margin in margins.iter().take(MARGINS_SHOWN) {
         let of = match &margin.action {
@@ -133,7 +176,7 @@ fn success(task: &Task, name: &str, report: &Report, look: Look) -> String {
             "  and {} more (--json has all)",
             margins.len() - MARGINS_SHOWN
         );
-        text.push_str(&format!("{}\n", styled(FAINT, &more)));
+        let _ = writeln!(text, "{}", styled(FAINT, &more));
     }
     text
 }

@@ -5,10 +5,11 @@ mod document;
 mod fails;
 mod search;
 mod text;
+mod watch;
 
 use elbowroom::Explainer;
-use elbowroom::flow::{self, FlowError};
 use elbowroom::envelope::Oracle;
+use elbowroom::flow::{self, FlowError};
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::obligations::Refusal;
 use elbowroom::plan::parametrize::VarySpec;
@@ -16,10 +17,12 @@ use elbowroom::plan::parametrize::VarySpec;
 use crate::args::{EnvelopeArgs, Guarantee, Method};
 use crate::exit::{Answer, Failure};
 use crate::input::{self, AnyPlan};
+use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     refuse_what_is_not_there_yet(arguments)?;
+    let watch = Watch::start(arguments.time_limit.as_ref());
     let mut task = input::task(&arguments.problem)?;
     let specs = specifications(&arguments.vary)?;
     let epsilon = &arguments.epsilon;
@@ -46,7 +49,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     };
     match &arguments.contains {
         Some(text) => contains::run(&subject, oracle, text),
-        None => search::run(&subject, oracle),
+        None => search::run(&subject, oracle, &watch),
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Conflict {
 #[derive(Clone, Copy)]
 enum Origin<'a> {
     /// Nothing happens before time 0.
-    Beginning(NodeId),
+    Beginning,
     /// The lower bound of a constraint.
     AtLeast(&'a Constraint),
     /// The upper bound of a constraint.
@@ -29,11 +29,7 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
     let plan = &explainer.plan.plan;
     let cycle = plan.network(valuation).consistency().err()?;
     // In the order in which `StnPlan::network` adds them.
-    let mut origins: Vec<Origin<'_>> = plan
-        .nodes()
-        .skip(1)
-        .map(|(node, _)| Origin::Beginning(node))
-        .collect();
+    let mut origins: Vec<Origin<'_>> = plan.nodes().skip(1).map(|_| Origin::Beginning).collect();
     for constraint in &plan.constraints {
         if constraint.lower != Bound::Infinite {
             origins.push(Origin::AtLeast(constraint));
@@ -52,10 +48,10 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
     let first_room = walked.iter().position(|o| matches!(o, Origin::AtMost(_)));
     walked.rotate_left(first_room.unwrap_or(0));
     let mut needs: Vec<String> = Vec::new();
-    let mut rooms: Vec<String> = Vec::new();
+    let mut rooms: Vec<Room> = Vec::new();
     for (position, origin) in walked.iter().enumerate() {
         match origin {
-            Origin::Beginning(_) => {}
+            Origin::Beginning => {}
             Origin::AtLeast(constraint) => needs.extend(need(explainer, constraint, valuation)),
             Origin::AtMost(constraint) => {
                 let next = walked[(position + 1) % walked.len()];
@@ -64,18 +60,59 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<
         }
     }
     needs.reverse();
+    let reason = if walked
+        .iter()
+        .any(|origin| is_own_separation(explainer, *origin))
+    {
+        explainer.own_separation()
+    } else {
+        sentence(&needs, &rooms)
+    };
     Some(Conflict {
-        reason: sentence(&needs, &rooms),
+        reason,
         excess: -cycle.total,
     })
 }
 
-fn sentence(needs: &[String], rooms: &[String]) -> String {
-    let rooms = rooms.join(", and ");
-    if needs.is_empty() {
-        return rooms;
+/// What there is to fit into.
+enum Room {
+    /// An action during which it must happen.
+    Action(String),
+    /// Anything else: a deadline, a bound.
+    Limit(String),
+}
+
+/// `A, B must fit into C`; `deadline of D at 60, after A, B`.
+fn sentence(needs: &[String], rooms: &[Room]) -> String {
+    let needs = needs.join(", ");
+    let mut actions = Vec::new();
+    let mut limits = Vec::new();
+    for room in rooms {
+        match room {
+            Room::Action(name) => actions.push(name.as_str()),
+            Room::Limit(words) => limits.push(words.as_str()),
+        }
     }
-    format!("{rooms}, with {}", needs.join(", "))
+    let (actions, limits) = (actions.join(" and "), limits.join(" and "));
+    match (needs.is_empty(), actions.is_empty(), limits.is_empty()) {
+        (true, true, _) => limits,
+        (true, false, true) => format!("the duration of {actions}"),
+        (true, false, false) => format!("{limits}, and the duration of {actions}"),
+        (false, true, _) => format!("{limits}, after {needs}"),
+        (false, false, true) => format!("{needs} must fit into {actions}"),
+        (false, false, false) => format!("{limits}, and {needs} must fit into {actions}"),
+    }
+}
+
+/// Whether the edge keeps start and end of one action apart, because they interfere.
+fn is_own_separation(explainer: &Explainer<'_>, origin: Origin<'_>) -> bool {
+    match origin {
+        Origin::AtLeast(constraint) => {
+            constraint.reason == Reason::Interference
+                && duration_of(explainer, constraint).is_some()
+        }
+        Origin::AtMost(_) | Origin::Beginning => false,
+    }
 }
 
 /// What takes time because of a lower bound; `None` for mere separations.
@@ -114,35 +151,27 @@ fn room(
     constraint: &Constraint,
     next: Origin<'_>,
     valuation: &[Rational],
-) -> String {
+) -> Room {
     let plan = &explainer.plan.plan;
     if let Reason::Timed(index) = constraint.reason {
         let before = match next {
             Origin::AtLeast(after) => after.from,
-            Origin::AtMost(_) | Origin::Beginning(_) => constraint.to,
+            Origin::AtMost(_) | Origin::Beginning => constraint.to,
         };
-        return explainer.deadline(before, index);
+        return Room::Limit(explainer.deadline(before, index));
     }
     if let Some(id) = duration_of(explainer, constraint) {
-        return format!("it must fit into {}", explainer.action_name(id));
+        return Room::Action(explainer.action_name(id).to_owned());
     }
     let most = value(&constraint.upper, valuation).unwrap_or_default();
-    if constraint.from == NodeId::ZERO {
-        if let Some(deadline) = explainer.deadline_behind(constraint.to, &most) {
-            return deadline;
-        }
-        return format!(
-            "{} must come at {} or before",
-            plan.node_words(explainer.task, constraint.to),
-            most.to_decimal(6)
-        );
-    }
-    format!(
-        "at most {} may pass from {} to {}",
-        most.to_decimal(6),
-        plan.node_words(explainer.task, constraint.from),
-        plan.node_words(explainer.task, constraint.to),
-    )
+    let to = plan.node_words(explainer.task, constraint.to);
+    Room::Limit(if constraint.from == NodeId::ZERO {
+        let deadline = explainer.deadline_behind(constraint.to, &most);
+        deadline.unwrap_or_else(|| format!("{to} at {} or before", most.to_decimal(6)))
+    } else {
+        let from = plan.node_words(explainer.task, constraint.from);
+        format!("at most {} from {from} to {to}", most.to_decimal(6))
+    })
 }
 
 /// The instance whose duration the constraint bounds.

@@ -3,18 +3,18 @@
 use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Change, Condition, FactId};
 use elbowroom_num::Rational;
-use elbowroom_plan::{Node, NodeId};
+use elbowroom_plan::{Node, NodeId, Parameter, ParameterKind};
 
 use super::Explainer;
 
 impl Explainer<'_> {
     /// Why the node must come before the timed initials: `deadline of (open w) at 320.118`.
     pub(super) fn deadline(&self, node: NodeId, timed: usize) -> String {
-        let time = self.timed_time(timed);
+        let time = self.at_time(timed);
         match self.lost(node, timed) {
-            Some(fact) => format!("deadline of {} at {time}", self.task.fact_name(fact)),
+            Some(fact) => format!("deadline of {}{time}", self.task.fact_name(fact)),
             None => format!(
-                "{} must come before {} at {time}",
+                "{} must come before {}{time}",
                 self.plan.plan.node_words(self.task, node),
                 self.timed_change(node, timed),
             ),
@@ -64,9 +64,28 @@ impl Explainer<'_> {
         }
     }
 
-    /// When the timed initials happen.
-    pub(super) fn timed_time(&self, timed: usize) -> String {
-        self.task.timed()[timed].time.to_decimal(6)
+    /// ` at 60`; nothing where the time is left open.
+    pub(super) fn at_time(&self, timed: usize) -> String {
+        let is_open = |p: &Parameter| p.kind == ParameterKind::Timed(timed);
+        if self.plan.parameters.iter().any(is_open) {
+            return String::new();
+        }
+        format!(" at {}", self.task.timed()[timed].time.to_decimal(6))
+    }
+
+    /// The time of the timed initials, as a quantity.
+    pub(super) fn timed_quantity(&self, timed: usize) -> String {
+        match self.task.timed()[timed].changes.as_slice() {
+            [Change::Delete(fact)] => format!("deadline of {}", self.task.fact_name(*fact)),
+            [Change::Add(fact)] => format!("when {} becomes true", self.task.fact_name(*fact)),
+            [Change::Update { fluent, .. }] => {
+                format!("when {} changes", self.task.fluent_name(*fluent))
+            }
+            _ => format!(
+                "time of the timed initials at {}",
+                self.task.timed()[timed].time.to_decimal(6)
+            ),
+        }
     }
 
     /// A fact that the timed initials make false and that is needed at the node, or until then.

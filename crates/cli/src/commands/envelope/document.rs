@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::Subject;
 use super::search::Outcome;
+use super::watch::Stop;
 use crate::args::{EnvelopeArgs, Growth};
 use crate::commands::check::violation_document;
 use crate::json;
@@ -54,7 +55,11 @@ pub(super) fn contains(
     envelope: &DecoupledEnvelope,
     why_not: Option<&Explanation>,
 ) -> Value {
-    let answer = if why_not.is_some() { "outside" } else { "inside" };
+    let answer = if why_not.is_some() {
+        "outside"
+    } else {
+        "inside"
+    };
     let mut document = header(subject.arguments, subject.task, answer);
     document["parameters"] = Value::Array(parameters(subject, Some(envelope)));
     if let Some(explanation) = why_not {
@@ -68,6 +73,13 @@ pub(super) fn fails(subject: &Subject<'_>, explanation: &Explanation) -> Value {
     let mut document = header(subject.arguments, subject.task, "fails");
     document["parameters"] = Value::Array(parameters(subject, None));
     document["counterexample"] = counterexample(subject, explanation);
+    document
+}
+
+/// The answer "nothing is known yet".
+pub(super) fn none(subject: &Subject<'_>, stop: Stop) -> Value {
+    let mut document = header(subject.arguments, subject.task, "none");
+    document["stop"] = json!(stop.name());
     document
 }
 
@@ -109,7 +121,7 @@ fn parameters(subject: &Subject<'_>, envelope: Option<&DecoupledEnvelope>) -> Ve
     let each = |(index, parameter): (usize, &elbowroom::plan::Parameter)| {
         let mut value = json!({
             "name": parameter.name,
-            "quantity": subject.plan.describe(subject.task, ParameterId::from(index)),
+            "quantity": subject.explainer.quantity(ParameterId::from(index)),
             "kind": kind(parameter.kind),
             "nominal": json::number(&parameter.nominal),
             "weight": json::number(&parameter.weight),
@@ -121,7 +133,13 @@ fn parameters(subject: &Subject<'_>, envelope: Option<&DecoupledEnvelope>) -> Ve
         }
         value
     };
-    subject.plan.parameters.iter().enumerate().map(each).collect()
+    subject
+        .plan
+        .parameters
+        .iter()
+        .enumerate()
+        .map(each)
+        .collect()
 }
 
 fn kind(kind: ParameterKind) -> &'static str {
@@ -142,7 +160,7 @@ fn counterexample(subject: &Subject<'_>, explanation: &Explanation) -> Value {
         .collect();
     json!({
         "message": explanation.reason,
-        "shortfall": explanation.shortfall.as_ref().map(json::number),
+        "shortfall": explanation.shortfall.as_ref().map(|gap| json::number(gap.value())),
         "verdict": explanation.verdict,
         "values": values,
         "schedule": schedule(subject, explanation),

@@ -1,10 +1,10 @@
 //! Plans that fail even as planned.
 
-use elbowroom::Explanation;
 use elbowroom::envelope::{Objection, Oracle};
 use elbowroom::model::Task;
 use elbowroom::model::validate::Violation;
 use elbowroom::plan::DecoupledEnvelope;
+use elbowroom::{Explanation, Shortfall};
 
 use super::contains::example;
 use super::{Subject, document};
@@ -24,7 +24,12 @@ pub(super) fn judged_invalid(
         output::print_json(&document::judged_invalid(arguments, task, violation))?;
     } else {
         let mut text = headline(arguments);
-        push_wrapped(&mut text, &violation.to_string(), 2, Look::of_stdout().width);
+        push_wrapped(
+            &mut text,
+            &violation.to_string(),
+            2,
+            Look::of_stdout().width,
+        );
         output::print(&text)?;
     }
     Ok(Exit::No)
@@ -74,21 +79,14 @@ fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
 
 /// The reason, and by how much.
 pub(super) fn what(explanation: &Explanation) -> String {
+    let reason = &explanation.reason;
     match &explanation.shortfall {
-        Some(shortfall) if !shortfall.is_zero() && explanation.schedule.is_none() => {
-            format!(
-                "{}: too late by {}",
-                explanation.reason,
-                number::nearest(shortfall)
-            )
+        Some(Shortfall::Time(late)) => {
+            format!("{reason}: too late by {}", number::nearest(late))
         }
-        Some(shortfall) if !shortfall.is_zero() => {
-            format!(
-                "{}: short by {}",
-                explanation.reason,
-                number::nearest(shortfall)
-            )
+        Some(Shortfall::Amount(short)) => {
+            format!("{reason}: short by {}", number::nearest(short))
         }
-        _ => explanation.reason.clone(),
+        None => reason.clone(),
     }
 }

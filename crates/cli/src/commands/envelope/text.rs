@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use elbowroom::num::Rational;
 use elbowroom::plan::{ParameterId, ParameterKind, Valuation};
 
 use super::Subject;
-use super::search::{Outcome, Stop};
-use crate::limits::{self, Limit, push_wrapped};
+use super::search::Outcome;
+use super::watch::Stop;
+use crate::limits::{self, Limit, push_paragraph};
 use crate::look::{FAINT, Look, STRONG, styled};
 use crate::table::{self, Row};
 use crate::{number, output};
@@ -34,15 +34,15 @@ pub(super) fn envelope(subject: &Subject<'_>, outcome: &Outcome, look: Look) -> 
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
-    push_wrapped(&mut text, meaning(&rows), 1, look.width);
+    push_paragraph(&mut text, meaning(&rows), look.width);
     text.push('\n');
     text.push_str(&limits::render(&limits_of(subject, outcome), look));
     text.push('\n');
     if let Some(makespan) = makespan(subject, outcome) {
-        text.push_str(&makespan);
+        push_paragraph(&mut text, &makespan, look.width);
     }
     let mut how = String::new();
-    push_wrapped(&mut how, &course(subject, outcome), 0, look.width);
+    push_paragraph(&mut how, &course(subject, outcome), look.width);
     text.push_str(&styled(FAINT, how.trim_end()));
     text.push('\n');
     text
@@ -59,7 +59,7 @@ fn quantity(subject: &Subject<'_>, id: ParameterId) -> String {
         ParameterKind::Duration(instance) => {
             subject.plan.plan.instance(instance).action.name.clone()
         }
-        _ => subject.plan.describe(subject.task, id),
+        _ => subject.explainer.quantity(id),
     }
 }
 
@@ -98,17 +98,21 @@ fn makespan(subject: &Subject<'_>, outcome: &Outcome) -> Option<String> {
     let at_most: Option<Valuation> = intervals.iter().map(|i| i.upper.value().cloned()).collect();
     let nominal = end(Some(subject.plan.nominal()))?;
     let mut line = format!("Done at {} as planned", number::nearest(&nominal));
-    let or = |text: Option<Rational>| text.as_ref().map(number::nearest);
-    if let Some(shortest) = or(end(at_least)) {
-        let _ = write!(line, "; at {shortest} with all at their lower ends");
+    if let Some(shortest) = end(at_least) {
+        let _ = write!(
+            line,
+            ", at {} with all at their lower ends",
+            number::nearest(&shortest)
+        );
     }
-    match or(end(at_most)) {
-        Some(longest) => {
-            let _ = write!(line, ", at {longest} with all at their upper ends");
-        }
-        None => {}
+    if let Some(longest) = end(at_most) {
+        let _ = write!(
+            line,
+            ", at {} with all at their upper ends",
+            number::nearest(&longest)
+        );
     }
-    line.push_str(".\n");
+    line.push_str(", if started as early as possible.");
     Some(line)
 }
 
@@ -117,7 +121,7 @@ fn course(subject: &Subject<'_>, outcome: &Outcome) -> String {
     let ended = match outcome.stop {
         Stop::Converged if subject.arguments.sharpen => "Each end touches its limit".to_owned(),
         Stop::Converged => format!(
-            "No end can move by {} or more (--sharpen moves each onto its limit)",
+            "Steps below {} were not tried (--sharpen moves each end onto its limit)",
             number::nearest(&subject.arguments.precision)
         ),
         Stop::CheckLimit | Stop::TimeLimit => {

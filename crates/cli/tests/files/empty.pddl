@@ -1,0 +1,1 @@
+(define (problem empty) (:domain misspelt) (:init) (:goal (done)))

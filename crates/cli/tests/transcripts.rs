@@ -1,0 +1,15 @@
+//! The transcripts in `tests/cmd` are the manual of the command, and are run as they stand.
+
+use std::path::Path;
+
+#[test]
+fn the_transcripts_are_true() {
+    // They name files as one does at the root of the repository.
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::env::set_current_dir(root).expect("the repository");
+    trycmd::TestCases::new()
+        .default_bin_path(env!("CARGO_BIN_EXE_elbowroom"))
+        .env("NO_COLOR", "1")
+        .env("LC_ALL", "C")
+        .case("crates/cli/tests/cmd/*.md");
+}

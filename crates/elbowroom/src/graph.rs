@@ -1,0 +1,80 @@
+//! STN plans as pictures.
+
+use std::fmt::Write as _;
+
+use elbowroom_model::Task;
+use elbowroom_plan::{Bound, Constraint, Node, ParametrizedPlan, Reason};
+
+/// The network as a graph for Graphviz: `dot -Tsvg`.
+///
+/// One box for each action, with its start and end side by side; arrows are constraints, dashed
+/// where they only say what comes first.
+pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
+    let network = &plan.plan;
+    let mut dot = String::from(
+        "digraph plan {\n  rankdir=LR;\n  node [shape=box, style=rounded, fontname=\"sans-serif\"];\n  \
+         edge [fontname=\"sans-serif\", fontsize=10];\n",
+    );
+    for (id, node) in network.nodes() {
+        let (label, shape) = match node {
+            Node::Zero => ("0".to_owned(), "circle"),
+            Node::Timed(index) => (task.timed()[index].time.to_decimal(3), "diamond"),
+            Node::Start(_) | Node::End(_) | Node::Instant(_) => {
+                (network.node_words(task, id), "box")
+            }
+        };
+        let _ = writeln!(
+            dot,
+            "  n{} [label={}, shape={shape}];",
+            id.0,
+            quoted(&label)
+        );
+    }
+    for constraint in &network.constraints {
+        let style = match constraint.reason {
+            Reason::Duration(_) => "bold",
+            Reason::Interference | Reason::OverAll => "dashed",
+            Reason::Given | Reason::Timed(_) | Reason::Pinned => "solid",
+        };
+        let label = label(plan, constraint);
+        let _ = writeln!(
+            dot,
+            "  n{} -> n{} [label={}, style={style}];",
+            constraint.from.0,
+            constraint.to.0,
+            quoted(&label)
+        );
+    }
+    dot.push_str("}\n");
+    dot
+}
+
+/// Why a constraint is there, in one word.
+pub fn reason(reason: &Reason) -> &'static str {
+    match reason {
+        Reason::Given => "given",
+        Reason::Duration(_) => "duration",
+        Reason::Timed(_) => "timed",
+        Reason::Interference => "interference",
+        Reason::OverAll => "over all",
+        Reason::Pinned => "pinned",
+    }
+}
+
+/// `[lower, upper]`, or nothing for a mere order.
+fn label(plan: &ParametrizedPlan, constraint: &Constraint) -> String {
+    let bound = |bound: &Bound, infinity: &str| match bound {
+        Bound::Infinite => infinity.to_owned(),
+        Bound::Finite(value) => value.to_decimal(3),
+        Bound::Parameter(id) => plan.parameter(*id).name.clone(),
+    };
+    let lower = bound(&constraint.lower, "-inf");
+    if constraint.lower == constraint.upper {
+        return lower;
+    }
+    format!("[{lower}, {}]", bound(&constraint.upper, "inf"))
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}

@@ -1,0 +1,225 @@
+//! The cases, worked by hand in their problem files: the program must come to the same result.
+//!
+//! For each case the region is written down as inequalities, and the interval of each duration
+//! with the others nominal. The first is compared at many points, the second exactly.
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use elbowroom::envelope::{self, Oracle, irr, sharpen};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::{Interval, Rational};
+use elbowroom::pddl::{self, Source};
+use elbowroom::plan::parametrize::VarySpec;
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom::{flow, plan};
+
+fn folder(case: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../cases")
+        .join(case)
+}
+
+fn source(path: &Path) -> Source {
+    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    Source::new(path.display().to_string(), text)
+}
+
+fn read(case: &str) -> (Task, TimeTriggeredPlan) {
+    let folder = folder(case);
+    let (domain, problem) = (
+        source(&folder.join("domain.pddl")),
+        source(&folder.join("problem.pddl")),
+    );
+    let (problem, warnings) =
+        pddl::read_problem(&domain, &problem).expect("a case without mistakes");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let mut task = Task::new(problem);
+    let plan = source(&folder.join("plan.plan"));
+    let (plan, _) = pddl::read_plan(&plan, &mut task).expect("a plan without mistakes");
+    (task, plan)
+}
+
+fn epsilon() -> Rational {
+    Rational::new(1, 1000)
+}
+
+/// The plan with these left open; all durations if nothing is named.
+fn opened(task: &Task, plan: &TimeTriggeredPlan, vary: &[&str]) -> ParametrizedPlan {
+    let specs: Vec<VarySpec> = vary.iter().map(|text| text.parse().unwrap()).collect();
+    let freed = flow::free(task, plan, &epsilon()).expect("a valid plan");
+    flow::open(task, freed, &specs, &epsilon()).expect("quantities of this plan")
+}
+
+fn number(text: &str) -> Rational {
+    text.parse().unwrap()
+}
+
+/// How far the duration of the instance may deviate while all else is as planned.
+fn alone(task: &Task, time_triggered: &TimeTriggeredPlan, instance: usize) -> Interval {
+    let vary = format!("duration n{instance}");
+    let plan = opened(task, time_triggered, &[&vary]);
+    let mut oracle = Oracle::new(task, &plan, &epsilon()).expect("within exact reasoning");
+    let go_on = ControlFlow::Continue(());
+    let run = irr(&mut oracle, &envelope::Settings::default(), &mut |_| go_on).unwrap();
+    let found = run.envelope.expect("the plan works as planned");
+    let sharp = sharpen(&mut oracle, &found, &mut || go_on).unwrap();
+    assert!(sharp.includes(&found));
+    sharp.intervals[0].clone()
+}
+
+/// Compares a case with what was worked out by hand: for each duration, in the order of the
+/// plan's actions by start, its interval with the others nominal; and the region.
+fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) {
+    let (task, plan) = read(case);
+    for (instance, expected) in intervals.iter().enumerate() {
+        let found = alone(&task, &plan, instance).to_string();
+        assert_eq!(found, *expected, "{case}: duration n{instance}");
+    }
+    let opened = opened(&task, &plan, &[]);
+    let nominal = opened.nominal();
+    assert!(region(&nominal), "{case}: the nominal point");
+    let mut oracle = Oracle::new(&task, &opened, &epsilon()).expect("within exact reasoning");
+    // All points whose coordinates are these shares of the nominal ones, and just beyond zero.
+    let shares = ["0", "1/3", "3/4", "1", "7/6", "3/2", "2"].map(number);
+    let mut inside = 0;
+    let mut outside = 0;
+    for code in 0..shares.len().pow(u32::try_from(nominal.len()).unwrap()) {
+        let mut rest = code;
+        let point: Vec<Rational> = nominal
+            .iter()
+            .map(|value| {
+                let share = &shares[rest % shares.len()];
+                rest /= shares.len();
+                value * share
+            })
+            .collect();
+        let expected = region(&point);
+        let found = oracle.objection(&DecoupledEnvelope::point(&point)).unwrap();
+        assert_eq!(found.is_none(), expected, "{case} at {point:?}: {found:?}");
+        if expected {
+            inside += 1;
+        } else {
+            outside += 1;
+        }
+    }
+    assert!(
+        inside > 0 && outside > 0,
+        "{case}: {inside} inside, {outside} outside"
+    );
+}
+
+#[test]
+fn the_delivery_is_as_worked_by_hand() {
+    let thousandth = epsilon();
+    // In the plan's order: first drive, unlocking, pick, second drive, drop.
+    agrees(
+        "delivery",
+        &[
+            "[1/1000, 9999/250]",
+            "[0, 28499/500]",
+            "[1/1000, 7999/250]",
+            "[1/1000, 11249/250]",
+            "[1/1000, 8249/250]",
+        ],
+        |point| {
+            let [a, u, p, b, d] = point else {
+                panic!("five durations")
+            };
+            let robot = &(&(a + p) + b) + d;
+            robot <= number("59.996")
+                && u + d <= number("59.998")
+                && [a, p, b, d].iter().all(|x| **x >= thousandth)
+                && !u.is_negative()
+        },
+    );
+}
+
+#[test]
+fn the_battery_is_as_worked_by_hand() {
+    let thousandth = epsilon();
+    agrees(
+        "battery",
+        &["[10, 25]", "[15/2, 15]", "[1/1000, 35]"],
+        |point| {
+            let [a, c, b] = point else {
+                panic!("three durations")
+            };
+            let two = Rational::from(2);
+            *a <= number("35")
+                && &two * c - a <= number("10")
+                && &(a + b) - &(&two * c) <= number("35")
+                && [a, b, c].iter().all(|x| **x >= thousandth)
+        },
+    );
+}
+
+#[test]
+fn the_flare_is_as_worked_by_hand() {
+    let thousandth = epsilon();
+    agrees(
+        "match",
+        &[
+            "[18003/1000, inf)",
+            "[1/1000, 19997/1000]",
+            "[1/1000, 21997/1000]",
+        ],
+        |point| {
+            let [f, h, k] = point else {
+                panic!("three durations")
+            };
+            &(h + k) + &number("0.003") <= *f && [h, k].iter().all(|x| **x >= thousandth)
+        },
+    );
+}
+
+#[test]
+fn the_tank_is_as_worked_by_hand() {
+    let thousandth = epsilon();
+    agrees("tank", &["[25/2, 20]", "[5, 35/3]"], |point| {
+        let [f, d] = point else {
+            panic!("two durations")
+        };
+        let (in_two, in_three) = (&Rational::from(2) * f, &Rational::from(3) * d);
+        *f <= number("20")
+            && &in_three - &in_two <= number("5")
+            && &in_two - &in_three <= number("15")
+            && [f, d].iter().all(|x| **x >= thousandth)
+    });
+}
+
+#[test]
+fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
+    let (mut task, plan) = read("delivery");
+    let text = fs::read(folder("delivery").join("plan.stn")).unwrap();
+    let by_hand = plan::format::read(&text, &mut task).expect("an STN plan file without mistakes");
+    let derived = opened(&task, &plan, &[]);
+    let mut of_file = Oracle::new(&task, &by_hand, &epsilon()).unwrap();
+    let mut of_plan = Oracle::new(&task, &derived, &epsilon()).unwrap();
+    // The file leaves open first, second, handing and opening; the plan also the pick.
+    for (first, second, handing, opening) in [
+        (10, 15, 3, 6),
+        (20, 15, 3, 6),
+        (20, 30, 3, 50),
+        (20, 35, 3, 6),
+        (1, 2, 50, 8),
+        (1, 1, 40, 25),
+    ] {
+        let box_of = |values: &[i64]| {
+            let values: Vec<Rational> = values.iter().map(|&v| Rational::from(v)).collect();
+            DecoupledEnvelope::point(&values)
+        };
+        let in_file = of_file
+            .objection(&box_of(&[first, second, handing, opening]))
+            .unwrap();
+        let in_plan = of_plan
+            .objection(&box_of(&[first, opening, 2, second, handing]))
+            .unwrap();
+        assert_eq!(
+            in_file.is_none(),
+            in_plan.is_none(),
+            "{in_file:?} {in_plan:?}"
+        );
+    }
+}
