@@ -4,7 +4,7 @@
 //! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
 //! set, so if two interfering happenings are at least ε apart in all of them, one always comes
 //! first. The separation itself is an obligation; where it holds, every value that a happening
-//! reads is one fixed expression in times and parameters (paper 1's enc_eff without its
+//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
 //! disjunctions). What remains undecided is only which commuting happenings come before a moment
 //! *inside* an action, where its over-all condition is read ([`OverAll`]).
 //!

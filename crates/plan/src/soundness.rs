@@ -13,7 +13,7 @@ mod flow;
 mod linear_program;
 mod proof;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -145,11 +145,7 @@ impl<'a> Soundness<'a> {
             refutations,
             ..
         } = self;
-        let mut schedules = Lazy {
-            reduction,
-            envelope,
-            schedules: None,
-        };
+        let mut schedules = Lazy::Unmade(reduction, envelope);
         let first = (*suspect).min(direct.len());
         let mut found = None;
         for index in (first..direct.len()).chain(0..first) {
@@ -251,18 +247,23 @@ impl DirectCase {
 }
 
 /// The network of a box, made when first needed.
-struct Lazy<'a> {
-    reduction: &'a Reduction,
-    envelope: &'a DecoupledEnvelope,
-    schedules: Option<Option<Schedules<'a>>>,
+enum Lazy<'a> {
+    Unmade(&'a Reduction, &'a DecoupledEnvelope),
+    Made(Schedules<'a>),
+    /// The box has no schedule at all: then none is bad.
+    Empty,
 }
 
 impl<'a> Lazy<'a> {
-    /// `None` if the box has no schedule at all: then none is bad.
+    /// `None` if the box has no schedule at all.
     fn get(&mut self) -> Option<&mut Schedules<'a>> {
-        self.schedules
-            .get_or_insert_with(|| Schedules::new(self.reduction, self.envelope))
-            .as_mut()
+        if let Self::Unmade(reduction, envelope) = *self {
+            *self = Schedules::new(reduction, envelope).map_or(Self::Empty, Self::Made);
+        }
+        match self {
+            Self::Made(schedules) => Some(schedules),
+            Self::Unmade(..) | Self::Empty => None,
+        }
     }
 }
 
@@ -287,17 +288,12 @@ fn check_products(
     reduction: &Reduction,
     case: &BadCase,
 ) -> Result<(), Refusal> {
-    let multiplied: BTreeMap<ParameterId, ()> = case
+    let multiplied: BTreeSet<ParameterId> = case
         .inequalities
         .iter()
-        .flat_map(|inequality| {
-            inequality
-                .expression
-                .multiplied_parameters()
-                .map(|id| (id, ()))
-        })
+        .flat_map(|inequality| inequality.expression.multiplied_parameters())
         .collect();
-    for &parameter in multiplied.keys() {
+    for parameter in multiplied {
         if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
             return Err(Refusal::Coupled {
                 name: plan.parameter(parameter).name.clone(),

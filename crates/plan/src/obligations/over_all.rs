@@ -49,7 +49,7 @@ impl OverAll {
         let mut touched = BTreeSet::new();
         condition.visit_facts(&mut |fact| {
             task.for_each_basis(fact, &mut |basis| {
-                touched.extend(timeline.fact_nodes(basis))
+                touched.extend(timeline.fact_nodes(basis));
             });
         });
         task.visit_fluents_of(condition, &mut |fluent| {
