@@ -189,7 +189,7 @@ impl<'a> Soundness<'a> {
                 return Ok(None);
             };
             *refutations += 1;
-            let mut prover = Prover::new(self.task, &self.plan.plan, over_all, schedules);
+            let mut prover = Prover::new(self.task, self.plan, over_all, schedules);
             match prover.prove(proof.as_ref(), moved)? {
                 Ok(found) => *proof = Some(found),
                 Err(case) => {
