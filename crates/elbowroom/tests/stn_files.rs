@@ -1,5 +1,11 @@
 //! Every STN plan file of the authors' benchmarks is read, unchanged.
 
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "the helpers of a test are part of it"
+)]
+
 mod shared;
 
 use std::fs;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::reduction::{BoxEnd, Edge, Reduction, Side};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
@@ -15,13 +15,16 @@ pub(crate) const MOST_CORNERS: usize = 1 << 14;
 /// The values for which it has one form a convex set, so the corners of the box decide. Few of
 /// them need looking at: a parameter matters only through cycles of constraints. If all cycles
 /// through it walk its constraint one way, only one of its ends counts, and that end is known
-/// beforehand. In deordered plans almost every parameter is like that.
+/// beforehand. In deordered plans almost every parameter is like that. Where an end is infinite,
+/// it is asked whether the values with a schedule go on for ever on that side.
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
     /// The reduced network's edges, and each parameter's role in its cycles.
     edges: Vec<Edge>,
     class_count: usize,
     roles: Vec<Role>,
+    /// Parameters that bound several differences.
+    coupled: Vec<ParameterId>,
     corners: Vec<Corner>,
 }
 
@@ -77,6 +80,7 @@ impl Feasibility {
             edges,
             class_count,
             roles,
+            coupled: reduction.coupled.clone(),
             corners: Vec::new(),
         })
     }
@@ -90,9 +94,71 @@ impl Feasibility {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Option<Infeasible> {
+        let ends = match moved {
+            Some(end) => vec![end],
+            None => all_ends(envelope),
+        };
+        for end in ends {
+            if end.reach(envelope).is_none() && !self.goes_on_for_ever(end) {
+                return Some(self.far_out(envelope, end));
+            }
+        }
         match moved {
             Some(end) if !self.corners.is_empty() => self.tighten(envelope, end),
             _ => self.rebuild(envelope),
+        }
+    }
+
+    /// Whether the parameter can move out on that side without limit, from any values that have a
+    /// schedule.
+    ///
+    /// The values that have one form a polyhedron; it goes on for ever in a direction exactly if
+    /// the network has a schedule when only what the direction adds to each bound is kept.
+    fn goes_on_for_ever(&self, end: BoxEnd) -> bool {
+        if !self.coupled.contains(&end.parameter) {
+            return match self.roles[end.parameter.index()] {
+                Role::None => true,
+                Role::Lower => end.side == Side::Upper,
+                Role::Upper => end.side == Side::Lower,
+                Role::Both => false,
+            };
+        }
+        let mut network = Network::with_nodes(self.class_count);
+        for edge in &self.edges {
+            // An upper bound follows the parameter, a lower bound holds against it.
+            let bound = match edge.end {
+                Some(other) if other.parameter == end.parameter && other.side == end.side => 1,
+                Some(other) if other.parameter == end.parameter => -1,
+                _ => 0,
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound: Rational::from(bound),
+            });
+        }
+        ConsistentNetwork::try_from(network).is_ok()
+    }
+
+    /// Values without a schedule, with the parameter so far out on that side as it takes.
+    fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Infeasible {
+        let mut values: Valuation = envelope
+            .intervals
+            .iter()
+            .map(|interval| any_value(interval, Side::Lower))
+            .collect();
+        let base = any_value(envelope.interval(end.parameter), other_side(end.side));
+        let mut step = Rational::ONE;
+        loop {
+            values[end.parameter.index()] = match end.side {
+                Side::Lower => &base - &step,
+                Side::Upper => &base + &step,
+            };
+            let point = DecoupledEnvelope::point(&values);
+            if self.network_where(|edge| edge.bound(&point)).is_none() {
+                return values;
+            }
+            step = &step + &step;
         }
     }
 
@@ -134,32 +200,36 @@ impl Feasibility {
         sides: &BTreeMap<ParameterId, Side>,
         envelope: &DecoupledEnvelope,
     ) -> Option<ConsistentNetwork> {
+        self.network_where(|edge| self.bound(edge, sides, envelope))
+    }
+
+    /// The network with these bounds, if it is consistent; `None` is no bound.
+    fn network_where(
+        &self,
+        bound: impl Fn(&Edge) -> Option<Rational>,
+    ) -> Option<ConsistentNetwork> {
         let mut network = Network::with_nodes(self.class_count);
         for edge in &self.edges {
-            match self.bound(edge, sides, envelope) {
-                EdgeBound::Unused => {}
-                EdgeBound::At(bound) => {
-                    network.add(Constraint {
-                        from: edge.from,
-                        to: edge.to,
-                        bound,
-                    });
-                }
-                EdgeBound::Impossible => return None,
+            if let Some(bound) = bound(edge) {
+                network.add(Constraint {
+                    from: edge.from,
+                    to: edge.to,
+                    bound,
+                });
             }
         }
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// What an edge demands at a corner.
+    /// What an edge demands at a corner; `None` if nothing that matters.
     fn bound(
         &self,
         edge: &Edge,
         sides: &BTreeMap<ParameterId, Side>,
         envelope: &DecoupledEnvelope,
-    ) -> EdgeBound {
+    ) -> Option<Rational> {
         let Some(end) = edge.end else {
-            return EdgeBound::At(edge.constant.clone());
+            return Some(edge.constant.clone());
         };
         // An edge that says "at most the parameter" lies on cycles that small values break.
         let matters = match (self.roles[end.parameter.index()], end.side) {
@@ -167,19 +237,13 @@ impl Feasibility {
             (Role::None | Role::Lower | Role::Upper, _) => false,
         };
         let (true, Some(&side)) = (matters, sides.get(&end.parameter)) else {
-            return EdgeBound::Unused;
+            return None;
         };
-        let interval = envelope.interval(end.parameter);
-        let value = match side {
-            Side::Lower => interval.lower.value(),
-            Side::Upper => interval.upper.value(),
-        };
-        match (value, end.side) {
-            (Some(value), Side::Upper) => EdgeBound::At(&edge.constant + value),
-            (Some(value), Side::Lower) => EdgeBound::At(&edge.constant - value),
-            // The edge is on a cycle, and its bound can be arbitrarily tight.
-            (None, _) => EdgeBound::Impossible,
-        }
+        let value = any_value(envelope.interval(end.parameter), side);
+        Some(match end.side {
+            Side::Upper => &edge.constant + value,
+            Side::Lower => &edge.constant - value,
+        })
     }
 
     /// Moves one end further out in all corners that use it; all of them or none.
@@ -202,19 +266,12 @@ impl Feasibility {
                 continue;
             }
             let sides = BTreeMap::from([(end.parameter, end.side)]);
-            match self.bound(edge, &sides, envelope) {
-                EdgeBound::Unused => {}
-                EdgeBound::At(bound) => {
-                    tightened.push(Constraint {
-                        from: edge.from,
-                        to: edge.to,
-                        bound,
-                    });
-                }
-                EdgeBound::Impossible => {
-                    let sides = self.corners.first().map(|corner| &corner.sides);
-                    return Some(sides.map_or_else(Vec::new, |s| valuation(s, envelope)));
-                }
+            if let Some(bound) = self.bound(edge, &sides, envelope) {
+                tightened.push(Constraint {
+                    from: edge.from,
+                    to: edge.to,
+                    bound,
+                });
             }
         }
         let checkpoints: Vec<_> = self
@@ -254,39 +311,41 @@ impl Feasibility {
     }
 }
 
-/// What an edge demands at a corner.
-enum EdgeBound {
-    /// Nothing that matters.
-    Unused,
-    /// A bound.
-    At(Rational),
-    /// More than any schedule can satisfy.
-    Impossible,
-}
-
-/// The values at a corner; parameters that do not matter, and infinite ends, at some value.
+/// The values at a corner; parameters that do not matter at some value.
 fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) -> Valuation {
     envelope
         .intervals
         .iter()
         .enumerate()
         .map(|(index, interval)| {
-            let (lower, upper) = (interval.lower.value(), interval.upper.value());
-            let (wanted, other) = match sides.get(&ParameterId::from(index)) {
-                Some(Side::Upper) => (upper, lower),
-                Some(Side::Lower) | None => (lower, upper),
-            };
-            // A value beyond all others in the plan shows an infinite end at work.
-            let far = || Rational::from(1_000_000_000_i64);
-            match (wanted, other) {
-                (Some(value), _) => value.clone(),
-                (None, Some(other)) => match sides.get(&ParameterId::from(index)) {
-                    Some(Side::Upper) => other + &far(),
-                    _ => other - &far(),
-                },
-                (None, None) => far(),
-            }
+            let side = sides.get(&ParameterId::from(index));
+            any_value(interval, side.copied().unwrap_or(Side::Lower))
         })
+        .collect()
+}
+
+/// That end of the interval, or, if it is infinite, some value in it: that the plan has schedules
+/// in that direction for ever is asked apart.
+fn any_value(interval: &Interval, side: Side) -> Rational {
+    let (wanted, other) = match side {
+        Side::Lower => (&interval.lower, &interval.upper),
+        Side::Upper => (&interval.upper, &interval.lower),
+    };
+    let value = wanted.value().or(other.value());
+    value.cloned().unwrap_or_default()
+}
+
+fn other_side(side: Side) -> Side {
+    match side {
+        Side::Lower => Side::Upper,
+        Side::Upper => Side::Lower,
+    }
+}
+
+fn all_ends(envelope: &DecoupledEnvelope) -> Vec<BoxEnd> {
+    (0..envelope.intervals.len())
+        .map(ParameterId::from)
+        .flat_map(|parameter| [Side::Lower, Side::Upper].map(|side| BoxEnd { parameter, side }))
         .collect()
 }
 

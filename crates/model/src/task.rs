@@ -27,6 +27,9 @@ pub struct Task {
     pub(crate) rules: Vec<GroundRule>,
     /// Derived facts whose rules are in `rules` already.
     pub(crate) derived: BTreeSet<FactId>,
+    /// Derived facts whose rules are not in `rules` yet.
+    waiting: Vec<FactId>,
+    is_grounding_rules: bool,
 }
 
 /// The truth of facts and the values of fluents at one moment.
@@ -97,6 +100,8 @@ impl Task {
             goal: Condition::TRUE,
             rules: Vec::new(),
             derived: BTreeSet::new(),
+            waiting: Vec::new(),
+            is_grounding_rules: false,
         };
         for (predicate, arguments) in &problem.initial_facts {
             let fact = task.fact(*predicate, arguments);
@@ -211,9 +216,22 @@ impl Task {
         let (index, _) = self.facts.insert_full((predicate, arguments.to_vec()));
         let fact = FactId(narrow(index));
         if self.problem.predicates[predicate.index()].is_derived {
-            self.ground_rules(fact);
+            self.waiting.push(fact);
+            self.ground_waiting_rules();
         }
         fact
+    }
+
+    /// Grounds the rules of the derived facts met. Rules mention further derived facts; these wait
+    /// for their turn, so that a long chain of rules is no deep recursion.
+    fn ground_waiting_rules(&mut self) {
+        if std::mem::replace(&mut self.is_grounding_rules, true) {
+            return;
+        }
+        while let Some(fact) = self.waiting.pop() {
+            self.ground_rules(fact);
+        }
+        self.is_grounding_rules = false;
     }
 
     pub(crate) fn fluent(&mut self, function: FunctionId, arguments: &[ObjectId]) -> FluentId {

@@ -4,7 +4,7 @@
 //! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
 //! set, so if two interfering happenings are at least ε apart in all of them, one always comes
 //! first. The separation itself is an obligation; where it holds, every value that a happening
-//! reads is one fixed expression in times and parameters (paper 1's enc_eff without its
+//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
 //! disjunctions). What remains undecided is only which commuting happenings come before a moment
 //! *inside* an action, where its over-all condition is read ([`OverAll`]).
 //!
@@ -22,7 +22,7 @@ use elbowroom_model::ground::Condition;
 use elbowroom_num::Rational;
 
 use crate::linear::Linear;
-use crate::parameter::ParameterId;
+use crate::parameter::{ParameterId, Valuation};
 use crate::stn_plan::{InstanceId, NodeId, StnPlan};
 
 pub use over_all::OverAll;
@@ -69,6 +69,14 @@ pub struct Inequality {
     pub expression: Linear,
     /// Whether zero itself is excluded.
     pub is_strict: bool,
+}
+
+impl Inequality {
+    /// Whether it holds for these times (by node) and parameters.
+    pub fn holds(&self, times: &[Rational], parameters: &Valuation) -> bool {
+        let value = self.expression.value(times, parameters);
+        value.is_negative() || (value.is_zero() && !self.is_strict)
+    }
 }
 
 /// One way in which an obligation can be violated: all of these at once.

@@ -323,7 +323,9 @@ fn implied<W: Weight>(
     network: Network<W>,
     keep: impl Fn(ConstraintId) -> bool,
 ) -> Vec<ConstraintId> {
-    ConsistentNetwork::try_from(network).map(|network| network.implied(keep)).unwrap_or_default()
+    ConsistentNetwork::try_from(network)
+        .map(|network| network.implied(keep))
+        .unwrap_or_default()
 }
 
 /// The network with all bounds multiplied by their common denominator, if that gives numbers so
@@ -345,7 +347,11 @@ fn scaled(network: &Network<Delta>) -> Option<Network<i128>> {
         if bound.abs() > LARGEST {
             return None;
         }
-        whole.add(Constraint { from: constraint.from, to: constraint.to, bound });
+        whole.add(Constraint {
+            from: constraint.from,
+            to: constraint.to,
+            bound,
+        });
     }
     Some(whole)
 }

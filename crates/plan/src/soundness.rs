@@ -13,14 +13,14 @@ mod flow;
 mod linear_program;
 mod proof;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::decoupled::DecoupledEnvelope;
-use crate::obligations::{BadCase, Obligations, Refusal, Requirement};
+use crate::obligations::{BadCase, Difference, Obligations, Refusal, Requirement};
 use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
 use bad_case::{Outcome, Schedules};
@@ -145,32 +145,38 @@ impl<'a> Soundness<'a> {
             refutations,
             ..
         } = self;
-        let mut schedules = Lazy {
-            reduction,
-            envelope,
-            schedules: None,
-        };
+        let mut schedules = Lazy::Unmade(reduction, envelope);
         let first = (*suspect).min(direct.len());
+        let mut found = None;
         for index in (first..direct.len()).chain(0..first) {
             let direct = &mut direct[index];
-            if direct.stands(envelope, moved) {
+            let obligation = &obligations.direct[direct.obligation];
+            let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
+            // What happenings read is known only where those that interfere keep their order, so
+            // that they do not is the better reason, and the only one with a counterexample.
+            if found.is_some() && !is_separation || direct.stands(envelope, moved) {
                 continue;
             }
             let Some(schedules) = schedules.get() else {
                 return Ok(None);
             };
             *refutations += 1;
-            let obligation = &obligations.direct[direct.obligation];
             match schedules.possible(&obligation.bad_cases[direct.case]) {
                 Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
                 Outcome::Possible => {
                     *suspect = index;
-                    return Ok(Some(Broken {
+                    found = Some(Broken {
                         requirement: obligation.requirement.clone(),
                         case: obligation.bad_cases[direct.case].clone(),
-                    }));
+                    });
+                    if is_separation {
+                        return Ok(found);
+                    }
                 }
             }
+        }
+        if found.is_some() {
+            return Ok(found);
         }
         for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
             if proof
@@ -206,6 +212,23 @@ impl<'a> Soundness<'a> {
         envelope: &DecoupledEnvelope,
         broken: &Broken,
     ) -> Option<Counterexample> {
+        if let Requirement::Separation { first, second } = broken.requirement
+            && let [too_near] = &broken.case.differences[..]
+        {
+            // Far apart the wrong way round is no mistake by itself, but then there are schedules
+            // in between.
+            let mut near = broken.case.clone();
+            near.differences.push(Difference {
+                from: second,
+                to: first,
+                bound: too_near.bound.clone(),
+                is_strict: true,
+            });
+            let witness = bad_case::witness(&self.reduction, envelope, &near);
+            if witness.is_some() {
+                return witness;
+            }
+        }
         bad_case::witness(&self.reduction, envelope, &broken.case)
     }
 }
@@ -218,24 +241,29 @@ impl DirectCase {
         };
         proofs.iter().all(|proof| match moved {
             Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
-            None => proof.fixed.is_empty() && proof.holds_in(envelope, None),
+            None => proof.holds_in(envelope, None),
         })
     }
 }
 
 /// The network of a box, made when first needed.
-struct Lazy<'a> {
-    reduction: &'a Reduction,
-    envelope: &'a DecoupledEnvelope,
-    schedules: Option<Option<Schedules<'a>>>,
+enum Lazy<'a> {
+    Unmade(&'a Reduction, &'a DecoupledEnvelope),
+    Made(Schedules<'a>),
+    /// The box has no schedule at all: then none is bad.
+    Empty,
 }
 
 impl<'a> Lazy<'a> {
-    /// `None` if the box has no schedule at all: then none is bad.
+    /// `None` if the box has no schedule at all.
     fn get(&mut self) -> Option<&mut Schedules<'a>> {
-        self.schedules
-            .get_or_insert_with(|| Schedules::new(self.reduction, self.envelope))
-            .as_mut()
+        if let Self::Unmade(reduction, envelope) = *self {
+            *self = Schedules::new(reduction, envelope).map_or(Self::Empty, Self::Made);
+        }
+        match self {
+            Self::Made(schedules) => Some(schedules),
+            Self::Unmade(..) | Self::Empty => None,
+        }
     }
 }
 
@@ -260,17 +288,12 @@ fn check_products(
     reduction: &Reduction,
     case: &BadCase,
 ) -> Result<(), Refusal> {
-    let multiplied: BTreeMap<ParameterId, ()> = case
+    let multiplied: BTreeSet<ParameterId> = case
         .inequalities
         .iter()
-        .flat_map(|inequality| {
-            inequality
-                .expression
-                .multiplied_parameters()
-                .map(|id| (id, ()))
-        })
+        .flat_map(|inequality| inequality.expression.multiplied_parameters())
         .collect();
-    for &parameter in multiplied.keys() {
+    for parameter in multiplied {
         if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
             return Err(Refusal::Coupled {
                 name: plan.parameter(parameter).name.clone(),

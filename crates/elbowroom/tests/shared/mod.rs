@@ -1,6 +1,7 @@
 //! Benchmark files beside the repository. Tests that need them say so and pass where they are
 //! absent.
 #![allow(dead_code, reason = "each test uses some of it")]
+#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
 pub(crate) mod draw;
 pub(crate) mod instances;

@@ -35,7 +35,7 @@ pub(super) fn constraints(task: &Task, plan: &StnPlan, times: &[Rational]) -> Ve
         let (from, to) = nodes[index];
         let original = &times[to.index()] - &times[from.index()];
         // Nobody has checked an over-all condition that had no time to hold.
-        let is_unchecked = original.is_zero() && over_all::has_any(task, plan, id);
+        let is_unchecked = original.is_zero() && over_all::has_any(plan, id);
         let bounds = interval.filter(|_| !is_unchecked).and_then(bounds);
         let (lower, upper, reason) = match bounds {
             Some((lower, upper)) => (lower, upper, Reason::Duration(id)),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_model::ground::{Condition, DurativeBody};
+use elbowroom_model::ground::{Condition, DurativeBody, Guard};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
@@ -10,7 +10,13 @@ use super::order::{Order, Quantity, Timeline, Writer, read_by};
 use crate::stn_plan::{InstanceId, Node, NodeId, Reason, StnPlan};
 
 /// Demands it of all writers, for all durative instances.
-pub(super) fn order(task: &Task, plan: &StnPlan, timeline: &Timeline<'_>, order: &mut Order) {
+pub(super) fn order(
+    task: &Task,
+    plan: &StnPlan,
+    timeline: &Timeline<'_>,
+    epsilon: &Rational,
+    order: &mut Order,
+) {
     let mut writers: BTreeMap<Quantity, Vec<Writer>> = BTreeMap::new();
     let mut ends = vec![NodeId::ZERO; plan.instances.len()];
     let mut starts = ends.clone();
@@ -26,29 +32,51 @@ pub(super) fn order(task: &Task, plan: &StnPlan, timeline: &Timeline<'_>, order:
             continue;
         };
         let (start, end) = (starts[index], ends[index]);
-        for quantity in read_by(&read_throughout(task, body)) {
-            let writers = writers
-                .entry(quantity)
-                .or_insert_with(|| timeline.writers(quantity));
-            keep_sides(writers, start, end, timeline, order);
+        if has_guards(body) {
+            // In no time at all, anything would hold throughout.
+            let duration = timeline.time(end) - timeline.time(start);
+            order.demand(start, end, duration.min(epsilon.clone()), Reason::OverAll);
+        }
+        // A required condition only gains when a moment in which it was read is lost. But an
+        // effect that did not happen could happen then.
+        let required = (read_throughout(task, body), Rational::ZERO);
+        let decisive = (guards_throughout(task, body), epsilon.clone());
+        for (footprint, distance) in [required, decisive] {
+            for quantity in read_by(&footprint) {
+                let writers = writers
+                    .entry(quantity)
+                    .or_insert_with(|| timeline.writers(quantity));
+                let action = Span {
+                    start,
+                    end,
+                    distance: &distance,
+                };
+                keep_sides(writers, &action, timeline, order);
+            }
         }
     }
 }
 
-/// Whether anything is read throughout the instance.
-pub(super) fn has_any(task: &Task, plan: &StnPlan, id: InstanceId) -> bool {
+/// Whether anything is required throughout the instance, or decided by it.
+pub(super) fn has_any(plan: &StnPlan, id: InstanceId) -> bool {
     let body = plan.instance(id).action.durative();
-    body.is_some_and(|body| read_by(&read_throughout(task, body)).next().is_some())
+    body.is_some_and(|body| !body.over_all.is_trivial() || has_guards(body))
 }
 
-/// What must not change unnoticed while the action runs: over-all conditions, those of
-/// conditional effects, and rates.
-fn read_throughout(task: &Task, body: &DurativeBody) -> Footprint {
+/// Whether effects depend on what holds throughout the action.
+fn has_guards(body: &DurativeBody) -> bool {
+    let mut guards = guards(body);
+    guards.any(|guard| !guard.over_all.is_trivial())
+}
+
+fn guards(body: &DurativeBody) -> impl Iterator<Item = &Guard> {
     let guards = body.end.effects.iter().map(|effect| &effect.guard);
-    let guards = guards.chain(body.continuous.iter().map(|effect| &effect.guard));
-    let mut conditions = vec![body.over_all.clone()];
-    conditions.extend(guards.map(|guard| guard.over_all.clone()));
-    let mut footprint = Footprint::of_condition(task, &Condition::And(conditions));
+    guards.chain(body.continuous.iter().map(|effect| &effect.guard))
+}
+
+/// What over-all conditions and rates read.
+fn read_throughout(task: &Task, body: &DurativeBody) -> Footprint {
+    let mut footprint = Footprint::of_condition(task, &body.over_all);
     for effect in &body.continuous {
         effect.rate.visit_fluents(&mut |fluent| {
             footprint.reads_fluents.insert(fluent);
@@ -57,32 +85,44 @@ fn read_throughout(task: &Task, body: &DurativeBody) -> Footprint {
     footprint
 }
 
-/// `writers` are those of one quantity. As runs keep their order among each other, it is enough
-/// to hold the ones next to the start and next to the end.
-fn keep_sides(
-    writers: &[Writer],
+/// What over-all conditions of conditional effects read.
+fn guards_throughout(task: &Task, body: &DurativeBody) -> Footprint {
+    let conditions = guards(body).map(|guard| guard.over_all.clone()).collect();
+    Footprint::of_condition(task, &Condition::And(conditions))
+}
+
+/// A durative action, and how far inside it writers that were inside must stay, unless they were
+/// closer to its start or end.
+struct Span<'a> {
     start: NodeId,
     end: NodeId,
-    timeline: &Timeline<'_>,
-    order: &mut Order,
-) {
+    distance: &'a Rational,
+}
+
+/// `writers` are those of one quantity. As runs keep their order among each other, it is enough
+/// to hold the ones next to the start and next to the end.
+fn keep_sides(writers: &[Writer], action: &Span<'_>, timeline: &Timeline<'_>, order: &mut Order) {
+    let (start, end) = (action.start, action.end);
     let time = |writer: &Writer| timeline.time(writer.node);
     let before = writers.partition_point(|writer| time(writer) <= timeline.time(start));
     let until_end = writers.partition_point(|writer| time(writer) < timeline.time(end));
     let (before, rest) = writers.split_at(before);
     let (inside, after) = rest.split_at(until_end.saturating_sub(before.len()));
-    let mut demand = |from, to| order.demand(from, to, Rational::ZERO, Reason::OverAll);
+    let mut demand = |from, to, least: &Rational| {
+        let original = timeline.time(to) - timeline.time(from);
+        order.demand(from, to, original.min(least.clone()), Reason::OverAll);
+    };
     for writer in last_run(before) {
-        demand(writer.node, start);
+        demand(writer.node, start, &Rational::ZERO);
     }
     for writer in first_run(inside) {
-        demand(start, writer.node);
+        demand(start, writer.node, action.distance);
     }
     for writer in last_run(inside) {
-        demand(writer.node, end);
+        demand(writer.node, end, action.distance);
     }
     for writer in first_run(after) {
-        demand(end, writer.node);
+        demand(end, writer.node, &Rational::ZERO);
     }
 }
 

@@ -202,3 +202,16 @@ fn an_oracle_that_is_never_content_gets_the_nominal_schedule_and_then_nothing() 
     assert!(nothing.is_none());
     assert!(asked < 20, "{asked}");
 }
+
+#[test]
+fn plans_of_thousands_of_actions_are_deordered_with_about_as_many_constraints() {
+    let lines: Vec<_> = (0..1500)
+        .map(|index| match index % 3 {
+            0 => format!("{}: refuel s1 [10]", 16 * index),
+            1 => format!("{}: collect s1 [15]", 16 * index),
+            _ => format!("{}: navigate [7]", 16 * index),
+        })
+        .collect();
+    let Deordered { plan, .. } = deordered(&lines.join("\n"));
+    assert!(plan.constraints.len() < 6000, "{}", plan.constraints.len());
+}

@@ -228,7 +228,7 @@ impl Compiler<'_> {
                     }
                 };
                 self.require(run, node, snap, obligations)?;
-                let effects = self.effects(run, id, 0, &snap.effects);
+                let effects = effects(run, id, 0, &snap.effects);
                 let drifts = self.drifts(run, node, id)?;
                 self.apply(run, node, effects.into_iter(), obligations)?;
                 for (fluent, rate) in drifts {
@@ -242,7 +242,7 @@ impl Compiler<'_> {
                 };
                 self.require_duration(run, node, id, true, obligations)?;
                 self.require(run, node, &body.end, obligations)?;
-                let effects = self.effects(run, id, body.start.effects.len(), &body.end.effects);
+                let effects = effects(run, id, body.start.effects.len(), &body.end.effects);
                 let since = self.plan.plan.start(id);
                 let first = body.start.effects.len() + body.end.effects.len();
                 // Values on arrival include the drift up to now, so it ends after the effects are
@@ -258,28 +258,6 @@ impl Compiler<'_> {
                 Ok(())
             }
         }
-    }
-
-    /// The changes of effects, with whether their guards hold in this run.
-    fn effects<'e>(
-        &self,
-        run: &Run,
-        instance: InstanceId,
-        first: usize,
-        effects: &'e [Effect],
-    ) -> Vec<(&'e Change, bool)> {
-        effects
-            .iter()
-            .enumerate()
-            .map(|(index, effect)| {
-                let held =
-                    |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
-                (
-                    &effect.change,
-                    held(GuardPart::Now) && held(GuardPart::AtStart),
-                )
-            })
-            .collect()
     }
 
     /// The continuous changes that begin at the start of an instance.
@@ -548,6 +526,26 @@ impl Compiler<'_> {
             place,
         }
     }
+}
+
+/// The changes of effects, with whether their guards hold in this run.
+fn effects<'e>(
+    run: &Run,
+    instance: InstanceId,
+    first: usize,
+    effects: &'e [Effect],
+) -> Vec<(&'e Change, bool)> {
+    effects
+        .iter()
+        .enumerate()
+        .map(|(index, effect)| {
+            let held = |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
+            (
+                &effect.change,
+                held(GuardPart::Now) && held(GuardPart::AtStart),
+            )
+        })
+        .collect()
 }
 
 /// A change read, not yet recorded.

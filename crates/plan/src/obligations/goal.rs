@@ -24,11 +24,11 @@ pub(super) fn goal_cases(
     let mut touched = BTreeSet::new();
     condition.visit_facts(&mut |fact| {
         task.for_each_basis(fact, &mut |basis| {
-            touched.extend(timeline.fact_nodes(basis))
+            touched.extend(timeline.fact_nodes(basis));
         });
     });
     task.visit_fluents_of(condition, &mut |fluent| {
-        touched.extend(timeline.fluent_nodes(fluent))
+        touched.extend(timeline.fluent_nodes(fluent));
     });
     let timed: Vec<NodeId> = plan
         .nodes()

@@ -49,7 +49,7 @@ impl OverAll {
         let mut touched = BTreeSet::new();
         condition.visit_facts(&mut |fact| {
             task.for_each_basis(fact, &mut |basis| {
-                touched.extend(timeline.fact_nodes(basis))
+                touched.extend(timeline.fact_nodes(basis));
             });
         });
         task.visit_fluents_of(condition, &mut |fluent| {
@@ -138,8 +138,11 @@ pub(super) fn literal_cases(
             .take_while(|event| event.1 == wanted)
             .map(|event| event.0);
         let righting: Vec<NodeId> = righting.collect();
-        // Righted at the action's own start, or before it began to be wrong: never inside.
-        if righting.contains(&start) {
+        // Righted at the action's own start, or as it began to be wrong: never inside.
+        if righting
+            .iter()
+            .any(|&right| right == start || Some(right) == since)
+        {
             continue;
         }
         differences.extend(

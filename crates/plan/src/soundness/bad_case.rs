@@ -12,7 +12,7 @@ use super::linear_program;
 use crate::decoupled::DecoupledEnvelope;
 use crate::linear::{Factor, Linear};
 use crate::obligations::{BadCase, Difference, Inequality};
-use crate::parameter::ParameterId;
+use crate::parameter::{ParameterId, Valuation};
 use crate::reduction::{BoxEnd, BoxNetwork, Reduction, Side};
 
 /// The schedules of a box: a network that can be tightened for a while.
@@ -267,6 +267,34 @@ impl Corner {
     }
 }
 
+impl Corner {
+    /// The valuation with the parameters at infinite ends so far out that it will do.
+    ///
+    /// As in [`apply`](Self::apply), the first of them outgrows the second, and so on.
+    fn far_out(
+        &self,
+        mut valuation: Valuation,
+        will_do: &dyn Fn(&Valuation) -> bool,
+    ) -> Option<Valuation> {
+        let mut step = Rational::ONE;
+        for _ in 0..MOST_DOUBLINGS {
+            let mut reach = step.clone();
+            for &(parameter, is_upper) in self.infinite.iter().rev() {
+                valuation[parameter.index()] = if is_upper { reach.clone() } else { -&reach };
+                reach *= &step;
+            }
+            if will_do(&valuation) {
+                return Some(valuation);
+            }
+            step = &step + &step;
+        }
+        None
+    }
+}
+
+/// How often values are doubled to show what becomes of an expression as they grow.
+const MOST_DOUBLINGS: usize = 256;
+
 /// The factor of a parameter in an expression.
 fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {
     let mut coefficient = Linear::default();
@@ -325,24 +353,31 @@ pub(crate) fn witness(
         .corners(&multiplied)
         .into_iter()
         .find_map(|corner| {
-            // At an infinite end there is no last value to show; a large one stands in.
             let fixed: Vec<Inequality> =
                 case.inequalities.iter().map(|i| corner.apply(i)).collect();
             let (class_times, mut valuation) =
                 linear_program::witness(reduction, envelope, &assumed, &fixed)?;
-            for (parameter, value) in corner.values {
-                valuation[parameter.index()] = value;
+            for (&parameter, value) in &corner.values {
+                valuation[parameter.index()] = value.clone();
             }
-            let moment = case
+            let moment = &class_times[reduction.class_count()] - &class_times[0];
+            let mut times = reduction.times(&class_times);
+            times.push(moment.clone());
+            let comes_about = |valuation: &Valuation| {
+                envelope.contains(valuation)
+                    && case.inequalities.iter().all(|i| i.holds(&times, valuation))
+            };
+            let valuation = corner.far_out(valuation, &comes_about)?;
+            times.pop();
+            let reads_moment = case
                 .differences
                 .iter()
                 .flat_map(|difference| [difference.from, difference.to])
-                .any(|node| node.index() == reduction.node_count())
-                .then(|| &class_times[reduction.class_count()] - &class_times[0]);
+                .any(|node| node.index() == reduction.node_count());
             Some(Counterexample {
                 valuation,
-                schedule: reduction.times(&class_times),
-                moment,
+                schedule: times,
+                moment: reads_moment.then_some(moment),
             })
         })
 }

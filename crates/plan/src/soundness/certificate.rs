@@ -54,9 +54,14 @@ impl Certificate {
         Some(value)
     }
 
-    /// Whether the proof stands in the box, which differs from the one it was made for in `moved`.
+    /// Whether the proof stands in the box, which differs from the one it was made for in `moved`;
+    /// `None`: nothing is known about how they differ.
     pub(crate) fn holds_in(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
-        if moved.is_some_and(|end| self.fixed.contains(&end)) {
+        let is_void = match moved {
+            Some(end) => self.fixed.contains(&end),
+            None => !self.fixed.is_empty(),
+        };
+        if is_void {
             return false;
         }
         self.value(envelope)

@@ -12,8 +12,9 @@
 //!   falling together with start or end does no harm: at the start, the write comes first, as a
 //!   condition over the interval sees only what is true after the start; at the end it comes
 //!   last.
-//! - Rates of continuous effects and conditions of conditional ones are treated like over-all
-//!   conditions.
+//! - Rates of continuous effects are treated like over-all conditions. So are over-all conditions
+//!   of conditional effects, but what came between start and end stays strictly between, as such
+//!   a condition must not become true either.
 //! - Timed initials that change what the goal reads stay on their side of the plan's end.
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
@@ -115,7 +116,7 @@ pub fn deorder(
             second: stn_plan.node_words(task, second),
             time: times[first.index()].to_decimal(6),
         })?;
-    over_all::order(task, &stn_plan, &timeline, &mut order);
+    over_all::order(task, &stn_plan, &timeline, &settings.epsilon, &mut order);
     goal::order(task, &stn_plan, &times, &settings.epsilon, &mut order);
     stn_plan
         .constraints

@@ -1,0 +1,175 @@
+//! Mistakes that the second oracle found in the first one, each as a small case.
+
+use elbowroom_envelope::{Objection, Oracle};
+use elbowroom_model::Task;
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_plan::parametrize::vary;
+use elbowroom_plan::soundness::Counterexample;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+
+/// A problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, and an STN plan.
+#[derive(Default)]
+struct Given<'a> {
+    /// `:synth-parameters` and actions.
+    domain: &'a str,
+    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5.
+    init: &'a str,
+    /// The goal; `(and)` if empty.
+    goal: &'a str,
+    /// An STN plan file.
+    plan: &'a str,
+    /// What else to leave open.
+    vary: &'a [&'a str],
+}
+
+impl Given<'_> {
+    fn task_and_plan(&self) -> (Task, ParametrizedPlan) {
+        let domain = format!(
+            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y)) {})",
+            self.domain
+        );
+        let goal = if self.goal.is_empty() {
+            "(and)"
+        } else {
+            self.goal
+        };
+        let problem = format!(
+            "(define (problem d) (:domain d) (:init (= (x) 5) (= (y) 5) {}) (:goal {goal}))",
+            self.init
+        );
+        let (problem, _) = read_problem(
+            &Source::new("domain", domain),
+            &Source::new("problem", problem),
+        )
+        .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+        let mut task = Task::new(problem);
+        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &mut task).unwrap();
+        let specs: Vec<_> = self.vary.iter().map(|spec| spec.parse().unwrap()).collect();
+        let nominal = vec![Rational::ZERO; plan.plan.nodes.len()];
+        let plan = vary(&task, plan, &nominal, &specs).unwrap();
+        (task, plan)
+    }
+
+    /// What one oracle with ε = 1/4 says of these boxes, one after the other: `inside`, or why not.
+    fn answers(&self, boxes: &[&str]) -> Vec<String> {
+        let (task, plan) = self.task_and_plan();
+        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+        boxes
+            .iter()
+            .map(|text| match oracle.objection(&envelope(text)).unwrap() {
+                None => "inside".to_owned(),
+                Some(Objection::NoSchedule(_)) => "no schedule".to_owned(),
+                Some(Objection::Broken(broken)) => broken.requirement.describe(&task, &plan.plan),
+            })
+            .collect()
+    }
+
+    /// What shows that the box is not inside.
+    fn counterexample(&self, text: &str) -> Counterexample {
+        let (task, plan) = self.task_and_plan();
+        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+        match oracle.objection(&envelope(text)).unwrap() {
+            Some(Objection::Broken(broken)) => {
+                oracle.counterexample(&envelope(text), &broken).unwrap()
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn answer(&self, envelope: &str) -> String {
+        self.answers(&[envelope]).remove(0)
+    }
+}
+
+/// `[1, 3/2] [-inf, 0]`: an interval for each parameter.
+fn envelope(text: &str) -> DecoupledEnvelope {
+    let end = |text: &str| match text.trim() {
+        "inf" | "-inf" => End::Infinite,
+        number => End::Closed(number.parse().unwrap()),
+    };
+    let intervals = text.split(']').filter_map(|interval| {
+        let (lower, upper) = interval.trim().strip_prefix('[')?.split_once(',')?;
+        Some(Interval {
+            lower: end(lower),
+            upper: end(upper),
+        })
+    });
+    DecoupledEnvelope {
+        intervals: intervals.collect(),
+    }
+}
+
+#[test]
+fn a_fact_deleted_and_added_at_once_stays_true_inside_an_action() {
+    let given = Given {
+        domain: "(:durative-action wait :parameters () :duration (>= ?duration 0)
+                    :condition (over all (p)) :effect (and))
+                 (:action renew :parameters () :precondition (and)
+                    :effect (and (not (p)) (p)))",
+        init: "(p)",
+        plan: "durative-action instance n : (wait); action instance r : (renew);
+               c: n.end - n.start in [3, inf]; c: r - n.start in [1, 2];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer(""), "inside");
+}
+
+#[test]
+fn a_proof_about_a_multiplied_parameter_holds_for_its_own_box_only() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action fill :parameters () :duration (= ?duration 3)
+                    :condition (over all (<= (x) 8)) :effect (increase (x) (* #t ?s)))",
+        plan: "parameter ?s default 1; durative-action instance n : (fill);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answers(&["[1, 1]", "[1, 2]"]),
+        ["inside", "(fill) needs (<= (x) 8) throughout"]
+    );
+}
+
+#[test]
+fn a_parameter_on_two_constraints_may_grow_for_ever() {
+    let given = Given {
+        domain: "(:action first :parameters () :precondition (and) :effect (and))
+                 (:action second :parameters () :precondition (and) :effect (and))",
+        plan: "parameter g default 5;
+               action instance a : (first); action instance b : (second);
+               c: b - a in [-inf, g]; c: b - .zero in [-inf, g];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer("[5, inf]"), "inside");
+    assert_eq!(given.answer("[-inf, 5]"), "no schedule");
+}
+
+#[test]
+fn a_counterexample_to_separation_has_the_happenings_close_together() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(p)",
+        plan: "action instance s : (set); action instance l : (look);
+               c: s - .zero in [2, inf];",
+        ..Given::default()
+    };
+    let found = given.counterexample("");
+    assert!((&found.schedule[1] - &found.schedule[2]).abs() < Rational::new(1, 4));
+}
+
+#[test]
+fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action fill :parameters () :duration (= ?duration 3)
+                    :condition (over all (<= (x) 8)) :effect (increase (x) (* #t ?s)))",
+        plan: "parameter ?s default 1; durative-action instance n : (fill);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    let found = given.counterexample("[1, inf]");
+    let duration = &found.moment.unwrap() - &found.schedule[1];
+    assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
+}

@@ -1,0 +1,444 @@
+//! All oracles are asked about the same boxes, and the judge about what they claim.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use elbowroom_envelope::{Objection, Oracle};
+use elbowroom_model::Task;
+use elbowroom_model::validate::Verdict;
+use elbowroom_num::Rational;
+use elbowroom_plan::obligations::Requirement;
+use elbowroom_plan::reduction::{BoxEnd, Side};
+use elbowroom_plan::soundness::Broken;
+use elbowroom_plan::{
+    DecoupledEnvelope, Node, NodeId, Parameter, ParameterId, ParametrizedPlan, Valuation,
+};
+
+use crate::case::{Case, show};
+use crate::dice::Dice;
+use crate::generate::sample;
+use crate::plain::{self, Answer, GaveUp};
+use crate::smt::Encoding;
+use crate::system::System;
+use crate::z3::{Found, Z3};
+
+/// How many groups of happenings the plain oracle may look at for one box.
+const MOST_GROUPS: usize = 1500;
+
+/// A box to ask about.
+#[derive(Clone, Debug)]
+pub(crate) enum Step {
+    /// This one.
+    Jump(DecoupledEnvelope),
+    /// The last one accepted with one end moved out by so much, or to infinity. `is_hinted`: the
+    /// oracle is told which end.
+    Widen {
+        end: BoxEnd,
+        by: Option<Rational>,
+        is_hinted: bool,
+    },
+}
+
+/// What came of it all.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tally {
+    /// Boxes asked about, by what the oracles agree on (or do not say).
+    pub(crate) counts: BTreeMap<&'static str, usize>,
+    pub(crate) refusals: BTreeMap<String, usize>,
+}
+
+impl Tally {
+    fn count(&mut self, what: &'static str) {
+        *self.counts.entry(what).or_default() += 1;
+    }
+
+    pub(crate) fn include(&mut self, other: Self) {
+        for (what, count) in other.counts {
+            *self.counts.entry(what).or_default() += count;
+        }
+        for (what, count) in other.refusals {
+            *self.refusals.entry(what).or_default() += count;
+        }
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (what, count) in &self.counts {
+            writeln!(f, "{count:7} {what}")?;
+        }
+        for (what, count) in &self.refusals {
+            writeln!(f, "{count:7} refused: {what}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Somebody is wrong.
+#[derive(Clone, Debug)]
+pub(crate) struct Mismatch {
+    /// The same for the same sort of mistake.
+    pub(crate) kind: &'static str,
+    pub(crate) details: String,
+}
+
+/// A case with boxes to ask about.
+#[derive(Clone, Debug)]
+pub(crate) struct Script {
+    pub(crate) case: Case,
+    pub(crate) steps: Vec<Step>,
+}
+
+impl Script {
+    /// Asks about all boxes, one after the other, the same fast oracle.
+    pub(crate) fn run(&self, solver: Option<&mut Z3>) -> Result<Tally, Mismatch> {
+        let (task, plan) = self.case.build();
+        let mut contest = Contest {
+            case: &self.case,
+            task: &task,
+            plan: &plan,
+            solver,
+            encoding: Encoding::new(&task, &plan, &self.case.epsilon).ok(),
+            dice: Dice::new(1),
+            tally: Tally::default(),
+        };
+        let mut oracle = match Oracle::new(&task, &plan, &self.case.epsilon) {
+            Ok(oracle) => oracle,
+            Err(refusal) => {
+                contest.tally.count("plans refused");
+                let reason = format!("{refusal:?}");
+                let reason = reason.split(' ').next().unwrap_or_default().to_owned();
+                *contest.tally.refusals.entry(reason).or_default() += 1;
+                return Ok(contest.tally);
+            }
+        };
+        contest.tally.count("plans");
+        let mut accepted: Option<DecoupledEnvelope> = None;
+        for step in &self.steps {
+            let Some((envelope, hint)) = next_box(step, accepted.as_ref(), &plan.parameters) else {
+                continue;
+            };
+            let Some(is_inside) = contest.ask(&mut oracle, &envelope, hint)? else {
+                break;
+            };
+            if is_inside {
+                accepted = Some(envelope);
+            }
+        }
+        Ok(contest.tally)
+    }
+}
+
+fn next_box(
+    step: &Step,
+    accepted: Option<&DecoupledEnvelope>,
+    parameters: &[Parameter],
+) -> Option<(DecoupledEnvelope, Option<BoxEnd>)> {
+    match step {
+        Step::Jump(envelope) => Some((envelope.clone(), None)),
+        Step::Widen { end, by, is_hinted } => {
+            let accepted = accepted?;
+            let reach = end.reach(accepted)?;
+            let widened = end.with_reach(accepted, by.as_ref().map(|by| reach + by));
+            let range = &parameters[end.parameter.index()].range;
+            let interval = widened.interval(end.parameter);
+            let is_in_range = range.intersection(interval) == *interval;
+            is_in_range.then_some((widened, is_hinted.then_some(*end)))
+        }
+    }
+}
+
+/// Random boxes around the nominal point: growing ones as in a search, and some others.
+pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) -> Vec<Step> {
+    let nominal: Valuation = parameters.iter().map(|p| p.nominal.clone()).collect();
+    let mut steps = vec![Step::Jump(DecoupledEnvelope::point(&nominal))];
+    if parameters.is_empty() {
+        return steps;
+    }
+    for _ in 0..length {
+        let end = BoxEnd {
+            parameter: ParameterId::from(dice.below(parameters.len())),
+            side: *dice.pick(&[Side::Lower, Side::Upper]),
+        };
+        let by = (!dice.chance(8)).then(|| {
+            dice.pick(&[
+                Rational::new(1, 4),
+                Rational::new(1, 2),
+                Rational::ONE,
+                Rational::from(2),
+                Rational::from(5),
+            ])
+            .clone()
+        });
+        steps.push(match dice.below(8) {
+            0 => Step::Jump(random_box(dice, &nominal, parameters)),
+            1 => Step::Widen {
+                end,
+                by,
+                is_hinted: false,
+            },
+            _ => Step::Widen {
+                end,
+                by,
+                is_hinted: true,
+            },
+        });
+    }
+    steps
+}
+
+/// A box with the nominal point in it.
+fn random_box(
+    dice: &mut Dice,
+    nominal: &[Rational],
+    parameters: &[Parameter],
+) -> DecoupledEnvelope {
+    let mut envelope = DecoupledEnvelope::point(nominal);
+    for (interval, parameter) in envelope.intervals.iter_mut().zip(parameters) {
+        let width = *dice.pick(&[0, 0, 1, 2, 4]);
+        let below = Rational::new(dice.between(0, width), 2);
+        let above = Rational::new(dice.between(0, width), 2);
+        let wide = elbowroom_num::Interval::closed(
+            &parameter.nominal - &below,
+            &parameter.nominal + &above,
+        );
+        *interval = wide.intersection(&parameter.range);
+    }
+    envelope
+}
+
+struct Contest<'a> {
+    case: &'a Case,
+    task: &'a Task,
+    plan: &'a ParametrizedPlan,
+    solver: Option<&'a mut Z3>,
+    encoding: Option<Encoding>,
+    dice: Dice,
+    tally: Tally,
+}
+
+impl Contest<'_> {
+    /// Whether the box is inside; `None` if the fast oracle has no answer.
+    fn ask(
+        &mut self,
+        oracle: &mut Oracle<'_>,
+        envelope: &DecoupledEnvelope,
+        hint: Option<BoxEnd>,
+    ) -> Result<Option<bool>, Mismatch> {
+        self.tally.count("boxes");
+        let fast = match oracle.objection_after(envelope, hint) {
+            Ok(fast) => fast,
+            Err(refusal) => {
+                let reason = format!("{refusal:?}");
+                let reason = reason.split(' ').next().unwrap_or_default().to_owned();
+                *self.tally.refusals.entry(reason).or_default() += 1;
+                return Ok(None);
+            }
+        };
+        let is_inside = fast.is_none();
+        self.compare_with_plain(envelope, is_inside)?;
+        match &fast {
+            None => self.sample(envelope)?,
+            Some(Objection::NoSchedule(valuation)) => {
+                self.confirm_no_schedule(envelope, valuation)?;
+            }
+            Some(Objection::Broken(broken)) => self.confirm(oracle, envelope, broken)?,
+        }
+        self.compare_with_solver(envelope, is_inside)?;
+        Ok(Some(is_inside))
+    }
+
+    fn mismatch<T>(
+        &self,
+        kind: &'static str,
+        envelope: &DecoupledEnvelope,
+        details: &str,
+    ) -> Result<T, Mismatch> {
+        Err(Mismatch {
+            kind,
+            details: format!("box {}: {details}\n{}", show(envelope), self.case),
+        })
+    }
+
+    /// All sampled schedules must be valid.
+    fn sample(&mut self, envelope: &DecoupledEnvelope) -> Result<(), Mismatch> {
+        let mut system = System::new(self.plan, envelope);
+        for _ in 0..3 {
+            let Some((valuation, schedule)) = sample(&mut system, &mut self.dice) else {
+                return Ok(());
+            };
+            if let Verdict::Invalid(violation) = self.case.judge(&valuation, &schedule) {
+                if self.timed_change_places(&schedule) {
+                    continue;
+                }
+                let details = format!("{violation} at {valuation:?}, {schedule:?}");
+                return self.mismatch("inside, but the judge objects", envelope, &details);
+            }
+        }
+        Ok(())
+    }
+
+    fn timed_change_places(&self, schedule: &[Rational]) -> bool {
+        let timed = self.plan.plan.nodes();
+        let times: Vec<_> = timed
+            .filter(|(_, node)| matches!(node, Node::Timed(_)))
+            .map(|(id, _)| &schedule[id.index()])
+            .collect();
+        times.windows(2).any(|pair| pair[0] >= pair[1])
+    }
+
+    fn confirm_no_schedule(
+        &self,
+        envelope: &DecoupledEnvelope,
+        valuation: &Valuation,
+    ) -> Result<(), Mismatch> {
+        let details = format!("{valuation:?}");
+        if !envelope.contains(valuation) {
+            return self.mismatch("no schedule, outside the box", envelope, &details);
+        }
+        if System::new(self.plan, &DecoupledEnvelope::point(valuation)).is_feasible() {
+            return self.mismatch("no schedule, but there is one", envelope, &details);
+        }
+        Ok(())
+    }
+
+    /// The counterexample is a schedule in the box, and the judge refuses it.
+    fn confirm(
+        &mut self,
+        oracle: &Oracle<'_>,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Result<(), Mismatch> {
+        let Some(counterexample) = oracle.counterexample(envelope, broken) else {
+            let details = format!("{broken:?}");
+            return self.mismatch("no counterexample", envelope, &details);
+        };
+        let (valuation, schedule) = (&counterexample.valuation, &counterexample.schedule);
+        let details = format!("{broken:?}\nat {valuation:?}, {schedule:?}");
+        if !envelope.contains(valuation) {
+            return self.mismatch("counterexample outside the box", envelope, &details);
+        }
+        if !self.is_schedule(valuation, schedule) {
+            return self.mismatch("counterexample is no schedule", envelope, &details);
+        }
+        if let Requirement::Separation { first, second } = broken.requirement {
+            let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
+            if is_timed(first) && is_timed(second) {
+                self.tally.count("timed initials too near");
+                return Ok(());
+            }
+        }
+        match self.case.judge(valuation, schedule) {
+            Verdict::Valid(_) => self.mismatch("counterexample is valid", envelope, &details),
+            Verdict::Invalid(_) => {
+                self.tally.count("counterexamples confirmed");
+                Ok(())
+            }
+            Verdict::Undecided(_) => {
+                self.tally.count("counterexamples the judge cannot tell");
+                Ok(())
+            }
+        }
+    }
+
+    fn is_schedule(&self, valuation: &[Rational], schedule: &[Rational]) -> bool {
+        let plan = self.plan.plan.at(valuation);
+        let gaps = plan.constraints.iter().all(|constraint| {
+            let gap = &schedule[constraint.to.index()] - &schedule[constraint.from.index()];
+            let lower = match &constraint.lower {
+                elbowroom_plan::Bound::Finite(lower) => gap >= *lower,
+                _ => true,
+            };
+            let upper = match &constraint.upper {
+                elbowroom_plan::Bound::Finite(upper) => gap <= *upper,
+                _ => true,
+            };
+            lower && upper
+        });
+        gaps && schedule.iter().all(|time| !time.is_negative()) && schedule[0].is_zero()
+    }
+
+    fn compare_with_plain(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        is_inside: bool,
+    ) -> Result<(), Mismatch> {
+        let plain = plain::check(
+            self.task,
+            self.plan,
+            &self.case.epsilon,
+            envelope,
+            MOST_GROUPS,
+        );
+        match plain {
+            Err(GaveUp::TooManyOrders) => self.tally.count("plain: too many orders"),
+            Err(GaveUp::NotLinear) => self.tally.count("plain: not linear"),
+            Err(GaveUp::NotCovered) => self.tally.count("plain: not covered"),
+            Ok(Answer::Inside) if is_inside => self.tally.count("plain: agreed inside"),
+            Ok(Answer::Inside) => {
+                return self.mismatch("outside, but plain says inside", envelope, "");
+            }
+            Ok(Answer::NoSchedule(valuation)) => {
+                if is_inside {
+                    let details = format!("{valuation:?}");
+                    return self.mismatch("inside, but without schedule", envelope, &details);
+                }
+                self.tally.count("plain: agreed outside, no schedule");
+            }
+            Ok(Answer::Broken(found)) => {
+                if !self.is_schedule(&found.valuation, &found.schedule)
+                    || !envelope.contains(&found.valuation)
+                    || (!found.is_between_timed
+                        && self
+                            .case
+                            .judge(&found.valuation, &found.schedule)
+                            .is_valid())
+                {
+                    let details = format!("{found:?}");
+                    return self.mismatch("plain is wrong", envelope, &details);
+                }
+                if is_inside {
+                    let details = format!("{found:?}");
+                    return self.mismatch("inside, but broken", envelope, &details);
+                }
+                self.tally.count("plain: agreed outside, broken");
+            }
+        }
+        Ok(())
+    }
+
+    fn compare_with_solver(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        is_inside: bool,
+    ) -> Result<(), Mismatch> {
+        let Some(solver) = self.solver.as_deref_mut() else {
+            return Ok(());
+        };
+        let Some(encoding) = &self.encoding else {
+            self.tally.count("z3: not encoded");
+            return Ok(());
+        };
+        let mut found = Found::NoModel;
+        for corner in plain::corners(envelope) {
+            let point = DecoupledEnvelope::point(&corner);
+            if solver.ask(&encoding.scheduled(&point)) == Found::NoModel {
+                found = Found::Model;
+                break;
+            }
+        }
+        if found == Found::NoModel {
+            found = solver.ask(&encoding.broken(envelope));
+        }
+        match (found, is_inside) {
+            (Found::Unknown, _) => self.tally.count("z3: unknown"),
+            (Found::Model, false) => self.tally.count("z3: agreed outside"),
+            (Found::NoModel, true) => self.tally.count("z3: agreed inside"),
+            (Found::Model, true) => return self.mismatch("inside, z3 objects", envelope, ""),
+            (Found::NoModel, false) => {
+                return self.mismatch("outside, z3 says inside", envelope, "");
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! Random choices that can be repeated.
+
+use elbowroom_num::Rational;
+
+/// The generator `SplitMix64`: small, seedable, and good enough to choose test cases with.
+pub(crate) struct Dice(u64);
+
+impl Dice {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x2545_F491_4F6C_DD1D) ^ 0x9E37_79B9_7F4A_7C15)
+    }
+
+    fn roll(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// A number in `0..count`.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        let count = u64::try_from(count).expect("small");
+        usize::try_from(self.roll() % count).expect("small")
+    }
+
+    /// A number in `least..=most`.
+    pub(crate) fn between(&mut self, least: i64, most: i64) -> i64 {
+        let width = u64::try_from(most - least + 1).expect("least <= most");
+        least + i64::try_from(self.roll() % width).expect("small")
+    }
+
+    /// True so many times in a hundred.
+    pub(crate) fn chance(&mut self, percent: usize) -> bool {
+        self.below(100) < percent
+    }
+
+    /// One of several.
+    pub(crate) fn pick<'a, T>(&mut self, from: &'a [T]) -> &'a T {
+        &from[self.below(from.len())]
+    }
+
+    /// A whole number or a half.
+    pub(crate) fn half(&mut self, least: i64, most: i64) -> Rational {
+        Rational::new(self.between(2 * least, 2 * most), 2)
+    }
+}

@@ -1,0 +1,95 @@
+//! The fast oracle against a plainly right one, an SMT solver, and the judge.
+//!
+//! Random small plans are generated around a schedule that works. On growing boxes of parameter
+//! values, `elbowroom_envelope::Oracle` must agree with
+//!
+//! - [`plain`]: all orders of all time points, one linear program for each question;
+//! - [`smt`]: the encoding of the paper's authors, decided by Z3 (skipped where there is none);
+//! - the judge: each counterexample is refused by it, each schedule sampled from a box that is
+//!   said to be inside is accepted.
+//!
+//! `ELBOWROOM_CASES` says how many cases are tried, `ELBOWROOM_FIRST_CASE` which is the first.
+
+mod case;
+mod contest;
+mod dice;
+mod generate;
+mod numbers;
+mod plain;
+mod polynomial;
+mod shrink;
+mod smt;
+mod system;
+mod z3;
+
+use contest::{Mismatch, Script, Tally, steps};
+use dice::Dice;
+use generate::generate;
+use z3::Z3;
+
+fn setting(name: &str, default: u64) -> u64 {
+    let value = std::env::var(name).ok();
+    value
+        .and_then(|value| value.parse().ok())
+        .unwrap_or(default)
+}
+
+fn script(seed: u64, length: usize) -> Script {
+    let case = generate(seed).case;
+    let steps = steps(&mut Dice::new(seed + 1), &case.parameters, length);
+    Script { case, steps }
+}
+
+/// All mismatches, shrunk, and what was compared.
+fn compare(cases: std::ops::Range<u64>, mut solver: Option<Z3>) -> (Tally, Vec<String>) {
+    let mut tally = Tally::default();
+    let mut complaints = Vec::new();
+    for seed in cases {
+        let script = script(seed, 7);
+        let mut run = |script: &Script| script.run(solver.as_mut());
+        match run(&script) {
+            Ok(more) => tally.include(more),
+            Err(mismatch) => {
+                let mut last = mismatch.clone();
+                let small = shrink::shrink(&script, &mut |smaller| match run(smaller) {
+                    Err(Mismatch { kind, details }) if kind == mismatch.kind => {
+                        last = Mismatch { kind, details };
+                        true
+                    }
+                    _ => false,
+                });
+                complaints.push(format!(
+                    "case {seed}: {}\n{}steps {:?}\n",
+                    last.kind, last.details, small.steps
+                ));
+            }
+        }
+    }
+    (tally, complaints)
+}
+
+fn expect_agreement(cases: u64, solver: Option<Z3>) {
+    let first = setting("ELBOWROOM_FIRST_CASE", 0);
+    let cases = setting("ELBOWROOM_CASES", cases);
+    let (tally, complaints) = compare(first..first + cases, solver);
+    println!("{tally}");
+    assert!(
+        complaints.is_empty(),
+        "{} mismatches:\n{}",
+        complaints.len(),
+        complaints.join("\n")
+    );
+}
+
+#[test]
+fn the_fast_oracle_agrees_with_the_plain_one_and_the_judge() {
+    expect_agreement(200, None);
+}
+
+#[test]
+fn the_fast_oracle_agrees_with_the_authors_encoding() {
+    match Z3::start() {
+        Some(solver) => expect_agreement(20, Some(solver)),
+        None => println!("skipped: there is no z3 here"),
+    }
+}
