@@ -173,3 +173,18 @@ fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
     let duration = &found.moment.unwrap() - &found.schedule[1];
     assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
 }
+
+#[test]
+fn a_parameter_that_bounds_a_time_and_stands_in_an_effect_is_one_quantity() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action burn :parameters () :duration (>= ?duration 0)
+                    :effect (and (at start (increase (x) ?s))
+                                 (at end (decrease (x) ?duration))))",
+        goal: "(>= (x) 5)",
+        plan: "parameter ?s default 3; durative-action instance n : (burn);
+               c: n.end - n.start in [1, ?s];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer("[1, 4]"), "inside");
+}

@@ -149,7 +149,13 @@ impl<'a> Schedules<'a> {
                 return Some(certificate);
             }
         }
-        if inequalities.len() <= 1 && self.reduction.coupled.is_empty() {
+        // A parameter that is a difference of times has been replaced by it; one that only bounds a
+        // difference occurs twice.
+        let is_shared = inequalities
+            .iter()
+            .flat_map(|inequality| inequality.expression.parameters.keys())
+            .any(|&parameter| self.reduction.is_in_network(parameter));
+        if inequalities.len() <= 1 && self.reduction.coupled.is_empty() && !is_shared {
             return None;
         }
         let assumed = &self.network.network().constraints()[self.edges.len()..];
