@@ -4,6 +4,7 @@ use elbowroom_envelope::{Objection, Oracle};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{Source, read_problem};
+use elbowroom_plan::obligations::Refusal;
 use elbowroom_plan::parametrize::vary;
 use elbowroom_plan::soundness::Counterexample;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
@@ -187,4 +188,26 @@ fn a_parameter_that_bounds_a_time_and_stands_in_an_effect_is_one_quantity() {
         ..Given::default()
     };
     assert_eq!(given.answer("[1, 4]"), "inside");
+}
+
+#[test]
+fn two_numbers_that_a_parameter_multiplies_are_not_decided_at_corners() {
+    // At the end (x) is 5 + 3s and (y) is 5 - 3s: the condition fails for s = 1, not for 0 and 2.
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action mix :parameters () :duration (= ?duration 3)
+                    :condition (over all (not (and (> (x) 7.5) (> (y) 1.5))))
+                    :effect (and (increase (x) (* #t ?s)) (decrease (y) (* #t ?s))))",
+        plan: "parameter ?s default 0; durative-action instance n : (mix);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    let (task, plan) = given.task_and_plan();
+    let refusal = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap_err();
+    assert_eq!(
+        refusal,
+        Refusal::Coupled {
+            name: "?s".to_owned()
+        }
+    );
 }
