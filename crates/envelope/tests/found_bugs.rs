@@ -14,7 +14,8 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 struct Given<'a> {
     /// `:synth-parameters` and actions.
     domain: &'a str,
-    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5.
+    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5, `(z)`
+    /// has no value.
     init: &'a str,
     /// The goal; `(and)` if empty.
     goal: &'a str,
@@ -27,7 +28,7 @@ struct Given<'a> {
 impl Given<'_> {
     fn task_and_plan(&self) -> (Task, ParametrizedPlan) {
         let domain = format!(
-            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y)) {})",
+            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
             self.domain
         );
         let goal = if self.goal.is_empty() {
@@ -209,5 +210,38 @@ fn two_numbers_that_a_parameter_multiplies_are_not_decided_at_corners() {
         Refusal::Coupled {
             name: "?s".to_owned()
         }
+    );
+}
+
+#[test]
+fn a_condition_that_says_nothing_does_not_hold_and_its_opposite_neither() {
+    let with = |condition: &str| {
+        let domain =
+            format!("(:action look :parameters () :precondition {condition} :effect (and))");
+        let given = Given {
+            domain: &domain,
+            init: "(p)",
+            plan: "action instance l : (look);",
+            ..Given::default()
+        };
+        given.answer("")
+    };
+    assert_eq!(with("(< (z) 1)"), "(look) needs (< (z) 1)");
+    assert_eq!(with("(not (< (z) 1))"), "(look) needs (not (< (z) 1))");
+    assert_eq!(with("(or (p) (< (z) 1))"), "inside");
+    assert_eq!(with("(not (and (not (p)) (< (z) 1)))"), "inside");
+}
+
+#[test]
+fn what_changes_continuously_must_have_a_value() {
+    let given = Given {
+        domain: "(:durative-action fill :parameters () :duration (= ?duration 3)
+                    :effect (increase (z) (* #t 1)))",
+        plan: "durative-action instance n : (fill); c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answer(""),
+        "start of (fill) needs a number that has no value"
     );
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 
+use super::dnf::Wanted;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Refusal, Substitution};
 use crate::stn_plan::{Node, NodeId, StnPlan};
@@ -69,7 +70,7 @@ pub(super) fn goal_cases(
                 })
                 .collect(),
         };
-        for inequalities in reading.alternatives(condition, false)? {
+        for inequalities in reading.alternatives(condition, Wanted::NotTrue)? {
             for differences in &windows {
                 let inequalities = [&timeline.assumptions[..], &inequalities].concat();
                 cases.push(BadCase {
