@@ -378,7 +378,9 @@ impl<'a> Search<'a> {
                 .ok_or(Trouble::GaveUp(GaveUp::TooManyOrders))?;
             let mut world = world.clone();
             self.pass(&mut world, group[0])?;
-            self.arrive(world, group)?;
+            if self.found.is_none() {
+                self.arrive(world, group)?;
+            }
         }
         self.system.pop();
         Ok(())
@@ -390,6 +392,13 @@ impl<'a> Search<'a> {
             return Ok(());
         };
         let rates = self.rates(world)?;
+        if rates
+            .iter()
+            .any(|(fluent, _)| world.values[fluent.index()].is_none())
+        {
+            self.report("no value to change".to_owned());
+            return Ok(());
+        }
         let moved = |moment: Symbol| {
             let elapsed = Polynomial::difference(Symbol::Time(last), moment);
             let mut values = world.values.clone();
@@ -429,7 +438,7 @@ impl<'a> Search<'a> {
     }
 
     /// The rates of the continuous effects at work.
-    fn rates(&self, world: &World) -> Result<Vec<(FluentId, Polynomial)>, Trouble> {
+    fn rates(&self, world: &World) -> Result<Vec<(FluentId, Option<Polynomial>)>, Trouble> {
         let mut rates = Vec::new();
         let mut moving = BTreeSet::new();
         let mut read = BTreeSet::new();
@@ -442,7 +451,6 @@ impl<'a> Search<'a> {
             let continuous = self.durative(id).continuous.iter();
             for (effect, _) in continuous.zip(&running.continuous).filter(|(_, on)| **on) {
                 let rate = self.value(&effect.rate, &context)?;
-                let rate = rate.ok_or(Trouble::GaveUp(GaveUp::NotCovered))?;
                 effect.rate.visit_fluents(&mut |fluent| {
                     read.insert(fluent);
                 });
@@ -813,7 +821,16 @@ impl<'a> Search<'a> {
             Node::Start(id) => &self.durative(id).start.effects,
             Node::End(id) => &self.durative(id).end.effects,
         };
-        let happens = |index: usize| outcomes.get(&(node, Part::Now, index)) == Some(&true);
+        // Of an action that takes no time, the guards read at the start are in the same group.
+        let is_off = |index: usize| match self.node(node) {
+            Node::End(id) => {
+                let start = self.plan.plan.start(id).index();
+                outcomes.get(&(start, Part::EndEffect, index)) == Some(&false)
+            }
+            _ => false,
+        };
+        let happens =
+            |index: usize| outcomes.get(&(node, Part::Now, index)) == Some(&true) && !is_off(index);
         let effects = effects.iter().enumerate();
         effects
             .filter(|(index, _)| happens(*index))
