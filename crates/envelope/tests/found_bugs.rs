@@ -245,3 +245,17 @@ fn what_changes_continuously_must_have_a_value() {
         "start of (fill) needs a number that has no value"
     );
 }
+
+#[test]
+fn one_happening_does_not_change_a_number_in_two_ways() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and)
+                    :effect (and (assign (x) 3) (increase (x) 1)))",
+        plan: "action instance s : (set);",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answer(""),
+        "(set) must not change (x) in several ways at once"
+    );
+}

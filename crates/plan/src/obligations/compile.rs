@@ -11,7 +11,7 @@ use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
 
 use super::dnf::{Alternatives, Wanted, compared};
-use super::goal::goal_cases;
+use super::goal::{goal_cases, lasts};
 use super::over_all::literal_cases;
 use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
@@ -393,6 +393,7 @@ impl Compiler<'_> {
         obligations: &mut Obligations,
     ) -> Result<Vec<Recorded>, Refusal> {
         let (mut recorded, mut additions) = (Vec::new(), Vec::new());
+        let mut updates: BTreeMap<FluentId, Vec<UpdateOperator>> = BTreeMap::new();
         for (change, _) in effects.filter(|&(_, happens)| happens) {
             match change {
                 Change::Add(fact) => additions.push(Recorded::Fact(*fact, true)),
@@ -402,6 +403,7 @@ impl Compiler<'_> {
                     fluent,
                     value,
                 } => {
+                    updates.entry(*fluent).or_default().push(*operator);
                     let reading = self.reading(&run.timeline, node);
                     let value = reading.linear(value)?;
                     let old = reading.linear(&Expression::Fluent(*fluent))?;
@@ -423,8 +425,40 @@ impl Compiler<'_> {
                 }
             }
         }
+        self.forbid_conflicts(run, node, &updates, obligations);
         recorded.append(&mut additions);
         Ok(recorded)
+    }
+
+    /// Several updates of one fluent by one happening must all be increases and decreases. Timed
+    /// initials that come after the plan's last action do not count.
+    fn forbid_conflicts(
+        &self,
+        run: &Run,
+        node: NodeId,
+        updates: &BTreeMap<FluentId, Vec<UpdateOperator>>,
+        obligations: &mut Obligations,
+    ) {
+        for (&fluent, operators) in updates {
+            if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
+                continue;
+            }
+            let when = match self.plan.plan.nodes[node.index()] {
+                Node::Timed(_) => lasts(&self.plan.plan)
+                    .into_iter()
+                    .map(|last| vec![Difference::not_after(node, last)])
+                    .collect(),
+                _ => vec![Vec::new()],
+            };
+            let bad_cases = when.into_iter().map(|differences| BadCase {
+                differences,
+                inequalities: run.timeline.assumptions.clone(),
+            });
+            obligations.direct.push(Obligation {
+                requirement: Requirement::OneUpdate { node, fluent },
+                bad_cases: bad_cases.collect(),
+            });
+        }
     }
 
     /// A continuous change without a value or a rate breaks the plan, unless its action takes no

@@ -36,12 +36,7 @@ pub(super) fn goal_cases(
         .filter(|(id, node)| matches!(node, Node::Timed(_)) && touched.contains(id))
         .map(|(id, _)| id)
         .collect();
-    // Starts of durative actions are never last: their ends follow.
-    let lasts: Vec<NodeId> = plan
-        .nodes()
-        .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
-        .map(|(id, _)| id)
-        .collect();
+    let lasts = lasts(plan);
     let mut cases = Vec::new();
     for happened in 0..=timed.len() {
         let (before, after) = timed.split_at(happened);
@@ -81,4 +76,13 @@ pub(super) fn goal_cases(
         }
     }
     Ok(cases)
+}
+
+/// The nodes that can be the last of the plan's actions: their ends and instants. Starts of
+/// durative actions are never last, their ends follow.
+pub(super) fn lasts(plan: &StnPlan) -> Vec<NodeId> {
+    plan.nodes()
+        .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
+        .map(|(id, _)| id)
+        .collect()
 }
