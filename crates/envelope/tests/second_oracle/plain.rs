@@ -38,8 +38,9 @@ pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
     pub(crate) schedule: Vec<Rational>,
-    /// Only two timed initials are too near to each other, which the judge does not mind.
-    pub(crate) is_between_timed: bool,
+    /// It is only that a timed initial is too near to another one, or to an action from after the
+    /// end of the plan. The judge does not mind.
+    pub(crate) is_only_timed: bool,
 }
 
 /// No answer.
@@ -331,7 +332,7 @@ impl<'a> Search<'a> {
             what,
             valuation,
             schedule,
-            is_between_timed: false,
+            is_only_timed: false,
         });
     }
 
@@ -601,9 +602,23 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
+    /// Timed initials after the last action keep away from it as well.
+    fn separate_later(&mut self, world: &World) -> Step {
+        for (position, &node) in world.remaining.iter().enumerate() {
+            if self.found.is_some() {
+                return Ok(());
+            }
+            let mut others = world.clone();
+            others.placed.extend(&world.remaining[..position]);
+            self.separate(&others, &[node])?;
+            self.mark_timed();
+        }
+        Ok(())
+    }
+
     fn mark_timed(&mut self) {
         if let Some(found) = &mut self.found {
-            found.is_between_timed = true;
+            found.is_only_timed = true;
         }
     }
 
@@ -778,7 +793,8 @@ impl<'a> Search<'a> {
                 duration: None,
             };
             let goal = &self.plan.goal;
-            return self.require(goal, &context, "goal");
+            self.require(goal, &context, "goal")?;
+            return self.separate_later(&world);
         }
         self.next_groups(&world, &mut Vec::new(), 0)
     }
