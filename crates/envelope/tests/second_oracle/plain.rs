@@ -392,14 +392,14 @@ impl<'a> Search<'a> {
         let Some(&last) = world.last.first() else {
             return Ok(());
         };
-        let rates = self.rates(world)?;
-        if rates
-            .iter()
-            .any(|(fluent, _)| world.values[fluent.index()].is_none())
-        {
-            self.report("no value to change".to_owned());
+        let rates = self.rates(world)?.into_iter().map(|(fluent, rate)| {
+            let value = world.values[fluent.index()].as_ref();
+            Some((fluent, rate.zip(value)?.0))
+        });
+        let Some(rates) = rates.collect::<Option<Vec<_>>>() else {
+            self.report("no value to change, or no rate".to_owned());
             return Ok(());
-        }
+        };
         let moved = |moment: Symbol| {
             let elapsed = Polynomial::difference(Symbol::Time(last), moment);
             let mut values = world.values.clone();
