@@ -223,8 +223,9 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     }
     // The moment inside an over-all condition is no node of the plan.
     nodes.retain(|node| node.index() < count);
-    if let Requirement::Condition { node, .. } | Requirement::Defined { node, .. } =
-        broken.requirement
+    if let Requirement::Condition { node, .. }
+    | Requirement::Defined { node, .. }
+    | Requirement::OneUpdate { node, .. } = broken.requirement
     {
         nodes.push(node);
     }

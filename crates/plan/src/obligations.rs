@@ -18,7 +18,7 @@ mod separation;
 mod timeline;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::Condition;
+use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::Rational;
 
 use crate::linear::Linear;
@@ -126,6 +126,14 @@ pub enum Requirement {
     Defined {
         /// Where it is needed.
         node: NodeId,
+    },
+    /// A happening changes a fluent in one way only, unless all it does is to increase and
+    /// decrease it.
+    OneUpdate {
+        /// The happening.
+        node: NodeId,
+        /// The fluent.
+        fluent: FluentId,
     },
     /// The goal holds at the end.
     Goal {
@@ -236,6 +244,13 @@ impl Requirement {
                 format!(
                     "{} needs a number that has no value",
                     plan.node_words(task, *node)
+                )
+            }
+            Self::OneUpdate { node, fluent } => {
+                format!(
+                    "{} must not change {} in several ways at once",
+                    plan.node_words(task, *node),
+                    task.fluent_name(*fluent)
                 )
             }
             Self::Goal { condition } => {

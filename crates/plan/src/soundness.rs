@@ -13,16 +13,15 @@ mod flow;
 mod linear_program;
 mod proof;
 
-use std::collections::BTreeSet;
-
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::decoupled::DecoupledEnvelope;
-use crate::obligations::{BadCase, Difference, Obligations, Refusal, Requirement};
-use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
+use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
+use crate::parameter::{ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
+use crate::stn_plan::NodeId;
 use bad_case::{Outcome, Schedules};
 use certificate::Certificate;
 use proof::{Proof, Prover};
@@ -95,6 +94,9 @@ impl<'a> Soundness<'a> {
                     proofs: None,
                 });
             }
+        }
+        for over_all in &obligations.over_all {
+            check_over_all(task, plan, &reduction, over_all, &nominal)?;
         }
         let over_all = vec![None; obligations.over_all.len()];
         Ok(Self {
@@ -172,6 +174,11 @@ impl<'a> Soundness<'a> {
                     if is_separation {
                         return Ok(found);
                     }
+                }
+                Outcome::Unknown(parameter) => {
+                    return Err(Refusal::Coupled {
+                        name: self.plan.parameter(parameter).name.clone(),
+                    });
                 }
             }
         }
@@ -288,16 +295,44 @@ fn check_products(
     reduction: &Reduction,
     case: &BadCase,
 ) -> Result<(), Refusal> {
-    let multiplied: BTreeSet<ParameterId> = case
-        .inequalities
-        .iter()
-        .flat_map(|inequality| inequality.expression.multiplied_parameters())
-        .collect();
-    for parameter in multiplied {
-        if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
-            return Err(Refusal::Coupled {
-                name: plan.parameter(parameter).name.clone(),
-            });
+    match reduction.undecided_at_corners(case) {
+        Some(parameter) => Err(Refusal::Coupled {
+            name: plan.parameter(parameter).name.clone(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The same for an over-all condition, read at any place of its moment among the events of the
+/// nominal schedule. Other places come to light with a box.
+fn check_over_all(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    reduction: &Reduction,
+    over_all: &OverAll,
+    nominal: &[Rational],
+) -> Result<(), Refusal> {
+    let (start, end) = (
+        &nominal[over_all.start.index()],
+        &nominal[over_all.end.index()],
+    );
+    let mut moments = vec![start];
+    moments.extend(
+        over_all
+            .events
+            .iter()
+            .map(|event| &nominal[event.index()])
+            .filter(|&time| time > start && time < end),
+    );
+    for moment in moments {
+        let cut = |node: NodeId| nominal[node.index()] <= *moment;
+        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+            inequalities.extend(over_all.assumptions.iter().cloned());
+            let case = BadCase {
+                differences: Vec::new(),
+                inequalities,
+            };
+            check_products(plan, reduction, &case)?;
         }
     }
     Ok(())

@@ -5,11 +5,10 @@ use elbowroom_stn::Checkpoint;
 
 use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
-use super::check_products;
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
+use crate::parameter::{ParameterId, ParametrizedPlan};
 use crate::reduction::BoxEnd;
-use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::NodeId;
 
 /// How many places of the moment are told apart in one over-all condition.
@@ -173,6 +172,12 @@ impl<'a, 'b> Prover<'a, 'b> {
         Ok(attempt)
     }
 
+    fn coupled(&self, parameter: ParameterId) -> Refusal {
+        Refusal::Coupled {
+            name: self.plan.parameter(parameter).name.clone(),
+        }
+    }
+
     /// All events are placed: the condition's value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
         let cut = |node: NodeId| happened.contains(&node);
@@ -183,10 +188,10 @@ impl<'a, 'b> Prover<'a, 'b> {
                 differences: self.assumed.clone(),
                 inequalities,
             };
-            check_products(self.plan, self.schedules.reduction, &case)?;
             match self.schedules.inequalities_possible(&case) {
                 Outcome::Impossible(certificates) => proofs.push(certificates),
                 Outcome::Possible => return Ok(Err(case)),
+                Outcome::Unknown(parameter) => return Err(self.coupled(parameter)),
             }
         }
         Ok(Ok(Proof::True(proofs)))
