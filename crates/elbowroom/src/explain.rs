@@ -12,8 +12,9 @@ use elbowroom_plan::reduction::Side;
 use elbowroom_plan::soundness::{Broken, Counterexample};
 use elbowroom_plan::{
     DecoupledEnvelope, InstanceId, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan,
-    Schedule, Valuation,
+    Schedule, Valuation, network_node,
 };
+use elbowroom_stn::{ConsistentNetwork, Constraint};
 
 /// Says in words what was found out about one plan.
 #[derive(Clone, Copy, Debug)]
@@ -42,17 +43,20 @@ pub struct Explanation {
 /// By how much something fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shortfall {
-    /// Something happens so much too late.
+    /// Something can happen so much too late.
     Time(Rational),
+    /// Something can happen as late as one likes.
+    Boundless,
     /// A comparison fails by so much.
     Amount(Rational),
 }
 
 impl Shortfall {
-    /// The number.
-    pub fn value(&self) -> &Rational {
+    /// The number; `None` if there is no limit.
+    pub fn value(&self) -> Option<&Rational> {
         match self {
-            Self::Time(value) | Self::Amount(value) => value,
+            Self::Time(value) | Self::Amount(value) => Some(value),
+            Self::Boundless => None,
         }
     }
 }
@@ -111,7 +115,7 @@ impl<'a> Explainer<'a> {
 
     fn broken(&self, broken: &Broken, example: Option<Counterexample>) -> Explanation {
         let reason = self.requirement(&broken.requirement);
-        let Some(example) = example else {
+        let Some(mut example) = example else {
             return Explanation {
                 reason,
                 shortfall: None,
@@ -120,28 +124,42 @@ impl<'a> Explainer<'a> {
                 verdict: None,
             };
         };
+        let shortfall = match &broken.requirement {
+            Requirement::Separation { first, second } => {
+                self.make_late(&mut example, *first, *second)
+            }
+            _ => shortfall(broken, &example),
+        };
         Explanation {
             reason,
-            shortfall: self.shortfall(broken, &example),
+            shortfall,
             verdict: self.verdict(&example),
             valuation: example.valuation,
             schedule: Some(example.schedule),
         }
     }
 
-    /// By how much the example breaks the requirement.
-    fn shortfall(&self, broken: &Broken, example: &Counterexample) -> Option<Shortfall> {
-        if let Requirement::Separation { first, second } = &broken.requirement {
-            let gap = &example.schedule[second.index()] - &example.schedule[first.index()];
-            return Some(Shortfall::Time(self.epsilon - &gap));
-        }
-        let [inequality] = broken.case.inequalities.as_slice() else {
-            return None;
-        };
-        let mut times = example.schedule.clone();
-        times.extend(example.moment.clone());
-        let value = inequality.expression.value(&times, &example.valuation);
-        Some(Shortfall::Amount(value.abs())).filter(|gap| !gap.value().is_zero())
+    /// Gives the example a schedule in which `first` comes as late as it can, compared with
+    /// `second`; a little after it, if there is no limit.
+    fn make_late(
+        &self,
+        example: &mut Counterexample,
+        first: NodeId,
+        second: NodeId,
+    ) -> Option<Shortfall> {
+        let network = self.plan.plan.network(&example.valuation);
+        let mut network = ConsistentNetwork::try_from(network).ok()?;
+        let (first, second) = (network_node(first), network_node(second));
+        let most = network.distance(second, first);
+        let late = most.clone().unwrap_or(Rational::ONE);
+        network
+            .add(Constraint::at_least(second, first, late))
+            .ok()?;
+        let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
+        example.schedule = schedule.times().to_vec();
+        Some(most.map_or(Shortfall::Boundless, |most| {
+            Shortfall::Time(&most + self.epsilon)
+        }))
     }
 
     /// What the judge says about the example; `None` where it cannot be asked, because something
@@ -233,4 +251,15 @@ impl<'a> Explainer<'a> {
     fn action_name(&self, id: InstanceId) -> &'a str {
         &self.plan.plan.instance(id).action.name
     }
+}
+
+/// By how much the example breaks a requirement on numbers.
+fn shortfall(broken: &Broken, example: &Counterexample) -> Option<Shortfall> {
+    let [inequality] = broken.case.inequalities.as_slice() else {
+        return None;
+    };
+    let mut times = example.schedule.clone();
+    times.extend(example.moment.clone());
+    let value = inequality.expression.value(&times, &example.valuation);
+    (!value.is_zero()).then(|| Shortfall::Amount(value.abs()))
 }

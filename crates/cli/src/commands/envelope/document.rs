@@ -1,10 +1,10 @@
 //! Answers as JSON: `docs/formats/envelope-json.md`.
 
-use elbowroom::Explanation;
 use elbowroom::model::Task;
 use elbowroom::model::validate::Violation;
 use elbowroom::plan::reduction::Side;
 use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind};
+use elbowroom::{Explanation, Shortfall};
 use serde_json::{Map, Value, json};
 
 use super::Subject;
@@ -160,7 +160,7 @@ fn counterexample(subject: &Subject<'_>, explanation: &Explanation) -> Value {
         .collect();
     json!({
         "message": explanation.reason,
-        "shortfall": explanation.shortfall.as_ref().map(|gap| json::number(gap.value())),
+        "shortfall": explanation.shortfall.as_ref().and_then(Shortfall::value).map(json::number),
         "verdict": explanation.verdict,
         "values": values,
         "schedule": schedule(subject, explanation),

@@ -89,6 +89,9 @@ pub(super) fn what(explanation: &Explanation) -> String {
         Some(Shortfall::Amount(short)) => {
             format!("{reason}: short by {}", number::nearest(short))
         }
+        Some(Shortfall::Boundless) => {
+            format!("{reason}, but nothing in the plan sees to it")
+        }
         None => reason.clone(),
     }
 }
