@@ -47,13 +47,16 @@ fn epsilon() -> Rational {
 
 /// The plan with these left open; all durations if nothing is named.
 fn opened(task: &Task, plan: &TimeTriggeredPlan, vary: &[&str]) -> ParametrizedPlan {
-    let specs: Vec<VarySpec> = vary.iter().map(|text| text.parse().unwrap()).collect();
+    let specs: Vec<VarySpec> = vary
+        .iter()
+        .map(|text| text.parse().expect("a specification"))
+        .collect();
     let freed = flow::free(task, plan, &epsilon()).expect("a valid plan");
     flow::open(task, freed, &specs, &epsilon()).expect("quantities of this plan")
 }
 
 fn number(text: &str) -> Rational {
-    text.parse().unwrap()
+    text.parse().expect("a number")
 }
 
 /// How far the duration of the instance may deviate while all else is as planned.
@@ -62,9 +65,9 @@ fn alone(task: &Task, time_triggered: &TimeTriggeredPlan, instance: usize) -> In
     let plan = opened(task, time_triggered, &[&vary]);
     let mut oracle = Oracle::new(task, &plan, &epsilon()).expect("within exact reasoning");
     let go_on = ControlFlow::Continue(());
-    let run = irr(&mut oracle, &envelope::Settings::default(), &mut |_| go_on).unwrap();
+    let run = irr(&mut oracle, &envelope::Settings::default(), &mut |_| go_on).expect("few cases");
     let found = run.envelope.expect("the plan works as planned");
-    let sharp = sharpen(&mut oracle, &found, &mut || go_on).unwrap();
+    let sharp = sharpen(&mut oracle, &found, &mut || go_on).expect("few cases");
     assert!(sharp.includes(&found));
     sharp.intervals[0].clone()
 }
@@ -85,7 +88,10 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
     let shares = ["0", "1/3", "3/4", "1", "7/6", "3/2", "2"].map(number);
     let mut inside = 0;
     let mut outside = 0;
-    for code in 0..shares.len().pow(u32::try_from(nominal.len()).unwrap()) {
+    for code in 0..shares
+        .len()
+        .pow(u32::try_from(nominal.len()).expect("few parameters"))
+    {
         let mut rest = code;
         let point: Vec<Rational> = nominal
             .iter()
@@ -96,7 +102,9 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
             })
             .collect();
         let expected = region(&point);
-        let found = oracle.objection(&DecoupledEnvelope::point(&point)).unwrap();
+        let found = oracle
+            .objection(&DecoupledEnvelope::point(&point))
+            .expect("few cases");
         assert_eq!(found.is_none(), expected, "{case} at {point:?}: {found:?}");
         if expected {
             inside += 1;
@@ -124,14 +132,14 @@ fn the_delivery_is_as_worked_by_hand() {
             "[1/1000, 8249/250]",
         ],
         |point| {
-            let [a, u, p, b, d] = point else {
+            let [first, unlock, pick, second, drop] = point else {
                 panic!("five durations")
             };
-            let robot = &(&(a + p) + b) + d;
-            robot <= number("59.996")
-                && u + d <= number("59.998")
-                && [a, p, b, d].iter().all(|x| **x >= thousandth)
-                && !u.is_negative()
+            let robot = [first, pick, second, drop];
+            robot.into_iter().sum::<Rational>() <= number("59.996")
+                && unlock + drop <= number("59.998")
+                && robot.iter().all(|&taken| *taken >= thousandth)
+                && !unlock.is_negative()
         },
     );
 }
