@@ -1,4 +1,4 @@
-//! Mistakes that the second oracle found in the first one, each as a small case.
+//! Mistakes found in the box check, most of them by the second oracle, each as a small case.
 
 use elbowroom_envelope::{Objection, Oracle};
 use elbowroom_model::Task;
@@ -172,4 +172,36 @@ fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
     let found = given.counterexample("[1, inf]");
     let duration = &found.moment.unwrap() - &found.schedule[1];
     assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
+}
+
+#[test]
+fn a_box_away_from_the_nominal_values_may_have_its_own_order() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(p)",
+        plan: "parameter x default 0;
+               action instance s : (set); action instance l : (look);
+               c: s - .zero in [2, 2]; c: l - .zero in [x, x]; c: l - s in [-inf, 9];",
+        ..Given::default()
+    };
+    let boxes = [
+        "[0, 1]",
+        "[9/4, 11]",
+        "[0, 4]",
+        "[0, 7/4]",
+        "[10, 12]",
+        "[12, 13]",
+    ];
+    assert_eq!(
+        given.answers(&boxes),
+        [
+            "inside",
+            "inside",
+            "(set) must come before (look), by at least ε",
+            "inside",
+            "no schedule",
+            "no schedule"
+        ]
+    );
 }

@@ -71,7 +71,7 @@ pub struct Counterexample {
 }
 
 impl<'a> Soundness<'a> {
-    /// Compiles a plan's obligations.
+    /// Compiles a plan's obligations for boxes that hold its nominal values.
     ///
     /// # Errors
     /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
@@ -81,10 +81,27 @@ impl<'a> Soundness<'a> {
         plan: &'a ParametrizedPlan,
         epsilon: &Rational,
     ) -> Result<Self, Refusal> {
+        Self::around(task, plan, epsilon, &plan.nominal())
+    }
+
+    /// Compiles a plan's obligations for boxes that hold these values.
+    ///
+    /// Happenings are required to keep the order that they have there. That is no restriction in a
+    /// box with these values in it; in others, a different order may work as well.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), with these values in place of the nominal ones.
+    pub fn around(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &Rational,
+        valuation: &[Rational],
+    ) -> Result<Self, Refusal> {
         let reduction = Reduction::new(plan);
-        let nominal = nominal_schedule(&reduction, plan).ok_or(Refusal::NoNominalSchedule)?;
+        let schedule =
+            earliest_schedule(&reduction, valuation).ok_or(Refusal::NoNominalSchedule)?;
         let obligations =
-            Obligations::compile(task, plan, epsilon, &nominal, &reduction.substitution)?;
+            Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {
@@ -266,9 +283,9 @@ impl<'a> Lazy<'a> {
     }
 }
 
-/// The earliest schedule at the nominal values, by node.
-fn nominal_schedule(reduction: &Reduction, plan: &ParametrizedPlan) -> Option<Vec<Rational>> {
-    let point = DecoupledEnvelope::point(&plan.nominal());
+/// The earliest schedule at these values, by node.
+fn earliest_schedule(reduction: &Reduction, valuation: &[Rational]) -> Option<Vec<Rational>> {
+    let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;
     let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));
