@@ -24,6 +24,8 @@ pub struct Oracle<'a> {
     soundness: Soundness<'a>,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
+    /// How many bad cases had been refuted from scratch before `around` changed last.
+    refuted_before: usize,
     checks: usize,
     without_schedule: usize,
 }
@@ -61,6 +63,7 @@ impl<'a> Oracle<'a> {
             feasibility,
             soundness,
             around: plan.nominal(),
+            refuted_before: 0,
             checks: 0,
             without_schedule: 0,
         })
@@ -83,7 +86,7 @@ impl<'a> Oracle<'a> {
 
     /// How many bad cases have been refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
-        self.soundness.refutations()
+        self.refuted_before + self.soundness.refutations()
     }
 
     /// Why the box is not inside the envelope; `None` if it is.
@@ -133,6 +136,7 @@ impl<'a> Oracle<'a> {
         let nearest = envelope.nearest(&self.plan.nominal());
         match Soundness::around(self.task, self.plan, &self.epsilon, &nearest) {
             Ok(soundness) => {
+                self.refuted_before += self.soundness.refutations();
                 self.soundness = soundness;
                 self.around = nearest;
                 Ok(None)
