@@ -81,7 +81,10 @@ impl<'a> Explainer<'a> {
         match objection {
             Objection::NoSchedule(valuation) => self.no_schedule(valuation),
             Objection::Broken(broken) => {
-                let example = oracle.counterexample(refused, broken);
+                let example = oracle
+                    .worst_case(refused, broken)
+                    .filter(|worst| self.verdict(worst).is_some())
+                    .or_else(|| oracle.counterexample(refused, broken));
                 self.broken(broken, example)
             }
         }
@@ -190,7 +193,7 @@ impl<'a> Explainer<'a> {
     pub fn requirement(&self, requirement: &Requirement) -> String {
         let plan = &self.plan.plan;
         let Requirement::Separation { first, second } = requirement else {
-            return requirement.describe(self.task, plan);
+            return self.with_names(requirement.describe(self.task, plan));
         };
         let epsilon = self.epsilon.to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
@@ -209,6 +212,15 @@ impl<'a> Explainer<'a> {
                 plan.node_words(self.task, *second),
             ),
         }
+    }
+
+    /// The text with the names of parameters, which a task does not know, for their numbers.
+    fn with_names(&self, mut text: String) -> String {
+        // From the last on: `?parameter1` is the beginning of `?parameter10`.
+        for (index, parameter) in self.plan.parameters.iter().enumerate().rev() {
+            text = text.replace(&format!("?parameter{index}"), &parameter.name);
+        }
+        text
     }
 
     /// A parameter in plain words: `duration of (drive rover depot shelf)`.

@@ -17,9 +17,15 @@ use crate::feasibility::Feasibility;
 #[doc(alias = "CheckInEnvelope")]
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
+    task: &'a Task,
     plan: &'a ParametrizedPlan,
+    epsilon: Rational,
     feasibility: Feasibility,
     soundness: Soundness<'a>,
+    /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
+    around: Valuation,
+    /// How many bad cases had been refuted from scratch before `around` changed last.
+    refuted_before: usize,
     checks: usize,
     without_schedule: usize,
 }
@@ -51,9 +57,13 @@ impl<'a> Oracle<'a> {
                 limit: crate::feasibility::MOST_CORNERS,
             })?;
         Ok(Self {
+            task,
             plan,
+            epsilon: epsilon.clone(),
             feasibility,
             soundness,
+            around: plan.nominal(),
+            refuted_before: 0,
             checks: 0,
             without_schedule: 0,
         })
@@ -76,7 +86,7 @@ impl<'a> Oracle<'a> {
 
     /// How many bad cases have been refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
-        self.soundness.refutations()
+        self.refuted_before + self.soundness.refutations()
     }
 
     /// Why the box is not inside the envelope; `None` if it is.
@@ -101,6 +111,11 @@ impl<'a> Oracle<'a> {
         moved: Option<BoxEnd>,
     ) -> Result<Option<Objection>, Refusal> {
         self.checks += 1;
+        if !envelope.contains(&self.around)
+            && let Some(without_schedule) = self.move_to(envelope)?
+        {
+            return Ok(Some(Objection::NoSchedule(without_schedule)));
+        }
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
         if let Some(broken) = self.soundness.broken(envelope, moved)? {
@@ -111,6 +126,37 @@ impl<'a> Oracle<'a> {
             return Ok(Some(Objection::NoSchedule(valuation)));
         }
         Ok(None)
+    }
+
+    /// Goes by the order that happenings have in the box from now on. The box need not hold the
+    /// nominal values, and elsewhere a plan may work in another order.
+    ///
+    /// Values in the box that have no schedule, if that shows already.
+    fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
+        let nearest = envelope.nearest(&self.plan.nominal());
+        match Soundness::around(self.task, self.plan, &self.epsilon, &nearest) {
+            Ok(soundness) => {
+                self.refuted_before += self.soundness.refutations();
+                self.soundness = soundness;
+                self.around = nearest;
+                Ok(None)
+            }
+            Err(Refusal::NoNominalSchedule) => {
+                self.without_schedule += 1;
+                Ok(Some(nearest))
+            }
+            Err(refusal) => Err(refusal),
+        }
+    }
+
+    /// Values and a schedule in the box that break the obligation by as much as any do; see
+    /// [`Soundness::worst_case`].
+    pub fn worst_case(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        self.soundness.worst_case(envelope, broken)
     }
 
     /// Values and a schedule in the box that show what is broken.

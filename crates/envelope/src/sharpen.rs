@@ -15,9 +15,9 @@ const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 /// The box with each end moved out until it touches its limit: upper before lower, parameter by
 /// parameter, each as far as those before it allow.
 ///
-/// A limit is a fraction, mostly one with a small denominator. Halving encloses it; the simplest
-/// fraction that is enclosed is tried as well, and is the limit as soon as no simpler one is left.
-/// What is returned lies inside the envelope in any case, and less than 10⁻¹² from the limit.
+/// A limit is a fraction, mostly one with a small denominator or few decimals. Halving encloses it;
+/// the simplest fraction and the shortest decimal that are enclosed are tried as well, and one of
+/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope in any case, and less than 10⁻¹² from the limit.
 ///
 /// `envelope` must lie inside the robustness envelope. `on_step` is called after every check and
 /// can end the work at any moment.
@@ -90,14 +90,13 @@ fn push(
     };
     let resolution = Rational::new(RESOLUTION.0, RESOLUTION.1);
     let half = Rational::new(1, 2);
-    let mut halve = true;
+    let mut guesses = (0..3).cycle();
     while &outside - &inside > resolution {
-        let candidate = if halve {
-            &(&inside + &outside) * &half
-        } else {
-            simplest_between(&inside, &outside)
+        let candidate = match guesses.next() {
+            Some(1) => simplest_between(&inside, &outside),
+            Some(2) => shortest_decimal_between(&inside, &outside),
+            _ => &(&inside + &outside) * &half,
         };
-        halve = !halve;
         if accepts(Some(candidate.clone()))? {
             inside = candidate;
         } else {
@@ -148,11 +147,44 @@ fn simplest_between(low: &Rational, high: &Rational) -> Rational {
             .expect("greater than `least`, which is positive")
 }
 
+/// A number with as few decimals as possible strictly between two numbers, `low < high`.
+fn shortest_decimal_between(low: &Rational, high: &Rational) -> Rational {
+    let tenth = Rational::new(1, 10);
+    let mut unit = Rational::ONE;
+    loop {
+        let scaled = low * &unit.reciprocal().expect("a power of ten");
+        let next = (&scaled.floor() + &Rational::ONE) * &unit;
+        if next < *high {
+            return next;
+        }
+        unit = &unit * &tenth;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use elbowroom_num::Rational;
 
-    use super::simplest_between;
+    use super::{shortest_decimal_between, simplest_between};
+
+    #[test]
+    fn the_shortest_decimal_has_no_more_places_than_it_takes() {
+        let between = |low: &str, high: &str| {
+            let number = |text: &str| text.parse::<Rational>().unwrap();
+            let found = shortest_decimal_between(&number(low), &number(high));
+            assert!(number(low) < found && found < number(high));
+            found
+        };
+        let number = |text: &str| text.parse::<Rational>().unwrap();
+        assert_eq!(between("0", "5"), number("1"));
+        assert_eq!(between("-1.5", "-0.2"), number("-1"));
+        assert_eq!(between("-0.5", "-0.2"), number("-0.4"));
+        assert_eq!(between("2.49", "2.51"), number("2.5"));
+        assert_eq!(
+            between("240.3864744559", "240.3864744561"),
+            number("240.386474456")
+        );
+    }
 
     #[test]
     fn the_simplest_fraction_has_the_smallest_denominator() {

@@ -1,4 +1,4 @@
-//! Mistakes that the second oracle found in the first one, each as a small case.
+//! Mistakes found in the box check, most of them by the second oracle, each as a small case.
 
 use elbowroom_envelope::{Objection, Oracle};
 use elbowroom_model::Task;
@@ -257,5 +257,37 @@ fn one_happening_does_not_change_a_number_in_two_ways() {
     assert_eq!(
         given.answer(""),
         "(set) must not change (x) in several ways at once"
+    );
+}
+
+#[test]
+fn a_box_away_from_the_nominal_values_may_have_its_own_order() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(p)",
+        plan: "parameter x default 0;
+               action instance s : (set); action instance l : (look);
+               c: s - .zero in [2, 2]; c: l - .zero in [x, x]; c: l - s in [-inf, 9];",
+        ..Given::default()
+    };
+    let boxes = [
+        "[0, 1]",
+        "[9/4, 11]",
+        "[0, 4]",
+        "[0, 7/4]",
+        "[10, 12]",
+        "[12, 13]",
+    ];
+    assert_eq!(
+        given.answers(&boxes),
+        [
+            "inside",
+            "inside",
+            "(set) must come before (look), by at least ε",
+            "inside",
+            "no schedule",
+            "no schedule"
+        ]
     );
 }

@@ -36,6 +36,23 @@ impl DecoupledEnvelope {
             .all(|(interval, value)| interval.contains(value))
     }
 
+    /// The valuation in this box (not empty) that is closest to another one.
+    #[must_use]
+    pub fn nearest(&self, valuation: &[Rational]) -> Valuation {
+        let clamped = |(interval, value): (&Interval, &Rational)| {
+            let value = match interval.lower.value() {
+                Some(lower) => value.max(lower),
+                None => value,
+            };
+            let value = match interval.upper.value() {
+                Some(upper) => value.min(upper),
+                None => value,
+            };
+            value.clone()
+        };
+        self.intervals.iter().zip(valuation).map(clamped).collect()
+    }
+
     /// Whether every valuation of `other` lies in this box (`other` not empty).
     pub fn includes(&self, other: &Self) -> bool {
         self.intervals

@@ -18,6 +18,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::decoupled::DecoupledEnvelope;
+use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
 use crate::parameter::{ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
@@ -70,7 +71,7 @@ pub struct Counterexample {
 }
 
 impl<'a> Soundness<'a> {
-    /// Compiles a plan's obligations.
+    /// Compiles a plan's obligations for boxes that hold its nominal values.
     ///
     /// # Errors
     /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
@@ -80,10 +81,27 @@ impl<'a> Soundness<'a> {
         plan: &'a ParametrizedPlan,
         epsilon: &Rational,
     ) -> Result<Self, Refusal> {
+        Self::around(task, plan, epsilon, &plan.nominal())
+    }
+
+    /// Compiles a plan's obligations for boxes that hold these values.
+    ///
+    /// Happenings are required to keep the order that they have there. That is no restriction in a
+    /// box with these values in it; in others, a different order may work as well.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), with these values in place of the nominal ones.
+    pub fn around(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &Rational,
+        valuation: &[Rational],
+    ) -> Result<Self, Refusal> {
         let reduction = Reduction::new(plan);
-        let nominal = nominal_schedule(&reduction, plan).ok_or(Refusal::NoNominalSchedule)?;
+        let schedule =
+            earliest_schedule(&reduction, valuation).ok_or(Refusal::NoNominalSchedule)?;
         let obligations =
-            Obligations::compile(task, plan, epsilon, &nominal, &reduction.substitution)?;
+            Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {
@@ -96,7 +114,7 @@ impl<'a> Soundness<'a> {
             }
         }
         for over_all in &obligations.over_all {
-            check_over_all(task, plan, &reduction, over_all, &nominal)?;
+            check_over_all(task, plan, &reduction, over_all, &schedule)?;
         }
         let over_all = vec![None; obligations.over_all.len()];
         Ok(Self {
@@ -231,12 +249,27 @@ impl<'a> Soundness<'a> {
                 bound: too_near.bound.clone(),
                 is_strict: true,
             });
-            let witness = bad_case::witness(&self.reduction, envelope, &near);
+            let witness = bad_case::witness(&self.reduction, envelope, &near, None);
             if witness.is_some() {
                 return witness;
             }
         }
-        bad_case::witness(&self.reduction, envelope, &broken.case)
+        bad_case::witness(&self.reduction, envelope, &broken.case, None)
+    }
+
+    /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
+    /// any does. Two happenings that should be apart may then be so far the wrong way round that
+    /// it does no harm.
+    pub fn worst_case(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        let gap = match broken.requirement {
+            Requirement::Separation { first, second } => Some(Linear::difference(first, second)),
+            _ => None,
+        };
+        bad_case::witness(&self.reduction, envelope, &broken.case, gap.as_ref())
     }
 }
 
@@ -274,9 +307,9 @@ impl<'a> Lazy<'a> {
     }
 }
 
-/// The earliest schedule at the nominal values, by node.
-fn nominal_schedule(reduction: &Reduction, plan: &ParametrizedPlan) -> Option<Vec<Rational>> {
-    let point = DecoupledEnvelope::point(&plan.nominal());
+/// The earliest schedule at these values, by node.
+fn earliest_schedule(reduction: &Reduction, valuation: &[Rational]) -> Option<Vec<Rational>> {
+    let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;
     let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));

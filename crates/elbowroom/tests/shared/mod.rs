@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test uses some of it")]
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
+pub(crate) mod case;
 pub(crate) mod draw;
 pub(crate) mod instances;
 

@@ -365,11 +365,13 @@ pub(crate) fn spread(
     constant
 }
 
-/// Values and a schedule in the box for which the case comes about.
+/// Values and a schedule in the box for which the case comes about. Among these, the ones that
+/// make `least` smallest, or, failing that, break the case's only inequality by most.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
     case: &BadCase,
+    least: Option<&Linear>,
 ) -> Option<Counterexample> {
     let schedules = Schedules::new(reduction, envelope)?;
     let assumed: Vec<_> = case
@@ -382,14 +384,24 @@ pub(crate) fn witness(
         .iter()
         .flat_map(|i| i.expression.multiplied_parameters())
         .collect();
+    let least = |fixed: &'_ [Inequality]| match (least, fixed) {
+        (Some(least), _) => Some(least.clone()),
+        (None, [inequality]) => Some(inequality.expression.clone()),
+        (None, _) => None,
+    };
     schedules
         .corners(&multiplied)
         .into_iter()
         .find_map(|corner| {
             let fixed: Vec<Inequality> =
                 case.inequalities.iter().map(|i| corner.apply(i)).collect();
-            let (class_times, mut valuation) =
-                linear_program::witness(reduction, envelope, &assumed, &fixed)?;
+            let (class_times, mut valuation) = linear_program::witness(
+                reduction,
+                envelope,
+                &assumed,
+                &fixed,
+                least(&fixed).as_ref(),
+            )?;
             for (&parameter, value) in &corner.values {
                 valuation[parameter.index()] = value.clone();
             }

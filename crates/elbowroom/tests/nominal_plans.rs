@@ -1,0 +1,109 @@
+//! Plans of the benchmarks as they are: each is guaranteed, or what it breaks has a name.
+
+#![allow(clippy::print_stdout, reason = "counts are worth seeing")]
+
+mod shared;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use elbowroom_plan::DecoupledEnvelope;
+use shared::case::Case;
+use shared::instances::figure_4;
+
+/// What keeps each plan from being guaranteed, and how often; the empty text for those that are.
+fn verdicts(cases: impl Iterator<Item = (String, Case)>) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::new();
+    for (name, case) in cases {
+        let reason = match case.why_not("") {
+            None => {
+                case.assert_withstands(&DecoupledEnvelope::point(&case.plan.nominal()));
+                String::new()
+            }
+            Some(why_not) => {
+                assert!(!why_not.reason.is_empty(), "{name}: {why_not:?}");
+                println!("{name}: {}", why_not.reason);
+                why_not.reason
+            }
+        };
+        *counts.entry(reason).or_default() += 1;
+    }
+    counts
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("a folder of plans");
+    let mut names: Vec<String> = entries
+        .map(|entry| {
+            entry
+                .expect("readable")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn rigid_auv_plans_are_guaranteed_and_flexible_ones_unless_they_leave_too_little_charge() {
+    let Some(data) = shared::data() else { return };
+    let folder = data.join("envelopes/auv");
+    let read = |name: &String| {
+        let (mission, _) = name.rsplit_once("_var").expect("stn_plan_MISSION_varNN");
+        let mission = mission.trim_start_matches("stn_plan_");
+        let case = Case::read(
+            &folder.join("domains/pandora_domain_strategic_for_validation.pddl"),
+            &folder.join(format!("problems/{mission}.pddl")),
+            &folder.join("stns").join(name),
+        );
+        (name.clone(), case)
+    };
+    // From `var00` to `var09`, ever more durations may be longer.
+    let (rigid, flexible): (Vec<_>, Vec<_>) = names(&folder.join("stns"))
+        .into_iter()
+        .partition(|name| name.ends_with("_var00"));
+    let counts = verdicts(rigid.iter().map(read));
+    assert_eq!(counts, BTreeMap::from([(String::new(), rigid.len())]));
+    let mut counts = verdicts(flexible.iter().map(read));
+    let guaranteed = counts.remove("").unwrap_or(0);
+    let uncharged: usize = counts.values().sum();
+    println!(
+        "{} rigid ones guaranteed; of the flexible ones, {guaranteed}, not {uncharged}",
+        rigid.len()
+    );
+    for reason in counts.keys() {
+        assert!(reason.contains(" needs (>= (charge auv) "), "{reason}");
+    }
+    assert!(rigid.len() >= 20 && guaranteed >= 121 && uncharged >= 59);
+}
+
+#[test]
+fn deliveries_are_guaranteed_or_later_than_a_deadline_with_a_name() {
+    let Some(data) = shared::data() else { return };
+    let cases = figure_4(&data).into_iter().map(|instance| {
+        let case = Case::read(&instance.domain, &instance.problem, &instance.plan);
+        (instance.name, case)
+    });
+    // In some files there is no plan.
+    let (cases, empty): (Vec<_>, Vec<_>) =
+        cases.partition(|(_, case)| !case.plan.plan.instances.is_empty());
+    let mut counts = verdicts(cases.into_iter());
+    let guaranteed = counts.remove("").unwrap_or(0);
+    let late: usize = counts.values().sum();
+    println!(
+        "{guaranteed} guaranteed, {late} late, {} empty",
+        empty.len()
+    );
+    for reason in counts.keys() {
+        assert!(
+            reason.starts_with("deadline of (delivery_destination "),
+            "{reason}"
+        );
+    }
+    for reason in verdicts(empty.into_iter()).keys() {
+        assert!(reason.starts_with("the goal "), "{reason}");
+    }
+    assert!(guaranteed >= 29 && late >= 13);
+}

@@ -1,0 +1,135 @@
+//! An STN plan with its problem, and what the library says of it.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use elbowroom::{Explainer, Explanation, parse_box, write_box};
+use elbowroom_envelope::{Objection, Oracle, Settings, irr, sharpen};
+use elbowroom_model::validate::{self, validate};
+use elbowroom_model::{Task, Verdict};
+use elbowroom_num::Rational;
+use elbowroom_plan::obligations::Requirement;
+use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan, format};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::draw;
+
+/// An STN plan with its problem.
+pub(crate) struct Case {
+    pub(crate) task: Task,
+    pub(crate) plan: ParametrizedPlan,
+}
+
+/// The least separation in all of the authors' runs.
+pub(crate) fn epsilon() -> Rational {
+    Rational::new(1, 1000)
+}
+
+pub(crate) fn number(text: &str) -> Rational {
+    text.parse()
+        .unwrap_or_else(|_| panic!("`{text}` is no number"))
+}
+
+impl Case {
+    /// Reads a plan file.
+    pub(crate) fn read(domain: &Path, problem: &Path, plan: &Path) -> Self {
+        let text = std::fs::read_to_string(plan)
+            .unwrap_or_else(|error| panic!("{}: {error}", plan.display()));
+        Self::of_text(domain, problem, &text)
+    }
+
+    /// Reads a plan.
+    pub(crate) fn of_text(domain: &Path, problem: &Path, plan: &str) -> Self {
+        let mut task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
+        let plan =
+            format::read(plan.as_bytes(), &mut task).unwrap_or_else(|error| panic!("{error}"));
+        Self { task, plan }
+    }
+
+    pub(crate) fn oracle(&self) -> Oracle<'_> {
+        Oracle::new(&self.task, &self.plan, &epsilon()).expect("within reach")
+    }
+
+    /// Whether the plan works everywhere in the box (`dur_0=[7/4,9]`; what is left out is nominal).
+    pub(crate) fn has_inside(&self, text: &str) -> bool {
+        self.why_not(text).is_none()
+    }
+
+    /// Why the plan does not work everywhere in the box.
+    ///
+    /// Where there is a schedule, and the judge can be asked, it must object as well.
+    pub(crate) fn why_not(&self, text: &str) -> Option<Explanation> {
+        let envelope = parse_box(text, &self.plan).expect("a box of this plan");
+        let (objection, explanation) = self.objection(&envelope)?;
+        let is_askable = self.plan.parameters.iter().all(|parameter| {
+            matches!(
+                parameter.kind,
+                ParameterKind::Duration(_) | ParameterKind::Constant(_) | ParameterKind::Bound
+            )
+        });
+        if is_askable && matches!(objection, Objection::Broken(_)) {
+            assert!(explanation.verdict.is_some(), "{text}: {explanation:?}");
+        }
+        Some(explanation)
+    }
+
+    /// What is broken at the nominal values.
+    pub(crate) fn broken(&self) -> Option<Requirement> {
+        match self.objection(&DecoupledEnvelope::point(&self.plan.nominal()))? {
+            (Objection::Broken(broken), _) => Some(broken.requirement),
+            (Objection::NoSchedule(_), explanation) => panic!("{explanation:?}"),
+        }
+    }
+
+    fn objection(&self, envelope: &DecoupledEnvelope) -> Option<(Objection, Explanation)> {
+        let mut oracle = self.oracle();
+        let objection = oracle.objection(envelope).expect("within reach")?;
+        let epsilon = epsilon();
+        let explainer = Explainer::new(&self.task, &self.plan, &epsilon);
+        let explanation = explainer.objection(&oracle, envelope, &objection);
+        Some((objection, explanation))
+    }
+
+    /// The box that the authors' search finds at this precision, and that box with all ends moved
+    /// onto their limits. Samples of both have passed the judge.
+    pub(crate) fn found(&self, precision: &str) -> [DecoupledEnvelope; 2] {
+        let settings = Settings {
+            precision: number(precision),
+            ..Settings::default()
+        };
+        let mut oracle = self.oracle();
+        let run =
+            irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).expect("within reach");
+        let envelope = run.envelope.expect("the start point is inside");
+        let sharp = sharpen(&mut oracle, &envelope, &mut || ControlFlow::Continue(()))
+            .expect("within reach");
+        assert!(sharp.includes(&envelope));
+        self.assert_withstands(&envelope);
+        self.assert_withstands(&sharp);
+        [envelope, sharp]
+    }
+
+    /// The box with its ends on their limits, as text.
+    pub(crate) fn limits(&self) -> String {
+        let [_, sharp] = self.found("1");
+        write_box(&sharp, &self.plan)
+    }
+
+    /// Random values in the box, random schedules for them: the judge must accept all.
+    pub(crate) fn assert_withstands(&self, envelope: &DecoupledEnvelope) {
+        const SAMPLES: usize = 20;
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..SAMPLES {
+            let valuation = draw::valuation(envelope, &mut rng);
+            let schedule = draw::schedule(&self.plan.plan, &valuation, &mut rng)
+                .unwrap_or_else(|| panic!("no schedule at {valuation:?}"));
+            let fixed = self.plan.plan.at(&valuation).scheduled(&schedule);
+            let verdict = validate(&self.task, &fixed, &validate::Settings::default());
+            assert!(
+                matches!(verdict, Verdict::Valid(_)),
+                "{valuation:?} {verdict:?}"
+            );
+        }
+    }
+}
