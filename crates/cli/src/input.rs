@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::PlanKind;
+use elbowroom::flow::Freed;
 use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::ParametrizedPlan;
@@ -14,7 +15,7 @@ use elbowroom::plan::format::{self, FormatErrors};
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
-use crate::look::{BAD, styled};
+use crate::look::{BAD, HINT, styled};
 use crate::output::{self, plain};
 
 /// Larger than any plan or problem, smaller than memory.
@@ -47,6 +48,19 @@ pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure>
     }
     let plan = with_warnings(pddl::read_plan(&text, task))?;
     Ok(AnyPlan::TimeTriggered(plan))
+}
+
+/// Says on standard error if not the plan's own times are taken, but valid ones close to them.
+pub(crate) fn tell_repair(path: &Path, freed: &Freed) {
+    if let Some(violation) = &freed.repaired {
+        output::tell(&format!(
+            "{}: {} is not valid as it stands, perhaps because its times are rounded\n  \
+             {violation}\n  {}: times close to these, which are valid, are taken instead",
+            styled(HINT, "warning"),
+            path.display(),
+            styled(HINT, "note"),
+        ));
+    }
 }
 
 /// The mistakes in an STN plan file, with excerpts.

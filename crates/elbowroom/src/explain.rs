@@ -77,7 +77,10 @@ impl<'a> Explainer<'a> {
         match objection {
             Objection::NoSchedule(valuation) => self.no_schedule(valuation),
             Objection::Broken(broken) => {
-                let example = oracle.counterexample(refused, broken);
+                let example = oracle
+                    .worst_case(refused, broken)
+                    .filter(|worst| self.verdict(worst).is_some())
+                    .or_else(|| oracle.counterexample(refused, broken));
                 self.broken(broken, example)
             }
         }

@@ -82,6 +82,16 @@ pub fn robust_plan(
     Ok(RobustPlan { plan, run })
 }
 
+/// A plan with only the orderings and bounds that it needs.
+#[derive(Clone, Debug)]
+pub struct Freed {
+    /// The plan, and a schedule of it.
+    pub deordered: Deordered,
+    /// What the judge objects to in the times of the original plan, if the schedule is not the
+    /// original one but close to it.
+    pub repaired: Option<Box<validate::Violation>>,
+}
+
 /// The plan with only the orderings and bounds that it needs.
 ///
 /// Planners round their times, and the judge forgives nothing. If it rejects the plan, but the
@@ -93,18 +103,24 @@ pub fn free(
     task: &Task,
     time_triggered: &TimeTriggeredPlan,
     epsilon: &Rational,
-) -> Result<Deordered, FlowError> {
+) -> Result<Freed, FlowError> {
     let settings = deorder::Settings {
         epsilon: epsilon.clone(),
     };
     let Verdict::Invalid(violation) = judge(task, time_triggered, epsilon) else {
-        return Ok(deorder(task, time_triggered, &settings)?);
+        return Ok(Freed {
+            deordered: deorder(task, time_triggered, &settings)?,
+            repaired: None,
+        });
     };
+    let violation = Box::new(violation);
+    let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal), epsilon).is_valid();
     match deorder(task, time_triggered, &settings) {
-        Ok(freed) if judge(task, &freed.plan.scheduled(&freed.nominal), epsilon).is_valid() => {
-            Ok(freed)
-        }
-        _ => Err(FlowError::Invalid(Box::new(violation))),
+        Ok(deordered) if works(&deordered) => Ok(Freed {
+            deordered,
+            repaired: Some(violation),
+        }),
+        _ => Err(FlowError::Invalid(violation)),
     }
 }
 
@@ -116,19 +132,21 @@ pub fn free(
 /// When `specs` names what the plan does not have.
 pub fn open(
     task: &Task,
-    freed: Deordered,
+    freed: Freed,
     specs: &[VarySpec],
     epsilon: &Rational,
 ) -> Result<ParametrizedPlan, FlowError> {
-    let plan = parametrize(task, freed.plan, &freed.nominal, specs)?;
-    Ok(pinned(task, plan, &freed.nominal, epsilon))
+    let Deordered { plan, nominal } = freed.deordered;
+    let plan = parametrize(task, plan, &nominal, specs)?;
+    Ok(pinned(task, plan, &nominal, epsilon))
 }
 
 /// The plan with nothing left open. Where needed, differences of times are fixed so that every
 /// schedule works.
-pub fn closed(task: &Task, freed: Deordered, epsilon: &Rational) -> ParametrizedPlan {
-    let plan = ParametrizedPlan::closed(task, freed.plan);
-    pinned(task, plan, &freed.nominal, epsilon)
+pub fn closed(task: &Task, freed: Freed, epsilon: &Rational) -> ParametrizedPlan {
+    let Deordered { plan, nominal } = freed.deordered;
+    let plan = ParametrizedPlan::closed(task, plan);
+    pinned(task, plan, &nominal, epsilon)
 }
 
 /// An STN plan, which may have parameters already, with more left open.
@@ -205,8 +223,9 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     }
     // The moment inside an over-all condition is no node of the plan.
     nodes.retain(|node| node.index() < count);
-    if let Requirement::Condition { node, .. } | Requirement::Defined { node, .. } =
-        broken.requirement
+    if let Requirement::Condition { node, .. }
+    | Requirement::Defined { node, .. }
+    | Requirement::OneUpdate { node, .. } = broken.requirement
     {
         nodes.push(node);
     }

@@ -93,8 +93,9 @@ fn pinned(task: &Task, deordered: &Deordered, epsilon: &Rational) -> Result<StnP
                     nodes.extend(inequality.expression.times.keys());
                 }
                 nodes.retain(|node| node.index() < plan.nodes.len());
-                if let Requirement::Condition { node, .. } | Requirement::Defined { node, .. } =
-                    broken.requirement
+                if let Requirement::Condition { node, .. }
+                | Requirement::Defined { node, .. }
+                | Requirement::OneUpdate { node, .. } = broken.requirement
                 {
                     nodes.push(node);
                 }

@@ -149,6 +149,16 @@ impl<'a> Oracle<'a> {
         }
     }
 
+    /// Values and a schedule in the box that break the obligation by as much as any do; see
+    /// [`Soundness::worst_case`].
+    pub fn worst_case(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        self.soundness.worst_case(envelope, broken)
+    }
+
     /// Values and a schedule in the box that show what is broken.
     pub fn counterexample(
         &self,

@@ -4,6 +4,7 @@ use elbowroom_envelope::{Objection, Oracle};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{Source, read_problem};
+use elbowroom_plan::obligations::Refusal;
 use elbowroom_plan::parametrize::vary;
 use elbowroom_plan::soundness::Counterexample;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
@@ -13,7 +14,8 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 struct Given<'a> {
     /// `:synth-parameters` and actions.
     domain: &'a str,
-    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5.
+    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5, `(z)`
+    /// has no value.
     init: &'a str,
     /// The goal; `(and)` if empty.
     goal: &'a str,
@@ -26,7 +28,7 @@ struct Given<'a> {
 impl Given<'_> {
     fn task_and_plan(&self) -> (Task, ParametrizedPlan) {
         let domain = format!(
-            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y)) {})",
+            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
             self.domain
         );
         let goal = if self.goal.is_empty() {
@@ -172,6 +174,90 @@ fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
     let found = given.counterexample("[1, inf]");
     let duration = &found.moment.unwrap() - &found.schedule[1];
     assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
+}
+
+#[test]
+fn a_parameter_that_bounds_a_time_and_stands_in_an_effect_is_one_quantity() {
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action burn :parameters () :duration (>= ?duration 0)
+                    :effect (and (at start (increase (x) ?s))
+                                 (at end (decrease (x) ?duration))))",
+        goal: "(>= (x) 5)",
+        plan: "parameter ?s default 3; durative-action instance n : (burn);
+               c: n.end - n.start in [1, ?s];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer("[1, 4]"), "inside");
+}
+
+#[test]
+fn two_numbers_that_a_parameter_multiplies_are_not_decided_at_corners() {
+    // At the end (x) is 5 + 3s and (y) is 5 - 3s: the condition fails for s = 1, not for 0 and 2.
+    let given = Given {
+        domain: "(:synth-parameters ?s)
+                 (:durative-action mix :parameters () :duration (= ?duration 3)
+                    :condition (over all (not (and (> (x) 7.5) (> (y) 1.5))))
+                    :effect (and (increase (x) (* #t ?s)) (decrease (y) (* #t ?s))))",
+        plan: "parameter ?s default 0; durative-action instance n : (mix);
+               c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    let (task, plan) = given.task_and_plan();
+    let refusal = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap_err();
+    assert_eq!(
+        refusal,
+        Refusal::Coupled {
+            name: "?s".to_owned()
+        }
+    );
+}
+
+#[test]
+fn a_condition_that_says_nothing_does_not_hold_and_its_opposite_neither() {
+    let with = |condition: &str| {
+        let domain =
+            format!("(:action look :parameters () :precondition {condition} :effect (and))");
+        let given = Given {
+            domain: &domain,
+            init: "(p)",
+            plan: "action instance l : (look);",
+            ..Given::default()
+        };
+        given.answer("")
+    };
+    assert_eq!(with("(< (z) 1)"), "(look) needs (< (z) 1)");
+    assert_eq!(with("(not (< (z) 1))"), "(look) needs (not (< (z) 1))");
+    assert_eq!(with("(or (p) (< (z) 1))"), "inside");
+    assert_eq!(with("(not (and (not (p)) (< (z) 1)))"), "inside");
+}
+
+#[test]
+fn what_changes_continuously_must_have_a_value() {
+    let given = Given {
+        domain: "(:durative-action fill :parameters () :duration (= ?duration 3)
+                    :effect (increase (z) (* #t 1)))",
+        plan: "durative-action instance n : (fill); c: n.end - n.start in [3, 3];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answer(""),
+        "start of (fill) needs a number that has no value"
+    );
+}
+
+#[test]
+fn one_happening_does_not_change_a_number_in_two_ways() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and)
+                    :effect (and (assign (x) 3) (increase (x) 1)))",
+        plan: "action instance s : (set);",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answer(""),
+        "(set) must not change (x) in several ways at once"
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
 //! set, so if two interfering happenings are at least ε apart in all of them, one always comes
 //! first. The separation itself is an obligation; where it holds, every value that a happening
-//! reads is one fixed expression in times and parameters (paper 1's enc_eff without its
+//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
 //! disjunctions). What remains undecided is only which commuting happenings come before a moment
 //! *inside* an action, where its over-all condition is read ([`OverAll`]).
 //!
@@ -18,7 +18,7 @@ mod separation;
 mod timeline;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::Condition;
+use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::Rational;
 
 use crate::linear::Linear;
@@ -126,6 +126,14 @@ pub enum Requirement {
     Defined {
         /// Where it is needed.
         node: NodeId,
+    },
+    /// A happening changes a fluent in one way only, unless all it does is to increase and
+    /// decrease it.
+    OneUpdate {
+        /// The happening.
+        node: NodeId,
+        /// The fluent.
+        fluent: FluentId,
     },
     /// The goal holds at the end.
     Goal {
@@ -236,6 +244,13 @@ impl Requirement {
                 format!(
                     "{} needs a number that has no value",
                     plan.node_words(task, *node)
+                )
+            }
+            Self::OneUpdate { node, fluent } => {
+                format!(
+                    "{} must not change {} in several ways at once",
+                    plan.node_words(task, *node),
+                    task.fluent_name(*fluent)
                 )
             }
             Self::Goal { condition } => {

@@ -9,7 +9,7 @@ use elbowroom_stn::{
 };
 
 use crate::decoupled::DecoupledEnvelope;
-use crate::obligations::Substitution;
+use crate::obligations::{BadCase, Substitution};
 use crate::parameter::{ParameterId, ParametrizedPlan};
 use crate::stn_plan::{Bound, NodeId};
 
@@ -211,6 +211,17 @@ impl Reduction {
     /// Whether the parameter bounds a difference of times.
     pub fn is_in_network(&self, parameter: ParameterId) -> bool {
         self.substitution.contains_key(&parameter) || self.is_mentioned(parameter)
+    }
+
+    /// A parameter in a product that the corners of a box say nothing about.
+    ///
+    /// Products are exact only one inequality at a time, and only if the multiplied parameter does
+    /// not also move the times.
+    pub(crate) fn undecided_at_corners(&self, case: &BadCase) -> Option<ParameterId> {
+        let inequalities = case.inequalities.iter();
+        let mut multiplied =
+            inequalities.flat_map(|inequality| inequality.expression.multiplied_parameters());
+        multiplied.find(|&id| case.inequalities.len() > 1 || self.is_in_network(id))
     }
 
     /// Adds `to - from <= constant + reach(end)`.

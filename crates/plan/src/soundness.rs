@@ -13,16 +13,16 @@ mod flow;
 mod linear_program;
 mod proof;
 
-use std::collections::BTreeMap;
-
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::decoupled::DecoupledEnvelope;
-use crate::obligations::{BadCase, Difference, Obligations, Refusal, Requirement};
-use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
+use crate::linear::Linear;
+use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
+use crate::parameter::{ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
+use crate::stn_plan::NodeId;
 use bad_case::{Outcome, Schedules};
 use certificate::Certificate;
 use proof::{Proof, Prover};
@@ -113,6 +113,9 @@ impl<'a> Soundness<'a> {
                 });
             }
         }
+        for over_all in &obligations.over_all {
+            check_over_all(task, plan, &reduction, over_all, &schedule)?;
+        }
         let over_all = vec![None; obligations.over_all.len()];
         Ok(Self {
             task,
@@ -162,11 +165,7 @@ impl<'a> Soundness<'a> {
             refutations,
             ..
         } = self;
-        let mut schedules = Lazy {
-            reduction,
-            envelope,
-            schedules: None,
-        };
+        let mut schedules = Lazy::Unmade(reduction, envelope);
         let first = (*suspect).min(direct.len());
         let mut found = None;
         for index in (first..direct.len()).chain(0..first) {
@@ -194,6 +193,11 @@ impl<'a> Soundness<'a> {
                         return Ok(found);
                     }
                 }
+                Outcome::Unknown(parameter) => {
+                    return Err(Refusal::Coupled {
+                        name: self.plan.parameter(parameter).name.clone(),
+                    });
+                }
             }
         }
         if found.is_some() {
@@ -210,7 +214,7 @@ impl<'a> Soundness<'a> {
                 return Ok(None);
             };
             *refutations += 1;
-            let mut prover = Prover::new(self.task, &self.plan.plan, over_all, schedules);
+            let mut prover = Prover::new(self.task, self.plan, over_all, schedules);
             match prover.prove(proof.as_ref(), moved)? {
                 Ok(found) => *proof = Some(found),
                 Err(case) => {
@@ -245,12 +249,27 @@ impl<'a> Soundness<'a> {
                 bound: too_near.bound.clone(),
                 is_strict: true,
             });
-            let witness = bad_case::witness(&self.reduction, envelope, &near);
+            let witness = bad_case::witness(&self.reduction, envelope, &near, None);
             if witness.is_some() {
                 return witness;
             }
         }
-        bad_case::witness(&self.reduction, envelope, &broken.case)
+        bad_case::witness(&self.reduction, envelope, &broken.case, None)
+    }
+
+    /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
+    /// any does. Two happenings that should be apart may then be so far the wrong way round that
+    /// it does no harm.
+    pub fn worst_case(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        let gap = match broken.requirement {
+            Requirement::Separation { first, second } => Some(Linear::difference(first, second)),
+            _ => None,
+        };
+        bad_case::witness(&self.reduction, envelope, &broken.case, gap.as_ref())
     }
 }
 
@@ -268,18 +287,23 @@ impl DirectCase {
 }
 
 /// The network of a box, made when first needed.
-struct Lazy<'a> {
-    reduction: &'a Reduction,
-    envelope: &'a DecoupledEnvelope,
-    schedules: Option<Option<Schedules<'a>>>,
+enum Lazy<'a> {
+    Unmade(&'a Reduction, &'a DecoupledEnvelope),
+    Made(Schedules<'a>),
+    /// The box has no schedule at all: then none is bad.
+    Empty,
 }
 
 impl<'a> Lazy<'a> {
-    /// `None` if the box has no schedule at all: then none is bad.
+    /// `None` if the box has no schedule at all.
     fn get(&mut self) -> Option<&mut Schedules<'a>> {
-        self.schedules
-            .get_or_insert_with(|| Schedules::new(self.reduction, self.envelope))
-            .as_mut()
+        if let Self::Unmade(reduction, envelope) = *self {
+            *self = Schedules::new(reduction, envelope).map_or(Self::Empty, Self::Made);
+        }
+        match self {
+            Self::Made(schedules) => Some(schedules),
+            Self::Unmade(..) | Self::Empty => None,
+        }
     }
 }
 
@@ -304,21 +328,44 @@ fn check_products(
     reduction: &Reduction,
     case: &BadCase,
 ) -> Result<(), Refusal> {
-    let multiplied: BTreeMap<ParameterId, ()> = case
-        .inequalities
-        .iter()
-        .flat_map(|inequality| {
-            inequality
-                .expression
-                .multiplied_parameters()
-                .map(|id| (id, ()))
-        })
-        .collect();
-    for &parameter in multiplied.keys() {
-        if reduction.is_in_network(parameter) || case.inequalities.len() > 1 {
-            return Err(Refusal::Coupled {
-                name: plan.parameter(parameter).name.clone(),
-            });
+    match reduction.undecided_at_corners(case) {
+        Some(parameter) => Err(Refusal::Coupled {
+            name: plan.parameter(parameter).name.clone(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The same for an over-all condition, read at any place of its moment among the events of the
+/// nominal schedule. Other places come to light with a box.
+fn check_over_all(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    reduction: &Reduction,
+    over_all: &OverAll,
+    nominal: &[Rational],
+) -> Result<(), Refusal> {
+    let (start, end) = (
+        &nominal[over_all.start.index()],
+        &nominal[over_all.end.index()],
+    );
+    let mut moments = vec![start];
+    moments.extend(
+        over_all
+            .events
+            .iter()
+            .map(|event| &nominal[event.index()])
+            .filter(|&time| time > start && time < end),
+    );
+    for moment in moments {
+        let cut = |node: NodeId| nominal[node.index()] <= *moment;
+        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+            inequalities.extend(over_all.assumptions.iter().cloned());
+            let case = BadCase {
+                differences: Vec::new(),
+                inequalities,
+            };
+            check_products(plan, reduction, &case)?;
         }
     }
     Ok(())

@@ -29,7 +29,10 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     let plan = match input::any_plan(&mut task, &arguments.plan)? {
         AnyPlan::Stn(plan) => flow::open_more(&task, plan, &specs).map_err(failure)?,
         AnyPlan::TimeTriggered(plan) => match flow::free(&task, &plan, epsilon) {
-            Ok(freed) => flow::open(&task, freed, &specs, epsilon).map_err(failure)?,
+            Ok(freed) => {
+                input::tell_repair(&arguments.plan, &freed);
+                flow::open(&task, freed, &specs, epsilon).map_err(failure)?
+            }
             Err(FlowError::Invalid(violation)) => {
                 return fails::judged_invalid(arguments, &task, &violation);
             }

@@ -21,7 +21,10 @@ pub(crate) fn run(arguments: &StnArgs) -> Answer {
     let plan = match input::any_plan(&mut task, &arguments.plan)? {
         AnyPlan::Stn(plan) => plan,
         AnyPlan::TimeTriggered(plan) => match flow::free(&task, &plan, &arguments.epsilon) {
-            Ok(freed) => flow::closed(&task, freed, &arguments.epsilon),
+            Ok(freed) => {
+                input::tell_repair(&arguments.plan, &freed);
+                flow::closed(&task, freed, &arguments.epsilon)
+            }
             Err(FlowError::Invalid(violation)) => {
                 return invalid(arguments, &violation);
             }

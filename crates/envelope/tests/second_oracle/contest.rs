@@ -321,12 +321,11 @@ impl Contest<'_> {
         if !self.is_schedule(valuation, schedule) {
             return self.mismatch("counterexample is no schedule", envelope, &details);
         }
-        if let Requirement::Separation { first, second } = broken.requirement {
-            let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
-            if is_timed(first) && is_timed(second) {
-                self.tally.count("timed initials too near");
-                return Ok(());
-            }
+        if let Requirement::Separation { first, second } = broken.requirement
+            && self.is_only_timed(first, second, schedule)
+        {
+            self.tally.count("timed initials too near");
+            return Ok(());
         }
         match self.case.judge(valuation, schedule) {
             Verdict::Valid(_) => self.mismatch("counterexample is valid", envelope, &details),
@@ -339,6 +338,19 @@ impl Contest<'_> {
                 Ok(())
             }
         }
+    }
+
+    /// The judge does not mind how near a timed initial is to another one, or to the last action
+    /// before it.
+    fn is_only_timed(&self, first: NodeId, second: NodeId, schedule: &[Rational]) -> bool {
+        let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
+        let nodes = self.plan.plan.nodes().skip(1);
+        let last = nodes
+            .filter(|(id, _)| !is_timed(*id))
+            .map(|(id, _)| &schedule[id.index()])
+            .max();
+        (is_timed(first) && is_timed(second))
+            || (is_timed(second) && last < Some(&schedule[second.index()]))
     }
 
     fn is_schedule(&self, valuation: &[Rational], schedule: &[Rational]) -> bool {
@@ -388,7 +400,7 @@ impl Contest<'_> {
             Ok(Answer::Broken(found)) => {
                 if !self.is_schedule(&found.valuation, &found.schedule)
                     || !envelope.contains(&found.valuation)
-                    || (!found.is_between_timed
+                    || (!found.is_only_timed
                         && self
                             .case
                             .judge(&found.valuation, &found.schedule)

@@ -36,7 +36,7 @@ pub(crate) fn generate(seed: u64) -> Generated {
 
 /// Nothing if the happenings as drawn get in each other's way.
 fn attempt(dice: &mut Dice) -> Option<Generated> {
-    let mut case = Case {
+    let case = Case {
         problem: skeleton(dice),
         gaps: Vec::new(),
         parameters: Vec::new(),

@@ -38,8 +38,9 @@ pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
     pub(crate) schedule: Vec<Rational>,
-    /// Only two timed initials are too near to each other, which the judge does not mind.
-    pub(crate) is_between_timed: bool,
+    /// It is only that a timed initial is too near to another one, or to an action from after the
+    /// end of the plan. The judge does not mind.
+    pub(crate) is_only_timed: bool,
 }
 
 /// No answer.
@@ -331,7 +332,7 @@ impl<'a> Search<'a> {
             what,
             valuation,
             schedule,
-            is_between_timed: false,
+            is_only_timed: false,
         });
     }
 
@@ -378,7 +379,9 @@ impl<'a> Search<'a> {
                 .ok_or(Trouble::GaveUp(GaveUp::TooManyOrders))?;
             let mut world = world.clone();
             self.pass(&mut world, group[0])?;
-            self.arrive(world, group)?;
+            if self.found.is_none() {
+                self.arrive(world, group)?;
+            }
         }
         self.system.pop();
         Ok(())
@@ -389,7 +392,14 @@ impl<'a> Search<'a> {
         let Some(&last) = world.last.first() else {
             return Ok(());
         };
-        let rates = self.rates(world)?;
+        let rates = self.rates(world)?.into_iter().map(|(fluent, rate)| {
+            let value = world.values[fluent.index()].as_ref();
+            Some((fluent, rate.zip(value)?.0))
+        });
+        let Some(rates) = rates.collect::<Option<Vec<_>>>() else {
+            self.report("no value to change, or no rate".to_owned());
+            return Ok(());
+        };
         let moved = |moment: Symbol| {
             let elapsed = Polynomial::difference(Symbol::Time(last), moment);
             let mut values = world.values.clone();
@@ -429,7 +439,7 @@ impl<'a> Search<'a> {
     }
 
     /// The rates of the continuous effects at work.
-    fn rates(&self, world: &World) -> Result<Vec<(FluentId, Polynomial)>, Trouble> {
+    fn rates(&self, world: &World) -> Result<Vec<(FluentId, Option<Polynomial>)>, Trouble> {
         let mut rates = Vec::new();
         let mut moving = BTreeSet::new();
         let mut read = BTreeSet::new();
@@ -442,7 +452,6 @@ impl<'a> Search<'a> {
             let continuous = self.durative(id).continuous.iter();
             for (effect, _) in continuous.zip(&running.continuous).filter(|(_, on)| **on) {
                 let rate = self.value(&effect.rate, &context)?;
-                let rate = rate.ok_or(Trouble::GaveUp(GaveUp::NotCovered))?;
                 effect.rate.visit_fluents(&mut |fluent| {
                     read.insert(fluent);
                 });
@@ -593,9 +602,23 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
+    /// Timed initials after the last action keep away from it as well.
+    fn separate_later(&mut self, world: &World) -> Step {
+        for (position, &node) in world.remaining.iter().enumerate() {
+            if self.found.is_some() {
+                return Ok(());
+            }
+            let mut others = world.clone();
+            others.placed.extend(&world.remaining[..position]);
+            self.separate(&others, &[node])?;
+            self.mark_timed();
+        }
+        Ok(())
+    }
+
     fn mark_timed(&mut self) {
         if let Some(found) = &mut self.found {
-            found.is_between_timed = true;
+            found.is_only_timed = true;
         }
     }
 
@@ -770,7 +793,8 @@ impl<'a> Search<'a> {
                 duration: None,
             };
             let goal = &self.plan.goal;
-            return self.require(goal, &context, "goal");
+            self.require(goal, &context, "goal")?;
+            return self.separate_later(&world);
         }
         self.next_groups(&world, &mut Vec::new(), 0)
     }
@@ -813,7 +837,16 @@ impl<'a> Search<'a> {
             Node::Start(id) => &self.durative(id).start.effects,
             Node::End(id) => &self.durative(id).end.effects,
         };
-        let happens = |index: usize| outcomes.get(&(node, Part::Now, index)) == Some(&true);
+        // Of an action that takes no time, the guards read at the start are in the same group.
+        let is_off = |index: usize| match self.node(node) {
+            Node::End(id) => {
+                let start = self.plan.plan.start(id).index();
+                outcomes.get(&(start, Part::EndEffect, index)) == Some(&false)
+            }
+            _ => false,
+        };
+        let happens =
+            |index: usize| outcomes.get(&(node, Part::Now, index)) == Some(&true) && !is_off(index);
         let effects = effects.iter().enumerate();
         effects
             .filter(|(index, _)| happens(*index))

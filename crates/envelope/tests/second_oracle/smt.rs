@@ -468,19 +468,6 @@ impl<'a> Encoder<'a> {
         Ok(())
     }
 
-    /// The time of the last action is at least that of the node.
-    fn is_in_plan(&self, node: usize) -> String {
-        if !matches!(self.node(node), Node::Timed(_)) {
-            return "true".to_owned();
-        }
-        let later: Vec<_> = self
-            .nodes()
-            .filter(|&other| !matches!(self.node(other), Node::Timed(_)))
-            .map(|other| format!("(>= t{other} t{node})"))
-            .collect();
-        or(&later)
-    }
-
     fn separation(&mut self) {
         let epsilon = number(self.epsilon);
         for node in self.nodes() {
@@ -489,7 +476,6 @@ impl<'a> Encoder<'a> {
                 if !left.interferes_with(&right) {
                     continue;
                 }
-                let both = and(&[self.is_in_plan(node), self.is_in_plan(other)]);
                 let near = match (self.node(node), self.node(other)) {
                     (Node::Timed(_), Node::Timed(_)) => {
                         if !self.is_open(node) && !self.is_open(other) {
@@ -502,7 +488,7 @@ impl<'a> Encoder<'a> {
                         "(and (< (- t{node} t{other}) {epsilon}) (< (- t{other} t{node}) {epsilon}))"
                     ),
                 };
-                self.violations.push(format!("(and {both} {near})"));
+                self.violations.push(near);
             }
         }
     }

@@ -4,16 +4,20 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Body, Change, Condition, Effect, SnapAction};
+use elbowroom_model::ground::{
+    Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
+};
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 use elbowroom_num::Rational;
 
-use super::dnf::{Alternatives, compared};
-use super::goal::goal_cases;
+use super::dnf::{Alternatives, Wanted, compared};
+use super::goal::{goal_cases, lasts};
 use super::over_all::literal_cases;
 use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
-use super::{BadCase, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution};
+use super::{
+    BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
+};
 use crate::linear::Linear;
 use crate::parameter::{ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{InstanceId, Node, NodeId};
@@ -106,7 +110,7 @@ struct Compiler<'a> {
 impl Compiler<'_> {
     fn follow(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
         while let Some(&node) = self.order.get(run.position) {
-            if let Some(split) = self.decide_guards(&mut run, node)? {
+            if let Some(split) = self.decide_guards(&mut run, node, obligations)? {
                 return Ok(Progress::Split(split));
             }
             self.happen(&mut run, node, obligations)?;
@@ -117,14 +121,32 @@ impl Compiler<'_> {
     }
 
     /// Settles every guard that is read at the node; `Some` if one can turn out either way.
-    fn decide_guards(&self, run: &mut Run, node: NodeId) -> Result<Option<Vec<Run>>, Refusal> {
+    fn decide_guards(
+        &self,
+        run: &mut Run,
+        node: NodeId,
+        obligations: &mut Obligations,
+    ) -> Result<Option<Vec<Run>>, Refusal> {
         for (id, guard) in self.guards_read_at(node)? {
             if run.outcomes.contains_key(&id) {
                 continue;
             }
+            let (instance, index, _) = id;
+            if run.outcomes.get(&(instance, index, GuardPart::AtStart)) == Some(&false) {
+                // The effect will not come about, whatever else its guard says.
+                run.outcomes.insert(id, false);
+                continue;
+            }
             let reading = self.reading(&run.timeline, node);
-            let held = reading.alternatives(guard, true)?;
-            let broken = reading.alternatives(guard, false)?;
+            let held = reading.alternatives(guard, Wanted::True)?;
+            let broken = reading.alternatives(guard, Wanted::False)?;
+            let silent = reading.silent(guard)?;
+            oblige(
+                obligations,
+                Requirement::Defined { node },
+                &run.timeline,
+                silent,
+            );
             if broken.is_empty() {
                 run.outcomes.insert(id, true);
             } else if held.is_empty() {
@@ -228,10 +250,17 @@ impl Compiler<'_> {
                     }
                 };
                 self.require(run, node, snap, obligations)?;
-                let effects = self.effects(run, id, 0, &snap.effects);
+                let effects = effects(run, id, 0, &snap.effects);
                 let drifts = self.drifts(run, node, id)?;
                 self.apply(run, node, effects.into_iter(), obligations)?;
                 for (fluent, rate) in drifts {
+                    let value = self
+                        .reading(&run.timeline, node)
+                        .linear(&Expression::Fluent(fluent))?;
+                    if value.is_none() || rate.is_none() {
+                        self.never_takes_time(run, node, id, obligations);
+                    }
+                    let rate = rate.unwrap_or_default();
                     run.timeline.change(node, fluent, FluentChange::Drift(rate));
                 }
                 Ok(())
@@ -242,7 +271,7 @@ impl Compiler<'_> {
                 };
                 self.require_duration(run, node, id, true, obligations)?;
                 self.require(run, node, &body.end, obligations)?;
-                let effects = self.effects(run, id, body.start.effects.len(), &body.end.effects);
+                let effects = effects(run, id, body.start.effects.len(), &body.end.effects);
                 let since = self.plan.plan.start(id);
                 let first = body.start.effects.len() + body.end.effects.len();
                 // Values on arrival include the drift up to now, so it ends after the effects are
@@ -260,35 +289,14 @@ impl Compiler<'_> {
         }
     }
 
-    /// The changes of effects, with whether their guards hold in this run.
-    fn effects<'e>(
-        &self,
-        run: &Run,
-        instance: InstanceId,
-        first: usize,
-        effects: &'e [Effect],
-    ) -> Vec<(&'e Change, bool)> {
-        effects
-            .iter()
-            .enumerate()
-            .map(|(index, effect)| {
-                let held =
-                    |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
-                (
-                    &effect.change,
-                    held(GuardPart::Now) && held(GuardPart::AtStart),
-                )
-            })
-            .collect()
-    }
-
-    /// The continuous changes that begin at the start of an instance.
+    /// The continuous changes that begin at the start of an instance, with their rates; `None` is
+    /// an undefined one.
     fn drifts(
         &self,
         run: &Run,
         node: NodeId,
         instance: InstanceId,
-    ) -> Result<Vec<(elbowroom_model::ground::FluentId, Linear)>, Refusal> {
+    ) -> Result<Vec<(FluentId, Option<Linear>)>, Refusal> {
         let action = &self.plan.plan.instance(instance).action;
         let Some(body) = action.durative() else {
             return Ok(Vec::new());
@@ -311,8 +319,8 @@ impl Compiler<'_> {
                 return Err(changing());
             }
             let rate = self.reading(&run.timeline, node).linear(&effect.rate)?;
-            let rate = rate.unwrap_or_default();
-            if !rate.times.is_empty() || !rate.products.is_empty() {
+            let is_linear = |rate: &Linear| rate.times.is_empty() && rate.products.is_empty();
+            if !rate.as_ref().is_none_or(is_linear) {
                 return Err(Refusal::NotLinear {
                     place: action.name.clone(),
                     expression: self.task.describe_expression(&effect.rate),
@@ -324,11 +332,7 @@ impl Compiler<'_> {
     }
 
     /// Whether anything from the node on may change what the expression reads.
-    fn changes_later(
-        &self,
-        expression: &elbowroom_model::ground::Expression,
-        node: NodeId,
-    ) -> bool {
+    fn changes_later(&self, expression: &Expression, node: NodeId) -> bool {
         let mut read = Vec::new();
         expression.visit_fluents(&mut |fluent| read.push(fluent));
         if read.is_empty() {
@@ -367,6 +371,7 @@ impl Compiler<'_> {
         obligations: &mut Obligations,
     ) -> Result<Vec<Recorded>, Refusal> {
         let (mut recorded, mut additions) = (Vec::new(), Vec::new());
+        let mut updates: BTreeMap<FluentId, Vec<UpdateOperator>> = BTreeMap::new();
         for (change, _) in effects.filter(|&(_, happens)| happens) {
             match change {
                 Change::Add(fact) => additions.push(Recorded::Fact(*fact, true)),
@@ -376,10 +381,10 @@ impl Compiler<'_> {
                     fluent,
                     value,
                 } => {
+                    updates.entry(*fluent).or_default().push(*operator);
                     let reading = self.reading(&run.timeline, node);
                     let value = reading.linear(value)?;
-                    let old =
-                        reading.linear(&elbowroom_model::ground::Expression::Fluent(*fluent))?;
+                    let old = reading.linear(&Expression::Fluent(*fluent))?;
                     let new = updated(&reading, *operator, old, value)?;
                     if new.is_none() {
                         // An effect without a value breaks the plan, whatever the times are.
@@ -398,8 +403,59 @@ impl Compiler<'_> {
                 }
             }
         }
+        self.forbid_conflicts(run, node, &updates, obligations);
         recorded.append(&mut additions);
         Ok(recorded)
+    }
+
+    /// Several updates of one fluent by one happening must all be increases and decreases. Timed
+    /// initials that come after the plan's last action do not count.
+    fn forbid_conflicts(
+        &self,
+        run: &Run,
+        node: NodeId,
+        updates: &BTreeMap<FluentId, Vec<UpdateOperator>>,
+        obligations: &mut Obligations,
+    ) {
+        for (&fluent, operators) in updates {
+            if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
+                continue;
+            }
+            let when = match self.plan.plan.nodes[node.index()] {
+                Node::Timed(_) => lasts(&self.plan.plan)
+                    .into_iter()
+                    .map(|last| vec![Difference::not_after(node, last)])
+                    .collect(),
+                _ => vec![Vec::new()],
+            };
+            let bad_cases = when.into_iter().map(|differences| BadCase {
+                differences,
+                inequalities: run.timeline.assumptions.clone(),
+            });
+            obligations.direct.push(Obligation {
+                requirement: Requirement::OneUpdate { node, fluent },
+                bad_cases: bad_cases.collect(),
+            });
+        }
+    }
+
+    /// A continuous change without a value or a rate breaks the plan, unless its action takes no
+    /// time.
+    fn never_takes_time(
+        &self,
+        run: &Run,
+        node: NodeId,
+        instance: InstanceId,
+        obligations: &mut Obligations,
+    ) {
+        let (start, end) = (self.plan.plan.start(instance), self.plan.plan.end(instance));
+        obligations.direct.push(Obligation {
+            requirement: Requirement::Defined { node },
+            bad_cases: vec![BadCase {
+                differences: vec![Difference::before(start, end)],
+                inequalities: run.timeline.assumptions.clone(),
+            }],
+        });
     }
 
     /// The conditions of a happening.
@@ -413,7 +469,7 @@ impl Compiler<'_> {
         for condition in snap.condition.conjuncts() {
             let broken = self
                 .reading(&run.timeline, node)
-                .alternatives(condition, false)?;
+                .alternatives(condition, Wanted::NotTrue)?;
             let requirement = Requirement::Condition {
                 node,
                 condition: condition.clone(),
@@ -550,10 +606,30 @@ impl Compiler<'_> {
     }
 }
 
+/// The changes of effects, with whether their guards hold in this run.
+fn effects<'e>(
+    run: &Run,
+    instance: InstanceId,
+    first: usize,
+    effects: &'e [Effect],
+) -> Vec<(&'e Change, bool)> {
+    effects
+        .iter()
+        .enumerate()
+        .map(|(index, effect)| {
+            let held = |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
+            (
+                &effect.change,
+                held(GuardPart::Now) && held(GuardPart::AtStart),
+            )
+        })
+        .collect()
+}
+
 /// A change read, not yet recorded.
 enum Recorded {
-    Fact(elbowroom_model::ground::FactId, bool),
-    Fluent(elbowroom_model::ground::FluentId, FluentChange),
+    Fact(FactId, bool),
+    Fluent(FluentId, FluentChange),
 }
 
 fn record(run: &mut Run, node: NodeId, changes: Vec<Recorded>) {

@@ -13,29 +13,71 @@ pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 /// How many alternatives a condition may unfold into.
 const MOST_ALTERNATIVES: usize = 4096;
 
+/// What one asks of a condition.
+///
+/// A comparison with an undefined number says nothing: it is neither true nor false, and so are
+/// the conditions around it, unless their other parts decide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// It is true.
+    True,
+    /// It is false.
+    False,
+    /// It is false or says nothing: then it is broken where it is needed.
+    NotTrue,
+    /// It is true or says nothing.
+    NotFalse,
+}
+
+impl Wanted {
+    fn negated(self) -> Self {
+        match self {
+            Self::True => Self::False,
+            Self::False => Self::True,
+            Self::NotTrue => Self::NotFalse,
+            Self::NotFalse => Self::NotTrue,
+        }
+    }
+
+    fn is_positive(self) -> bool {
+        matches!(self, Self::True | Self::NotFalse)
+    }
+}
+
 impl Reading<'_> {
-    /// The alternatives in which the condition is true (`wanted`) or false.
-    ///
-    /// A comparison with an undefined number is false, whichever way it is written.
+    /// The alternatives in which the condition is as wanted.
     pub(crate) fn alternatives(
         &self,
         condition: &Condition,
-        wanted: bool,
+        wanted: Wanted,
     ) -> Result<Alternatives, Refusal> {
+        let is_positive = wanted.is_positive();
         match condition {
-            Condition::Fact(fact) => Ok(always_if(self.fact(*fact)? == wanted)),
-            Condition::Not(part) => self.alternatives(part, !wanted),
-            Condition::And(parts) if wanted => self.all(parts, true),
-            Condition::And(parts) => self.any(parts, false),
-            Condition::Or(parts) if wanted => self.any(parts, true),
-            Condition::Or(parts) => self.all(parts, false),
+            Condition::Fact(fact) => Ok(always_if(self.fact(*fact)? == is_positive)),
+            Condition::Not(part) => self.alternatives(part, wanted.negated()),
+            Condition::And(parts) if is_positive => self.all(parts, wanted),
+            Condition::Or(parts) if !is_positive => self.all(parts, wanted),
+            Condition::And(parts) | Condition::Or(parts) => self.any(parts, wanted),
             Condition::Compare(comparison, left, right) => {
                 self.comparison(*comparison, left, right, wanted)
             }
         }
     }
 
-    fn any(&self, parts: &[Condition], wanted: bool) -> Result<Alternatives, Refusal> {
+    /// The alternatives in which the condition says nothing.
+    pub(crate) fn silent(&self, condition: &Condition) -> Result<Alternatives, Refusal> {
+        let mut expressions = Vec::new();
+        condition.visit_expressions(&mut |expression| expressions.push(expression.clone()));
+        for expression in &expressions {
+            if self.linear(expression)?.is_none() {
+                let opposite = Condition::Not(Box::new(condition.clone()));
+                return self.all(&[condition.clone(), opposite], Wanted::NotTrue);
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    fn any(&self, parts: &[Condition], wanted: Wanted) -> Result<Alternatives, Refusal> {
         let mut alternatives = Vec::new();
         for part in parts {
             alternatives.extend(self.alternatives(part, wanted)?);
@@ -47,7 +89,7 @@ impl Reading<'_> {
         Ok(alternatives)
     }
 
-    fn all(&self, parts: &[Condition], wanted: bool) -> Result<Alternatives, Refusal> {
+    fn all(&self, parts: &[Condition], wanted: Wanted) -> Result<Alternatives, Refusal> {
         let mut product: Alternatives = vec![Vec::new()];
         for part in parts {
             let alternatives = self.alternatives(part, wanted)?;
@@ -82,12 +124,15 @@ impl Reading<'_> {
         comparison: Comparison,
         left: &Expression,
         right: &Expression,
-        wanted: bool,
+        wanted: Wanted,
     ) -> Result<Alternatives, Refusal> {
         let (Some(left), Some(right)) = (self.linear(left)?, self.linear(right)?) else {
-            return Ok(always_if(!wanted));
+            return Ok(always_if(matches!(
+                wanted,
+                Wanted::NotTrue | Wanted::NotFalse
+            )));
         };
-        Ok(compared(comparison, &left, &right, wanted))
+        Ok(compared(comparison, &left, &right, wanted.is_positive()))
     }
 }
 

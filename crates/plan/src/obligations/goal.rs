@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 
+use super::dnf::Wanted;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Refusal, Substitution};
 use crate::stn_plan::{Node, NodeId, StnPlan};
@@ -24,23 +25,18 @@ pub(super) fn goal_cases(
     let mut touched = BTreeSet::new();
     condition.visit_facts(&mut |fact| {
         task.for_each_basis(fact, &mut |basis| {
-            touched.extend(timeline.fact_nodes(basis))
+            touched.extend(timeline.fact_nodes(basis));
         });
     });
     task.visit_fluents_of(condition, &mut |fluent| {
-        touched.extend(timeline.fluent_nodes(fluent))
+        touched.extend(timeline.fluent_nodes(fluent));
     });
     let timed: Vec<NodeId> = plan
         .nodes()
         .filter(|(id, node)| matches!(node, Node::Timed(_)) && touched.contains(id))
         .map(|(id, _)| id)
         .collect();
-    // Starts of durative actions are never last: their ends follow.
-    let lasts: Vec<NodeId> = plan
-        .nodes()
-        .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
-        .map(|(id, _)| id)
-        .collect();
+    let lasts = lasts(plan);
     let mut cases = Vec::new();
     for happened in 0..=timed.len() {
         let (before, after) = timed.split_at(happened);
@@ -69,7 +65,7 @@ pub(super) fn goal_cases(
                 })
                 .collect(),
         };
-        for inequalities in reading.alternatives(condition, false)? {
+        for inequalities in reading.alternatives(condition, Wanted::NotTrue)? {
             for differences in &windows {
                 let inequalities = [&timeline.assumptions[..], &inequalities].concat();
                 cases.push(BadCase {
@@ -80,4 +76,13 @@ pub(super) fn goal_cases(
         }
     }
     Ok(cases)
+}
+
+/// The nodes that can be the last of the plan's actions: their ends and instants. Starts of
+/// durative actions are never last, their ends follow.
+pub(super) fn lasts(plan: &StnPlan) -> Vec<NodeId> {
+    plan.nodes()
+        .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
+        .map(|(id, _)| id)
+        .collect()
 }

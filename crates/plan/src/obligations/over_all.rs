@@ -6,7 +6,7 @@ use std::rc::Rc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FactId};
 
-use super::dnf::Alternatives;
+use super::dnf::{Alternatives, Wanted};
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Inequality, Refusal, Substitution};
 use crate::stn_plan::{InstanceId, NodeId, StnPlan};
@@ -49,7 +49,7 @@ impl OverAll {
         let mut touched = BTreeSet::new();
         condition.visit_facts(&mut |fact| {
             task.for_each_basis(fact, &mut |basis| {
-                touched.extend(timeline.fact_nodes(basis))
+                touched.extend(timeline.fact_nodes(basis));
             });
         });
         task.visit_fluents_of(condition, &mut |fluent| {
@@ -92,7 +92,7 @@ impl OverAll {
             substitution: &self.substitution,
             place: &plan.instance(self.instance).action.name,
         };
-        reading.alternatives(&self.condition, false)
+        reading.alternatives(&self.condition, Wanted::NotTrue)
     }
 }
 

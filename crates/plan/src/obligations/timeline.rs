@@ -161,20 +161,20 @@ impl Timeline {
                 FluentChange::DriftEnd(since) => {
                     if let Some(index) = drifts.iter().position(|&(began, _, _)| began == *since) {
                         let (_, counted, rate) = drifts.remove(index);
-                        base = base.and_then(|base| add_drift(base, rate, counted, *node));
+                        base = base.and_then(|base| add_drift(&base, rate, counted, *node));
                     }
                 }
             }
         }
         for (_, counted, rate) in drifts {
-            base = base.and_then(|base| add_drift(base, rate, counted, moment));
+            base = base.and_then(|base| add_drift(&base, rate, counted, moment));
         }
         base
     }
 }
 
 /// `base + rate * (until - since)`; rates hold no times, so the product is always representable.
-fn add_drift(base: Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
+fn add_drift(base: &Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
     Some(base.plus(&rate.times(&Linear::difference(since, until))?))
 }
 

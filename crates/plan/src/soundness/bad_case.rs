@@ -29,6 +29,9 @@ pub(crate) enum Outcome {
     Impossible(Vec<Certificate>),
     /// Yes.
     Possible,
+    /// Nobody knows: a parameter multiplies something in several inequalities, or moves the times
+    /// as well, so the corners of the box do not decide.
+    Unknown(ParameterId),
 }
 
 impl<'a> Schedules<'a> {
@@ -119,7 +122,13 @@ impl<'a> Schedules<'a> {
             ids.dedup();
             ids
         };
-        for corner in self.corners(&multiplied) {
+        let corners = self.corners(&multiplied);
+        if let (Some(parameter), true) =
+            (self.reduction.undecided_at_corners(case), corners.len() > 1)
+        {
+            return self.each_possible(case, parameter);
+        }
+        for corner in corners {
             let fixed: Vec<Inequality> = case
                 .inequalities
                 .iter()
@@ -141,6 +150,24 @@ impl<'a> Schedules<'a> {
         Outcome::Impossible(certificates)
     }
 
+    /// Where corners do not decide several inequalities at once, one of them may be impossible by
+    /// itself.
+    fn each_possible(&mut self, case: &BadCase, parameter: ParameterId) -> Outcome {
+        if case.inequalities.len() > 1 {
+            for inequality in &case.inequalities {
+                let alone = BadCase {
+                    differences: Vec::new(),
+                    inequalities: vec![inequality.clone()],
+                };
+                let outcome = self.inequalities_possible(&alone);
+                if matches!(outcome, Outcome::Impossible(_)) {
+                    return outcome;
+                }
+            }
+        }
+        Outcome::Unknown(parameter)
+    }
+
     /// A proof that the inequalities, free of products, cannot all hold; `None` if they can.
     fn linear_possible(&mut self, inequalities: &[Inequality]) -> Option<Certificate> {
         // Each inequality alone, without what couples parameters, is a problem of flows.
@@ -149,7 +176,13 @@ impl<'a> Schedules<'a> {
                 return Some(certificate);
             }
         }
-        if inequalities.len() <= 1 && self.reduction.coupled.is_empty() {
+        // A parameter that is a difference of times has been replaced by it; one that only bounds a
+        // difference occurs twice.
+        let is_shared = inequalities
+            .iter()
+            .flat_map(|inequality| inequality.expression.parameters.keys())
+            .any(|&parameter| self.reduction.is_in_network(parameter));
+        if inequalities.len() <= 1 && self.reduction.coupled.is_empty() && !is_shared {
             return None;
         }
         let assumed = &self.network.network().constraints()[self.edges.len()..];
@@ -332,11 +365,13 @@ pub(crate) fn spread(
     constant
 }
 
-/// Values and a schedule in the box for which the case comes about.
+/// Values and a schedule in the box for which the case comes about. Among these, the ones that
+/// make `least` smallest, or, failing that, break the case's only inequality by most.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
     case: &BadCase,
+    least: Option<&Linear>,
 ) -> Option<Counterexample> {
     let schedules = Schedules::new(reduction, envelope)?;
     let assumed: Vec<_> = case
@@ -349,14 +384,24 @@ pub(crate) fn witness(
         .iter()
         .flat_map(|i| i.expression.multiplied_parameters())
         .collect();
+    let least = |fixed: &'_ [Inequality]| match (least, fixed) {
+        (Some(least), _) => Some(least.clone()),
+        (None, [inequality]) => Some(inequality.expression.clone()),
+        (None, _) => None,
+    };
     schedules
         .corners(&multiplied)
         .into_iter()
         .find_map(|corner| {
             let fixed: Vec<Inequality> =
                 case.inequalities.iter().map(|i| corner.apply(i)).collect();
-            let (class_times, mut valuation) =
-                linear_program::witness(reduction, envelope, &assumed, &fixed)?;
+            let (class_times, mut valuation) = linear_program::witness(
+                reduction,
+                envelope,
+                &assumed,
+                &fixed,
+                least(&fixed).as_ref(),
+            )?;
             for (&parameter, value) in &corner.values {
                 valuation[parameter.index()] = value.clone();
             }

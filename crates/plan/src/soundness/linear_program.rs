@@ -9,6 +9,7 @@ use elbowroom_stn::Constraint;
 use super::bad_case::spread;
 use super::certificate::Certificate;
 use crate::decoupled::DecoupledEnvelope;
+use crate::linear::Linear;
 use crate::obligations::Inequality;
 use crate::parameter::{ParameterId, Valuation};
 use crate::reduction::{BoxEnd, Reduction, Side};
@@ -54,15 +55,22 @@ pub(crate) fn refute(
     Some(certificate)
 }
 
-/// Times of all classes and values of the parameters that satisfy everything, if there are any.
+/// Times of all classes and values of the parameters that satisfy everything, if there are any;
+/// those that make `least` smallest, if something does.
 pub(crate) fn witness(
     reduction: &Reduction,
     envelope: &DecoupledEnvelope,
     assumed: &[Constraint<Delta>],
     inequalities: &[Inequality],
+    least: Option<&Linear>,
 ) -> Option<(Vec<Rational>, Valuation)> {
     let mut program = Program::new(reduction, envelope, assumed, inequalities);
     program.simplex.check().ok()?;
+    if let Some(least) = least {
+        let (row, _) = program.row(least);
+        // Where there is no smallest value, any will do.
+        program.simplex.minimize(&row).ok()?;
+    }
     let model = program.simplex.model();
     let times: Vec<Rational> = program
         .classes
@@ -173,22 +181,21 @@ impl<'a> Program<'a> {
         self.at_most(&row, bound, Meaning::Edge(index));
     }
 
-    fn add_inequality(&mut self, inequality: &Inequality) {
+    /// The expression as a combination of variables, and its constant.
+    fn row(&self, expression: &Linear) -> (Vec<(VariableId, Rational)>, Rational) {
         let mut row: BTreeMap<VariableId, Rational> = BTreeMap::new();
-        let constant = spread(
-            self.reduction,
-            &inequality.expression,
-            |class, coefficient| {
-                *row.entry(self.classes[class.index()]).or_default() += coefficient;
-            },
-        );
-        for (id, coefficient) in &inequality.expression.parameters {
+        let constant = spread(self.reduction, expression, |class, coefficient| {
+            *row.entry(self.classes[class.index()]).or_default() += coefficient;
+        });
+        for (id, coefficient) in &expression.parameters {
             *row.entry(self.parameters[id]).or_default() += coefficient;
         }
-        let row: Vec<_> = row
-            .into_iter()
-            .filter(|(_, factor)| !factor.is_zero())
-            .collect();
+        row.retain(|_, factor| !factor.is_zero());
+        (row.into_iter().collect(), constant)
+    }
+
+    fn add_inequality(&mut self, inequality: &Inequality) {
+        let (row, constant) = self.row(&inequality.expression);
         let bound = if inequality.is_strict {
             Delta::just_below(-constant)
         } else {

@@ -7,8 +7,9 @@ use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
+use crate::parameter::{ParameterId, ParametrizedPlan};
 use crate::reduction::BoxEnd;
-use crate::stn_plan::{NodeId, StnPlan};
+use crate::stn_plan::NodeId;
 
 /// How many places of the moment are told apart in one over-all condition.
 const MOST_PLACES: usize = 100_000;
@@ -41,7 +42,7 @@ impl Proof {
 /// Looks for a moment at which an over-all condition is false.
 pub(crate) struct Prover<'a, 'b> {
     pub(crate) task: &'a Task,
-    pub(crate) plan: &'a StnPlan,
+    pub(crate) plan: &'a ParametrizedPlan,
     pub(crate) over_all: &'a OverAll,
     pub(crate) schedules: &'b mut Schedules<'a>,
     /// The differences assumed so far, for the counterexample.
@@ -55,7 +56,7 @@ pub(crate) type Attempt = Result<Proof, BadCase>;
 impl<'a, 'b> Prover<'a, 'b> {
     pub(crate) fn new(
         task: &'a Task,
-        plan: &'a StnPlan,
+        plan: &'a ParametrizedPlan,
         over_all: &'a OverAll,
         schedules: &'b mut Schedules<'a>,
     ) -> Self {
@@ -117,7 +118,7 @@ impl<'a, 'b> Prover<'a, 'b> {
             return Err(Refusal::TooManyCases {
                 place: format!(
                     "over-all condition of {}",
-                    self.plan.instance(self.over_all.instance).action.name
+                    self.plan.plan.instance(self.over_all.instance).action.name
                 ),
                 limit: MOST_PLACES,
             });
@@ -171,11 +172,17 @@ impl<'a, 'b> Prover<'a, 'b> {
         Ok(attempt)
     }
 
+    fn coupled(&self, parameter: ParameterId) -> Refusal {
+        Refusal::Coupled {
+            name: self.plan.parameter(parameter).name.clone(),
+        }
+    }
+
     /// All events are placed: the condition's value is now an expression.
     fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
         let cut = |node: NodeId| happened.contains(&node);
         let mut proofs = Vec::new();
-        for mut inequalities in self.over_all.cases(self.task, self.plan, &cut)? {
+        for mut inequalities in self.over_all.cases(self.task, &self.plan.plan, &cut)? {
             inequalities.extend(self.over_all.assumptions.iter().cloned());
             let case = BadCase {
                 differences: self.assumed.clone(),
@@ -184,6 +191,7 @@ impl<'a, 'b> Prover<'a, 'b> {
             match self.schedules.inequalities_possible(&case) {
                 Outcome::Impossible(certificates) => proofs.push(certificates),
                 Outcome::Possible => return Ok(Err(case)),
+                Outcome::Unknown(parameter) => return Err(self.coupled(parameter)),
             }
         }
         Ok(Ok(Proof::True(proofs)))

@@ -23,7 +23,7 @@ pub(super) fn judged_invalid(
     if arguments.json {
         output::print_json(&document::judged_invalid(arguments, task, violation))?;
     } else {
-        let mut text = headline(arguments);
+        let mut text = headline(arguments, FAILS);
         push_wrapped(
             &mut text,
             &violation.to_string(),
@@ -35,12 +35,12 @@ pub(super) fn judged_invalid(
     Ok(Exit::No)
 }
 
-fn headline(arguments: &EnvelopeArgs) -> String {
-    format!(
-        "{}: {} fails even if everything goes as planned\n",
-        styled(BAD, "no elbow room"),
-        arguments.plan.display()
-    )
+const FAILS: &str = "fails even if everything goes as planned";
+const CAN_FAIL: &str = "can fail even if everything goes as planned";
+
+fn headline(arguments: &EnvelopeArgs, fails: &str) -> String {
+    let file = arguments.plan.display();
+    format!("{}: {file} {fails}\n", styled(BAD, "no elbow room"))
 }
 
 /// The plan contradicts itself: there is no schedule.
@@ -67,9 +67,11 @@ fn print(subject: &Subject<'_>, explanation: &Explanation) -> Answer {
         output::print_json(&document::fails(subject, explanation))?;
     } else {
         let look = Look::of_stdout();
-        let mut text = headline(subject.arguments);
+        let is_possible = explanation.schedule.is_some();
+        let fails = if is_possible { CAN_FAIL } else { FAILS };
+        let mut text = headline(subject.arguments, fails);
         push_wrapped(&mut text, &what(explanation), 2, look.width);
-        if explanation.schedule.is_some() {
+        if is_possible {
             text.push_str(&example(subject, explanation, look));
         }
         output::print(&text)?;
