@@ -22,16 +22,24 @@ fn main() {
 
 /// Every instance of both figures.
 fn instances() -> Vec<Instance> {
-    let Some(data) = shared::data() else { return Vec::new() };
+    let Some(data) = shared::data() else {
+        return Vec::new();
+    };
     [figure_3(&data), figure_4(&data)].concat()
 }
 
 fn names() -> Vec<String> {
-    instances().into_iter().map(|instance| instance.name).collect()
+    instances()
+        .into_iter()
+        .map(|instance| instance.name)
+        .collect()
 }
 
 fn read(name: &str) -> (Task, ParametrizedPlan) {
-    let instance = instances().into_iter().find(|i| i.name == name).expect("a known instance");
+    let instance = instances()
+        .into_iter()
+        .find(|i| i.name == name)
+        .expect("a known instance");
     let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
     let plan = format::read(&bytes, &mut task).expect("a readable plan");
@@ -44,7 +52,11 @@ fn search(task: &Task, plan: &ParametrizedPlan, enough: usize) -> usize {
     let mut widenings = 0;
     let run = irr(&mut oracle, &Settings::default(), &mut |widening| {
         widenings += usize::from(widening.is_some());
-        if widenings >= enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if widenings >= enough {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     });
     run.expect("within reach").checks
 }
