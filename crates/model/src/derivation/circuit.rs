@@ -91,9 +91,9 @@ impl<'a> Circuit<'a> {
                     debug_assert!(sign, "no fact is negated within its stratum");
                     return watchers.push(gate);
                 }
-                return self.supply(holds(condition, below), sign, gate);
+                return self.supply(&holds(condition, below), sign, gate);
             }
-            Condition::Compare(..) => return self.supply(holds(condition, below), sign, gate),
+            Condition::Compare(..) => return self.supply(&holds(condition, below), sign, gate),
             Condition::And(parts) => (parts, sign),
             Condition::Or(parts) => (parts, !sign),
         };
@@ -107,9 +107,9 @@ impl<'a> Circuit<'a> {
         }
     }
 
-    fn supply<F>(&mut self, truth: Result<bool, F>, sign: bool, gate: usize) {
+    fn supply<F>(&mut self, truth: &Result<bool, F>, sign: bool, gate: usize) {
         match truth {
-            Ok(truth) if truth == sign => self.certain.push_back(gate),
+            Ok(truth) if *truth == sign => self.certain.push_back(gate),
             Ok(_) => {}
             Err(_) => self.unclear.push_back(gate),
         }

@@ -300,3 +300,6 @@ impl Moment<Refusal> for Basic<'_> {
         Ok(comparison.holds(left, right))
     }
 }
+
+#[cfg(test)]
+mod tests;
