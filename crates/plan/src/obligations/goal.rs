@@ -1,5 +1,6 @@
 //! The goal holds after the last happening of the plan's actions.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use elbowroom_model::Task;
@@ -23,10 +24,8 @@ pub(super) fn goal_cases(
     condition: &Condition,
 ) -> Result<Vec<BadCase>, Refusal> {
     let mut touched = BTreeSet::new();
-    condition.visit_facts(&mut |fact| {
-        task.for_each_basis(fact, &mut |basis| {
-            touched.extend(timeline.fact_nodes(basis));
-        });
+    task.visit_facts_of(condition, &mut |fact| {
+        touched.extend(timeline.fact_nodes(fact));
     });
     task.visit_fluents_of(condition, &mut |fluent| {
         touched.extend(timeline.fluent_nodes(fluent));
@@ -49,6 +48,7 @@ pub(super) fn goal_cases(
             action: None,
             substitution,
             place: "goal",
+            derived: OnceCell::new(),
         };
         let mut common = Vec::new();
         if let Some(&next) = after.first() {
