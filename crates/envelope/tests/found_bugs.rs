@@ -259,3 +259,19 @@ fn one_happening_does_not_change_a_number_in_two_ways() {
         "(set) must not change (x) in several ways at once"
     );
 }
+
+#[test]
+fn timed_initials_that_move_may_change_places() {
+    let given = Given {
+        domain: "(:action look :parameters () :precondition (and) :effect (and))",
+        init: "(q) (at 2 (p)) (at 4 (not (q)))",
+        goal: "(or (p) (q))",
+        plan: "action instance l : (look); c: l - .zero in [5, 5];",
+        vary: &["timed p"],
+    };
+    assert_eq!(given.answer("[2, 5]"), "inside");
+    assert_eq!(
+        given.answer("[2, 6]"),
+        "the goal (or (p) (q)) must hold at the end"
+    );
+}
