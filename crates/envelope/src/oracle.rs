@@ -20,6 +20,8 @@ pub struct Oracle<'a> {
     plan: &'a ParametrizedPlan,
     feasibility: Feasibility,
     soundness: Soundness<'a>,
+    /// Whether all proofs that `soundness` knows hold in the last box accepted.
+    proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
 }
@@ -54,6 +56,7 @@ impl<'a> Oracle<'a> {
             plan,
             feasibility,
             soundness,
+            proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
         })
@@ -101,9 +104,26 @@ impl<'a> Oracle<'a> {
         moved: Option<BoxEnd>,
     ) -> Result<Option<Objection>, Refusal> {
         self.checks += 1;
+        // Proofs found for a box that was refused, and is not the last accepted one with an end
+        // moved out, may not hold in the last accepted one: then the hint says nothing about them.
+        let trusted = moved.filter(|_| self.proofs_hold_in_last);
+        let objection = self.sound_and_feasible(envelope, moved, trusted);
+        self.proofs_hold_in_last = match &objection {
+            Ok(None) => true,
+            _ => moved.is_some() && self.proofs_hold_in_last,
+        };
+        objection
+    }
+
+    fn sound_and_feasible(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+        trusted: Option<BoxEnd>,
+    ) -> Result<Option<Objection>, Refusal> {
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
-        if let Some(broken) = self.soundness.broken(envelope, moved)? {
+        if let Some(broken) = self.soundness.broken(envelope, trusted)? {
             return Ok(Some(Objection::Broken(broken)));
         }
         if let Some(valuation) = self.feasibility.infeasible(envelope, moved) {
