@@ -17,9 +17,13 @@ use crate::feasibility::Feasibility;
 #[doc(alias = "CheckInEnvelope")]
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
+    task: &'a Task,
+    epsilon: Rational,
     plan: &'a ParametrizedPlan,
     feasibility: Feasibility,
     soundness: Soundness<'a>,
+    /// Values around which `soundness` was made: it decides boxes that contain them.
+    center: Valuation,
     /// Whether all proofs that `soundness` knows hold in the last box accepted.
     proofs_hold_in_last: bool,
     checks: usize,
@@ -53,9 +57,12 @@ impl<'a> Oracle<'a> {
                 limit: crate::feasibility::MOST_CORNERS,
             })?;
         Ok(Self {
+            task,
+            epsilon: epsilon.clone(),
             plan,
             feasibility,
             soundness,
+            center: plan.nominal(),
             proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
@@ -121,6 +128,17 @@ impl<'a> Oracle<'a> {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Objection>, Refusal> {
+        if !envelope.contains(&self.center) {
+            let center = nearest(envelope, &self.center);
+            match Soundness::around(self.task, self.plan, &self.epsilon, &center) {
+                Ok(soundness) => (self.soundness, self.center) = (soundness, center),
+                Err(Refusal::NoNominalSchedule) => {
+                    self.without_schedule += 1;
+                    return Ok(Some(Objection::NoSchedule(center)));
+                }
+                Err(refusal) => return Err(refusal),
+            }
+        }
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
         if let Some(broken) = self.soundness.broken(envelope, trusted)? {
@@ -141,4 +159,22 @@ impl<'a> Oracle<'a> {
     ) -> Option<Counterexample> {
         self.soundness.counterexample(envelope, broken)
     }
+}
+
+/// The values in the box nearest to these.
+fn nearest(envelope: &DecoupledEnvelope, values: &[Rational]) -> Valuation {
+    let intervals = envelope.intervals.iter().zip(values);
+    intervals
+        .map(|(interval, value)| {
+            let value = match interval.lower.value() {
+                Some(lower) => lower.max(value),
+                None => value,
+            };
+            let value = match interval.upper.value() {
+                Some(upper) => upper.min(value),
+                None => value,
+            };
+            value.clone()
+        })
+        .collect()
 }

@@ -304,3 +304,24 @@ fn proofs_found_for_a_refused_box_are_not_taken_to_hold_in_the_last_accepted_one
     };
     assert!(!is_inside("[8, 12] [8, 20] [1, 1]", Some(moved)));
 }
+
+#[test]
+fn in_a_box_beside_the_nominal_values_happenings_may_come_in_another_order() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(q)",
+        plan: "parameter g default 5; action instance s : (set); action instance l : (look);
+               c: s - .zero in [10, 10]; c: l - s in [g, g];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answers(&["[5, 5]", "[-6, -5]", "[-6, 5]", "[1, 5]"]),
+        [
+            "inside",
+            "inside",
+            "(look) must come before (set), by at least ε",
+            "inside"
+        ]
+    );
+}

@@ -80,8 +80,23 @@ impl<'a> Soundness<'a> {
         plan: &'a ParametrizedPlan,
         epsilon: &Rational,
     ) -> Result<Self, Refusal> {
+        Self::around(task, plan, epsilon, &plan.nominal())
+    }
+
+    /// Compiles a plan's obligations, with its happenings in the order in which they come with
+    /// these values: for boxes that contain them.
+    ///
+    /// # Errors
+    /// When the plan has no schedule with these values, or holds something beyond exact linear
+    /// reasoning.
+    pub fn around(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &Rational,
+        values: &[Rational],
+    ) -> Result<Self, Refusal> {
         let reduction = Reduction::new(plan);
-        let nominal = nominal_schedule(&reduction, plan).ok_or(Refusal::NoNominalSchedule)?;
+        let nominal = schedule_at(&reduction, values).ok_or(Refusal::NoNominalSchedule)?;
         let obligations =
             Obligations::compile(task, plan, epsilon, &nominal, &reduction.substitution)?;
         let mut direct = Vec::new();
@@ -126,7 +141,8 @@ impl<'a> Soundness<'a> {
         self.refutations
     }
 
-    /// The first obligation that some schedule for some value in the box breaks.
+    /// The first obligation that some schedule for some value in the box breaks. The box contains
+    /// the plan's nominal values, or those that this was made [around](Self::around).
     ///
     /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
     /// end, further out than before, from the last one for which the answer was `None`, and all
@@ -275,9 +291,9 @@ impl<'a> Lazy<'a> {
     }
 }
 
-/// The earliest schedule at the nominal values, by node.
-fn nominal_schedule(reduction: &Reduction, plan: &ParametrizedPlan) -> Option<Vec<Rational>> {
-    let point = DecoupledEnvelope::point(&plan.nominal());
+/// The earliest schedule with these values, by node.
+fn schedule_at(reduction: &Reduction, values: &[Rational]) -> Option<Vec<Rational>> {
+    let point = DecoupledEnvelope::point(values);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;
     let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));
