@@ -17,27 +17,21 @@ use crate::dice::Dice;
 use crate::numbers;
 use crate::system::System;
 
-/// A case, and times at which its plan works with the nominal values.
-pub(crate) struct Generated {
-    pub(crate) case: Case,
-    /// By node.
-    pub(crate) schedule: Vec<Rational>,
-}
-
 /// The case of that number.
-pub(crate) fn generate(seed: u64) -> Generated {
+pub(crate) fn generate(seed: u64) -> Case {
     let mut dice = Dice::new(seed);
     loop {
-        if let Some(generated) = attempt(&mut dice) {
-            return generated;
+        if let Some(case) = attempt(&mut dice) {
+            return case;
         }
     }
 }
 
 /// Nothing if the happenings as drawn get in each other's way.
-fn attempt(dice: &mut Dice) -> Option<Generated> {
+fn attempt(dice: &mut Dice) -> Option<Case> {
+    let is_timed = dice.chance(15);
     let case = Case {
-        problem: skeleton(dice),
+        problem: skeleton(dice, is_timed),
         gaps: Vec::new(),
         parameters: Vec::new(),
         initial: std::collections::BTreeMap::new(),
@@ -57,6 +51,7 @@ fn attempt(dice: &mut Dice) -> Option<Generated> {
     let mut nominal = Nominal {
         case,
         schedule,
+        is_timed,
         dice,
     };
     nominal.add_conditions();
@@ -66,14 +61,11 @@ fn attempt(dice: &mut Dice) -> Option<Generated> {
     if nominal.dice.chance(75) {
         nominal.tighten();
     }
-    Some(Generated {
-        case: nominal.case,
-        schedule: nominal.schedule,
-    })
+    Some(nominal.case)
 }
 
 /// Actions with effects only, and timed initials.
-fn skeleton(dice: &mut Dice) -> Problem {
+fn skeleton(dice: &mut Dice, is_timed: bool) -> Problem {
     let (facts, fluents) = (1 + dice.below(3), 1 + dice.below(2));
     let name = |prefix: &str, index: usize| format!("{prefix}{index}");
     let mut problem = Problem {
@@ -120,8 +112,9 @@ fn skeleton(dice: &mut Dice) -> Problem {
         });
     }
     let mut time = Rational::ZERO;
-    for _ in 0..*dice.pick(&[0, 0, 1, 1, 2]) {
-        time += dice.half(1, 6);
+    let timed: &[usize] = if is_timed { &[2, 3] } else { &[0, 0, 1, 1, 2] };
+    for _ in 0..*dice.pick(timed) {
+        time += dice.half(1, if is_timed { 3 } else { 6 });
         for _ in 0..1 + dice.below(2) {
             problem.timed.push(TimedInitial {
                 time: time.clone(),
@@ -308,6 +301,8 @@ enum Place {
 struct Nominal<'d> {
     case: Case,
     schedule: Vec<Rational>,
+    /// Timed initials and what depends on them take the most room.
+    is_timed: bool,
     dice: &'d mut Dice,
 }
 
@@ -343,7 +338,8 @@ impl Nominal<'_> {
     }
 
     fn condition(&mut self, place: Place) -> Condition {
-        match self.dice.below(10) {
+        let compound = if self.is_timed { 4 } else { 10 };
+        match self.dice.below(compound) {
             0 => Condition::Or(vec![self.simple(place), self.simple(place)]),
             1 => {
                 let parts = vec![self.simple(place), self.simple(place)];
@@ -584,7 +580,12 @@ impl Nominal<'_> {
     /// Makes one to four numbers parameters.
     fn open_numbers(&mut self) {
         for _ in 0..*self.dice.pick(&[1, 1, 2, 2, 3, 4]) {
-            match self.dice.below(10) {
+            let which = if self.is_timed && self.dice.chance(60) {
+                8
+            } else {
+                self.dice.below(10)
+            };
+            match which {
                 0..=3 => self.open_duration(),
                 4 => self.open_bound(),
                 5..=6 => self.open_constant(),
