@@ -129,7 +129,13 @@ impl<'a> Explainer<'a> {
         };
         let shortfall = match &broken.requirement {
             Requirement::Separation { first, second } => {
-                self.make_late(&mut example, *first, *second)
+                let mut late = example.clone();
+                let shortfall = self.make_late(&mut late, *first, *second);
+                // The wrong way round may do no harm; too near always does.
+                if self.verdict(&late).is_some() || self.verdict(&example).is_none() {
+                    example = late;
+                }
+                shortfall
             }
             _ => shortfall(broken, &example),
         };

@@ -52,15 +52,16 @@ fn plans_that_it_finds_invalid_break_what_it_says() {
         let why_not = case.why_not("").expect("it is not valid");
         (broken.expect("it is not valid"), why_not.reason)
     };
-    // Refuelled from 4 on, the tank is full before the refuelling ends.
+    // Refuelled from 4 on, the tank is full before the refuelling ends, with no happening inside.
     let (requirement, reason) = broken("bug1.stn");
     assert!(matches!(requirement, Requirement::OverAll { .. }));
     assert_eq!(
         reason,
         "(refuel gen tank1) needs (< (fuellevel gen) (capacity gen)) throughout"
     );
-    // Refuelled from 991 on, the generator has run dry. (The tool says "action conditions", as its
-    // conditions at start, at end and throughout are one formula; the domain has this as `over all`.)
+    // Refuelled from 991 on, the generator has run dry. (The tool calls this an action condition:
+    // what must hold throughout is one of those on arrival at a happening inside the action, here
+    // the start of refuelling, and an invariant only between happenings.)
     let (requirement, reason) = broken("bug2.stn");
     assert!(matches!(requirement, Requirement::OverAll { .. }));
     assert_eq!(

@@ -217,7 +217,9 @@ impl<'a> Encoder<'a> {
     /// Each node has a position, each position a node, and times follow positions.
     fn positions(&mut self) {
         let count = self.count();
-        self.line("(define-fun tau0 () Real 0)");
+        // Not defined as 0: older versions of Z3 take a whole number there for an `Int` only.
+        self.line("(declare-const tau0 Real)");
+        self.line("(assert (= tau0 0))");
         for k in 1..=count {
             self.line(&format!("(declare-const tau{k} Real)"));
             self.assert(&format!("(<= tau{} tau{k})", k - 1));
@@ -307,7 +309,8 @@ impl<'a> Encoder<'a> {
                 Some(id) => format!("g{}", id.0),
                 None => number(value),
             };
-            self.line(&format!("(define-fun v{}_0 () Real {value})", fluent.0));
+            self.line(&format!("(declare-const v{}_0 Real)", fluent.0));
+            self.line(&format!("(assert (= v{}_0 {value}))", fluent.0));
         }
         for k in 1..=self.count() {
             for fluent in 0..fluents {
