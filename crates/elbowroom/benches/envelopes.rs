@@ -62,13 +62,13 @@ fn search(task: &Task, plan: &ParametrizedPlan, enough: usize) -> usize {
 }
 
 #[divan::bench(args = names(), sample_count = 20)]
-fn whole(bencher: Bencher<'_, '_>, name: &String) {
+fn whole(bencher: Bencher<'_, '_>, name: &str) {
     let (task, plan) = read(name);
     bencher.bench_local(|| search(&task, &plan, usize::MAX));
 }
 
 #[divan::bench(args = names(), sample_count = 20)]
-fn first_widening(bencher: Bencher<'_, '_>, name: &String) {
+fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
     let (task, plan) = read(name);
     bencher.bench_local(|| search(&task, &plan, 1));
 }

@@ -1,4 +1,4 @@
-//! STN plan files (`.stn`): [`read`] and [`write`].
+//! STN plan files (`.stn`): [`read()`] and [`write()`].
 //!
 //! One item, ended by `;`, is a parameter, an action instance or a constraint; a `#` begins a
 //! comment. The order of items is free.

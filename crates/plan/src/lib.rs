@@ -6,7 +6,7 @@
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
 //! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
-//! - [`format`]: STN plan files.
+//! - [`mod@format`]: STN plan files.
 
 mod decoupled;
 pub mod deorder;

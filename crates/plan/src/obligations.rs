@@ -1,6 +1,6 @@
 //! What every schedule of a plan must satisfy, as linear inequalities.
 //!
-//! [`compile`](Obligations::compile) runs the plan symbolically, once, in the order of a nominal
+//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal
 //! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
 //! set, so if two interfering happenings are at least ε apart in all of them, one always comes
 //! first. The separation itself is an obligation; where it holds, every value that a happening
