@@ -10,10 +10,14 @@
 //!
 //! `ELBOWROOM_CASES` says how many cases are tried, `ELBOWROOM_FIRST_CASE` which is the first.
 
+mod benchmarks;
 mod case;
 mod contest;
 mod dice;
 mod generate;
+#[path = "../../../elbowroom/tests/shared/instances.rs"]
+#[allow(dead_code, reason = "only some figures are asked about")]
+mod instances;
 mod numbers;
 mod plain;
 mod polynomial;
