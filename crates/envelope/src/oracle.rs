@@ -26,6 +26,8 @@ pub struct Oracle<'a> {
     around: Valuation,
     /// How many bad cases had been refuted from scratch before `around` changed last.
     refuted_before: usize,
+    /// Whether all proofs that `soundness` knows hold in the last box accepted.
+    proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
 }
@@ -64,6 +66,7 @@ impl<'a> Oracle<'a> {
             soundness,
             around: plan.nominal(),
             refuted_before: 0,
+            proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
         })
@@ -111,6 +114,23 @@ impl<'a> Oracle<'a> {
         moved: Option<BoxEnd>,
     ) -> Result<Option<Objection>, Refusal> {
         self.checks += 1;
+        // Proofs found for a box that was refused, and is not the last accepted one with an end
+        // moved out, may not hold in the last accepted one: then the hint says nothing about them.
+        let trusted = moved.filter(|_| self.proofs_hold_in_last);
+        let objection = self.sound_and_feasible(envelope, moved, trusted);
+        self.proofs_hold_in_last = match &objection {
+            Ok(None) => true,
+            _ => moved.is_some() && self.proofs_hold_in_last,
+        };
+        objection
+    }
+
+    fn sound_and_feasible(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+        trusted: Option<BoxEnd>,
+    ) -> Result<Option<Objection>, Refusal> {
         if !envelope.contains(&self.around)
             && let Some(without_schedule) = self.move_to(envelope)?
         {
@@ -118,7 +138,7 @@ impl<'a> Oracle<'a> {
         }
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
-        if let Some(broken) = self.soundness.broken(envelope, moved)? {
+        if let Some(broken) = self.soundness.broken(envelope, trusted)? {
             return Ok(Some(Objection::Broken(broken)));
         }
         if let Some(valuation) = self.feasibility.infeasible(envelope, moved) {

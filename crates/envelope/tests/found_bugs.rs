@@ -6,6 +6,7 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_pddl::{Source, read_problem};
 use elbowroom_plan::obligations::Refusal;
 use elbowroom_plan::parametrize::vary;
+use elbowroom_plan::reduction::{BoxEnd, Side};
 use elbowroom_plan::soundness::Counterexample;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
@@ -288,6 +289,71 @@ fn a_box_away_from_the_nominal_values_may_have_its_own_order() {
             "inside",
             "no schedule",
             "no schedule"
+        ]
+    );
+}
+
+#[test]
+fn timed_initials_that_move_may_change_places() {
+    let given = Given {
+        domain: "(:action look :parameters () :precondition (and) :effect (and))",
+        init: "(q) (at 2 (p)) (at 4 (not (q)))",
+        goal: "(or (p) (q))",
+        plan: "action instance l : (look); c: l - .zero in [5, 5];",
+        vary: &["timed p"],
+    };
+    assert_eq!(given.answer("[2, 5]"), "inside");
+    assert_eq!(
+        given.answer("[2, 6]"),
+        "the goal (or (p) (q)) must hold at the end"
+    );
+}
+
+#[test]
+fn proofs_found_for_a_refused_box_are_not_taken_to_hold_in_the_last_accepted_one() {
+    // The duration is at most the lesser of ?a and ?b, and must be at most 10.
+    let given = Given {
+        domain: "(:synth-parameters ?a ?b ?c)
+                 (:durative-action wait :parameters () :duration (<= ?duration 10)
+                    :effect (at end (increase (x) ?c)))",
+        goal: "(<= (x) 10)",
+        plan: "parameter ?a default 8; parameter ?b default 8; parameter ?c default 1;
+               durative-action instance n : (wait);
+               c: n.end - n.start in [1, ?a]; c: n.end - n.start in [1, ?b];",
+        ..Given::default()
+    };
+    let (task, plan) = given.task_and_plan();
+    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+    let mut is_inside = |text: &str, moved: Option<BoxEnd>| {
+        let objection = oracle.objection_after(&envelope(text), moved).unwrap();
+        objection.is_none()
+    };
+    assert!(is_inside("[8, 8] [8, 20] [1, 1]", None));
+    assert!(!is_inside("[8, 20] [8, 8] [1, 30]", None));
+    let moved = BoxEnd {
+        parameter: plan.find("?a").unwrap(),
+        side: Side::Upper,
+    };
+    assert!(!is_inside("[8, 12] [8, 20] [1, 1]", Some(moved)));
+}
+
+#[test]
+fn in_a_box_beside_the_nominal_values_happenings_may_come_in_another_order() {
+    let given = Given {
+        domain: "(:action set :parameters () :precondition (and) :effect (p))
+                 (:action look :parameters () :precondition (or (p) (q)) :effect (and))",
+        init: "(q)",
+        plan: "parameter g default 5; action instance s : (set); action instance l : (look);
+               c: s - .zero in [10, 10]; c: l - s in [g, g];",
+        ..Given::default()
+    };
+    assert_eq!(
+        given.answers(&["[5, 5]", "[-6, -5]", "[-6, 5]", "[1, 5]"]),
+        [
+            "inside",
+            "inside",
+            "(look) must come before (set), by at least ε",
+            "inside"
         ]
     );
 }

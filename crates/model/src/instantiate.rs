@@ -1,6 +1,7 @@
 //! From lifted to ground: variables replaced by objects, quantifiers expanded.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
@@ -9,7 +10,7 @@ use crate::problem::{
     self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, TimedChange,
     UpdateOperator, Variable,
 };
-use crate::task::{GroundRule, InstantiateError, Task, TimedHappening};
+use crate::task::{InstantiateError, Task, TimedHappening};
 use crate::terms::{resolve, with_arguments};
 
 /// What is known beforehand, so that quantifiers need not be expanded in full.
@@ -335,30 +336,26 @@ impl Task {
 
     /// Adds the rules whose head is `fact`, and, through their bodies, all they depend on.
     pub(crate) fn ground_rules(&mut self, fact: FactId) {
-        if !self.derived.insert(fact) {
-            return;
-        }
         let (predicate, arguments) = self
             .facts
             .get_index(fact.index())
             .cloned()
             .expect("a fact of this task");
         let problem = self.problem.clone();
-        for rule in problem
-            .rules
-            .iter()
-            .filter(|rule| rule.predicate == predicate)
-        {
+        let rules_of_predicate = Arc::clone(&self.rules_of_predicate);
+        let mut bodies = Vec::new();
+        for &position in &rules_of_predicate[predicate.index()] {
+            let rule = &problem.rules[position];
             let fits = rule
                 .parameters
                 .iter()
                 .zip(&arguments)
                 .all(|(variable, &object)| problem.has_type(object, &variable.types));
             if fits {
-                let body = self.ground_condition(&rule.body, &mut arguments.clone());
-                self.rules.push(GroundRule { head: fact, body });
+                bodies.push(self.ground_condition(&rule.body, &mut arguments.clone()));
             }
         }
+        self.rules.add(fact, bodies);
     }
 
     /// The timed initials by time, those of one time together in the order of the file.

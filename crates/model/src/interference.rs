@@ -141,10 +141,8 @@ impl Footprint {
     }
 
     fn include_condition(&mut self, task: &Task, condition: &Condition) {
-        condition.visit_facts(&mut |fact| {
-            task.for_each_basis(fact, &mut |basic| {
-                self.reads.insert(basic);
-            });
+        task.visit_facts_of(condition, &mut |fact| {
+            self.reads.insert(fact);
         });
         task.visit_fluents_of(condition, &mut |fluent| {
             self.reads_fluents.insert(fluent);
@@ -159,10 +157,10 @@ impl Footprint {
 }
 
 impl Task {
-    /// Calls `visit` for the fact itself, or, if it is derived, for each basic fact that its rules
-    /// mention, directly or through other derived facts.
-    pub fn for_each_basis(&self, fact: FactId, visit: &mut impl FnMut(FactId)) {
-        for fact in self.closure(fact) {
+    /// Calls `visit` for each basic fact that a condition reads; a derived fact counts as all
+    /// basic facts that its rules mention, directly or through other derived facts.
+    pub fn visit_facts_of(&self, condition: &Condition, visit: &mut impl FnMut(FactId)) {
+        for fact in self.closure(condition) {
             if !self.is_derived(fact) {
                 visit(fact);
             }
@@ -172,34 +170,28 @@ impl Task {
     /// Calls `visit` for each fluent that a condition reads, also through derived facts.
     pub fn visit_fluents_of(&self, condition: &Condition, visit: &mut impl FnMut(FluentId)) {
         condition.visit_fluents(visit);
-        condition.visit_facts(&mut |fact| {
-            if self.is_derived(fact) {
-                let closure = self.closure(fact);
-                for rule in self
-                    .rules()
-                    .iter()
-                    .filter(|rule| closure.contains(&rule.head))
-                {
-                    rule.body.visit_fluents(visit);
-                }
+        for fact in self.closure(condition) {
+            for rule in self.rules_of(fact) {
+                rule.body.visit_fluents(visit);
             }
-        });
+        }
     }
 
-    /// The fact and everything its rules mention, transitively.
-    fn closure(&self, fact: FactId) -> BTreeSet<FactId> {
-        let mut reached = BTreeSet::from([fact]);
-        let mut frontier = vec![fact];
+    /// The facts that a condition mentions and everything their rules mention, transitively.
+    fn closure(&self, condition: &Condition) -> BTreeSet<FactId> {
+        let mut reached = BTreeSet::new();
+        let mut frontier = Vec::new();
+        let mut reach = |condition: &Condition, frontier: &mut Vec<FactId>| {
+            condition.visit_facts(&mut |mentioned| {
+                if reached.insert(mentioned) {
+                    frontier.push(mentioned);
+                }
+            });
+        };
+        reach(condition, &mut frontier);
         while let Some(fact) = frontier.pop() {
-            if !self.is_derived(fact) {
-                continue;
-            }
-            for rule in self.rules().iter().filter(|rule| rule.head == fact) {
-                rule.body.visit_facts(&mut |mentioned| {
-                    if reached.insert(mentioned) {
-                        frontier.push(mentioned);
-                    }
-                });
+            for rule in self.rules_of(fact) {
+                reach(&rule.body, &mut frontier);
             }
         }
         reached

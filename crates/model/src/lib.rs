@@ -17,6 +17,7 @@
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
 
+pub mod derivation;
 mod describe;
 mod domains;
 pub mod ground;
@@ -31,9 +32,10 @@ mod task;
 mod terms;
 pub mod validate;
 
+pub use derivation::GroundRule;
 pub use interference::Footprint;
 pub use plan::{Step, TimeTriggeredPlan};
 pub use problem::Problem;
 pub use simplify::Constants;
-pub use task::{GroundRule, InstantiateError, State, Task, TimedHappening};
+pub use task::{InstantiateError, State, Task, TimedHappening};
 pub use validate::{Verdict, validate};

@@ -35,10 +35,11 @@ mod writes;
 
 use std::collections::BTreeSet;
 
+use crate::derivation::GroundRule;
 use crate::domains::Domains;
 use crate::ground::{Action, Condition, FactId};
 use crate::problem::{self, ObjectId, Problem, SchemaId, TimedChange};
-use crate::task::{GroundRule, Task};
+use crate::task::Task;
 
 use constants::{Memory, Unwritten};
 use event::Symbol;
@@ -107,7 +108,10 @@ pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
         relaxation: &reachable.relaxation,
         memory: &mut memory,
     };
-    let rules = task.rules.iter().filter(|rule| facts.contains(&rule.head));
+    let rules = task
+        .rules()
+        .iter()
+        .filter(|rule| facts.contains(&rule.head));
     let rules = rules.map(|rule| GroundRule {
         head: rule.head,
         body: rule.body.clone().simplified(&mut constants),

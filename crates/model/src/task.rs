@@ -1,11 +1,12 @@
 //! A problem with its table of ground facts and fluents.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use elbowroom_num::Rational;
 use indexmap::Equivalent;
 
+use crate::derivation::{Derivation, GroundRule, Rules, Strata};
 use crate::domains::Domains;
 use crate::ground::{Change, Condition, FactId, FluentId};
 use crate::hash::Set;
@@ -24,9 +25,11 @@ pub struct Task {
     pub(crate) initial: State,
     pub(crate) timed: Vec<TimedHappening>,
     pub(crate) goal: Condition,
-    pub(crate) rules: Vec<GroundRule>,
-    /// Derived facts whose rules are in `rules` already.
-    pub(crate) derived: BTreeSet<FactId>,
+    /// For each predicate, the positions of its rules in the problem.
+    pub(crate) rules_of_predicate: Arc<Vec<Vec<usize>>>,
+    pub(crate) rules: Rules,
+    /// The strata of `rules`, once something has asked for them; inside, `None` if there are none.
+    strata: OnceLock<Option<Arc<Strata>>>,
     /// Derived facts whose rules are not in `rules` yet.
     waiting: Vec<FactId>,
     is_grounding_rules: bool,
@@ -48,15 +51,6 @@ pub struct TimedHappening {
     pub time: Rational,
     /// What happens: additions, deletions and assignments of constants.
     pub changes: Vec<Change>,
-}
-
-/// `head` holds whenever `body` does.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GroundRule {
-    /// The derived fact.
-    pub head: FactId,
-    /// When it holds.
-    pub body: Condition,
 }
 
 /// An action cannot be instantiated as asked.
@@ -98,8 +92,9 @@ impl Task {
             initial: State::default(),
             timed: Vec::new(),
             goal: Condition::TRUE,
-            rules: Vec::new(),
-            derived: BTreeSet::new(),
+            rules_of_predicate: Arc::new(rules_of_predicate(&problem)),
+            rules: Rules::default(),
+            strata: OnceLock::new(),
             waiting: Vec::new(),
             is_grounding_rules: false,
         };
@@ -138,7 +133,21 @@ impl Task {
 
     /// The rules of all derived facts in the table, closed under what their bodies mention.
     pub fn rules(&self) -> &[GroundRule] {
-        &self.rules
+        self.rules.as_slice()
+    }
+
+    /// The rules whose head is the fact; none for a basic fact.
+    pub fn rules_of(&self, fact: FactId) -> &[GroundRule] {
+        self.rules.of(fact)
+    }
+
+    /// How derived facts follow from basic ones; `None` if one depends on its own negation.
+    pub fn derivation(&self) -> Option<Derivation<'_>> {
+        let strata = self
+            .strata
+            .get_or_init(|| Strata::of(&self.rules).map(Arc::new))
+            .as_deref()?;
+        Some(Derivation::new(&self.rules, strata))
     }
 
     /// Whether rules define the fact.
@@ -231,6 +240,7 @@ impl Task {
         while let Some(fact) = self.waiting.pop() {
             self.ground_rules(fact);
         }
+        self.strata.take();
         self.is_grounding_rules = false;
     }
 
@@ -241,6 +251,14 @@ impl Task {
         let (index, _) = self.fluents.insert_full((function, arguments.to_vec()));
         FluentId(narrow(index))
     }
+}
+
+fn rules_of_predicate(problem: &Problem) -> Vec<Vec<usize>> {
+    let mut positions = vec![Vec::new(); problem.predicates.len()];
+    for (position, rule) in problem.rules.iter().enumerate() {
+        positions[rule.predicate.index()].push(position);
+    }
+    positions
 }
 
 /// A symbol with its arguments, to look up in a table without a vector of its own.

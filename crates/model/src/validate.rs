@@ -30,7 +30,6 @@
 //! }
 //! ```
 
-mod derived;
 mod display;
 mod effects;
 mod explain;
@@ -152,7 +151,7 @@ pub struct Report {
 
 /// Judges a plan. The plan's actions must have been instantiated from this task.
 pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> Verdict {
-    let Some(derivation) = derived::Derivation::of(task) else {
+    let Some(derivation) = task.derivation() else {
         return Verdict::Undecided(Undecided {
             time: None,
             difficulty: Difficulty::Unstratified,

@@ -195,6 +195,12 @@ pub enum Refusal {
         /// How many are considered.
         limit: usize,
     },
+    /// A derived fact depends on its own negation.
+    #[error("{place}: a derived fact depends on its own negation; rewrite the rules without that")]
+    Unstratified {
+        /// Where it is read.
+        place: String,
+    },
     /// A number is left open that is not among the plan's parameters.
     #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
     OpenNumber {

@@ -144,10 +144,12 @@ impl<'a> Soundness<'a> {
         self.refutations
     }
 
-    /// The first obligation that some schedule for some value in the box breaks.
+    /// The first obligation that some schedule for some value in the box breaks. The box contains
+    /// the plan's nominal values, or those that this was made [around](Self::around).
     ///
     /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
-    /// end, further out than before, from the last one for which the answer was `None`.
+    /// end, further out than before, from the last one for which the answer was `None`, and all
+    /// boxes asked about since have been that one with an end moved out.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.

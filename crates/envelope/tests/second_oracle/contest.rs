@@ -187,22 +187,27 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
     steps
 }
 
-/// A box with the nominal point in it.
+/// A box near the nominal point, mostly with that point in it.
 fn random_box(
     dice: &mut Dice,
     nominal: &[Rational],
     parameters: &[Parameter],
 ) -> DecoupledEnvelope {
     let mut envelope = DecoupledEnvelope::point(nominal);
+    let is_around = dice.chance(75);
     for (interval, parameter) in envelope.intervals.iter_mut().zip(parameters) {
-        let width = *dice.pick(&[0, 0, 1, 2, 4]);
-        let below = Rational::new(dice.between(0, width), 2);
-        let above = Rational::new(dice.between(0, width), 2);
+        let width = *dice.pick(&[0, 0, 1, 2, 4, 8]);
+        let below = dice.between(if is_around { 0 } else { -width }, width);
+        let above = dice.between(if is_around { 0 } else { -below }, width);
+        let (below, above) = (Rational::new(below, 2), Rational::new(above, 2));
         let wide = elbowroom_num::Interval::closed(
             &parameter.nominal - &below,
             &parameter.nominal + &above,
         );
-        *interval = wide.intersection(&parameter.range);
+        let wide = wide.intersection(&parameter.range);
+        if !wide.is_empty() {
+            *interval = wide;
+        }
     }
     envelope
 }

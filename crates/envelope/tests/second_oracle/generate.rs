@@ -17,27 +17,45 @@ use crate::dice::Dice;
 use crate::numbers;
 use crate::system::System;
 
-/// A case, and times at which its plan works with the nominal values.
-pub(crate) struct Generated {
-    pub(crate) case: Case,
-    /// By node.
-    pub(crate) schedule: Vec<Rational>,
+/// What a case has more of than others.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Theme {
+    /// Nothing.
+    Mixed,
+    /// Timed initials, open ones, and disjunctions that depend on them.
+    Timed,
+    /// Continuous effects, and numbers left open in them.
+    Rates,
+    /// Conditional effects.
+    Guards,
+}
+
+impl Theme {
+    const ALL: [Self; 6] = [
+        Self::Mixed,
+        Self::Mixed,
+        Self::Mixed,
+        Self::Timed,
+        Self::Rates,
+        Self::Guards,
+    ];
 }
 
 /// The case of that number.
-pub(crate) fn generate(seed: u64) -> Generated {
+pub(crate) fn generate(seed: u64) -> Case {
     let mut dice = Dice::new(seed);
     loop {
-        if let Some(generated) = attempt(&mut dice) {
-            return generated;
+        if let Some(case) = attempt(&mut dice) {
+            return case;
         }
     }
 }
 
 /// Nothing if the happenings as drawn get in each other's way.
-fn attempt(dice: &mut Dice) -> Option<Generated> {
+fn attempt(dice: &mut Dice) -> Option<Case> {
+    let theme = *dice.pick(&Theme::ALL);
     let case = Case {
-        problem: skeleton(dice),
+        problem: skeleton(dice, theme),
         gaps: Vec::new(),
         parameters: Vec::new(),
         initial: std::collections::BTreeMap::new(),
@@ -57,6 +75,7 @@ fn attempt(dice: &mut Dice) -> Option<Generated> {
     let mut nominal = Nominal {
         case,
         schedule,
+        theme,
         dice,
     };
     nominal.add_conditions();
@@ -66,14 +85,11 @@ fn attempt(dice: &mut Dice) -> Option<Generated> {
     if nominal.dice.chance(75) {
         nominal.tighten();
     }
-    Some(Generated {
-        case: nominal.case,
-        schedule: nominal.schedule,
-    })
+    Some(nominal.case)
 }
 
 /// Actions with effects only, and timed initials.
-fn skeleton(dice: &mut Dice) -> Problem {
+fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
     let (facts, fluents) = (1 + dice.below(3), 1 + dice.below(2));
     let name = |prefix: &str, index: usize| format!("{prefix}{index}");
     let mut problem = Problem {
@@ -110,8 +126,8 @@ fn skeleton(dice: &mut Dice) -> Problem {
             problem.initial_values.push(entry);
         }
     }
-    for index in 0..*dice.pick(&[2, 2, 3, 3, 3, 4]) {
-        let body = body(dice, facts, fluents);
+    for index in 0..*dice.pick(&[2, 2, 3, 3, 3, 4, 4, 5]) {
+        let body = body(dice, facts, fluents, theme);
         problem.schemas.push(Schema {
             name: name("a", index),
             parameters: Vec::new(),
@@ -120,8 +136,13 @@ fn skeleton(dice: &mut Dice) -> Problem {
         });
     }
     let mut time = Rational::ZERO;
-    for _ in 0..*dice.pick(&[0, 0, 1, 1, 2]) {
-        time += dice.half(1, 6);
+    let timed: &[usize] = if theme == Theme::Timed {
+        &[2, 3]
+    } else {
+        &[0, 0, 1, 1, 2]
+    };
+    for _ in 0..*dice.pick(timed) {
+        time += dice.half(1, if theme == Theme::Timed { 3 } else { 6 });
         for _ in 0..1 + dice.below(2) {
             problem.timed.push(TimedInitial {
                 time: time.clone(),
@@ -144,27 +165,34 @@ fn timed_change(dice: &mut Dice, facts: usize, fluents: usize) -> TimedChange {
     }
 }
 
-fn body(dice: &mut Dice, facts: usize, fluents: usize) -> Body {
+fn body(dice: &mut Dice, facts: usize, fluents: usize, theme: Theme) -> Body {
     if dice.chance(30) {
         return Body::Instantaneous {
             condition: Condition::TRUE,
-            effects: effects(dice, facts, fluents, false),
+            effects: effects(dice, facts, fluents, (false, theme)),
         };
     }
-    let continuous = if dice.chance(40) {
+    let continuous = if dice.chance(if theme == Theme::Rates { 90 } else { 40 }) {
         vec![ContinuousEffect {
             variables: Vec::new(),
-            guard: Guard::default(),
+            guard: if dice.chance(guarded(theme) / 2) {
+                Guard {
+                    at_start: literal(dice, facts, fluents),
+                    ..Guard::default()
+                }
+            } else {
+                Guard::default()
+            },
             fluent: fluent(dice.below(fluents)),
             rate: rate(dice, fluents),
         }]
     } else {
         Vec::new()
     };
-    let start_effects = effects(dice, facts, fluents, true);
-    let mut end_effects = effects(dice, facts, fluents, true);
+    let start_effects = effects(dice, facts, fluents, (true, theme));
+    let mut end_effects = effects(dice, facts, fluents, (true, theme));
     for effect in &mut end_effects {
-        if dice.chance(5) {
+        if dice.chance(guarded(theme)) {
             effect.guard.at_start = literal(dice, facts, fluents);
         }
     }
@@ -177,6 +205,11 @@ fn body(dice: &mut Dice, facts: usize, fluents: usize) -> Body {
         end_effects,
         continuous,
     }
+}
+
+/// How many effects in a hundred depend on a condition.
+fn guarded(theme: Theme) -> usize {
+    if theme == Theme::Guards { 40 } else { 4 }
 }
 
 fn rate(dice: &mut Dice, fluents: usize) -> Expression {
@@ -192,10 +225,15 @@ fn rate(dice: &mut Dice, fluents: usize) -> Expression {
     }
 }
 
-fn effects(dice: &mut Dice, facts: usize, fluents: usize, is_durative: bool) -> Vec<Effect> {
+fn effects(
+    dice: &mut Dice,
+    facts: usize,
+    fluents: usize,
+    (is_durative, theme): (bool, Theme),
+) -> Vec<Effect> {
     let count = *dice.pick(&[0, 1, 1, 2]);
     let effect = |dice: &mut Dice| {
-        let guard = if dice.chance(6) {
+        let guard = if dice.chance(guarded(theme)) {
             Guard {
                 now: literal(dice, facts, fluents),
                 ..Guard::default()
@@ -308,6 +346,7 @@ enum Place {
 struct Nominal<'d> {
     case: Case,
     schedule: Vec<Rational>,
+    theme: Theme,
     dice: &'d mut Dice,
 }
 
@@ -343,7 +382,8 @@ impl Nominal<'_> {
     }
 
     fn condition(&mut self, place: Place) -> Condition {
-        match self.dice.below(10) {
+        let compound = if self.theme == Theme::Timed { 4 } else { 10 };
+        match self.dice.below(compound) {
             0 => Condition::Or(vec![self.simple(place), self.simple(place)]),
             1 => {
                 let parts = vec![self.simple(place), self.simple(place)];
@@ -584,7 +624,12 @@ impl Nominal<'_> {
     /// Makes one to four numbers parameters.
     fn open_numbers(&mut self) {
         for _ in 0..*self.dice.pick(&[1, 1, 2, 2, 3, 4]) {
-            match self.dice.below(10) {
+            let which = match self.theme {
+                Theme::Timed if self.dice.chance(60) => 8,
+                Theme::Rates if self.dice.chance(70) => 5,
+                _ => self.dice.below(10),
+            };
+            match which {
                 0..=3 => self.open_duration(),
                 4 => self.open_bound(),
                 5..=6 => self.open_constant(),

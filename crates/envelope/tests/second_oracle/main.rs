@@ -35,8 +35,10 @@ fn setting(name: &str, default: u64) -> u64 {
 }
 
 fn script(seed: u64, length: usize) -> Script {
-    let case = generate(seed).case;
-    let steps = steps(&mut Dice::new(seed + 1), &case.parameters, length);
+    let case = generate(seed);
+    let mut dice = Dice::new(seed + 1);
+    let length = if dice.chance(10) { 3 * length } else { length };
+    let steps = steps(&mut dice, &case.parameters, length);
     Script { case, steps }
 }
 

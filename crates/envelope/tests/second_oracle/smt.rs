@@ -91,8 +91,8 @@ fn in_box(envelope: &DecoupledEnvelope) -> String {
 fn number(value: &Rational) -> String {
     let text = value.abs().to_string();
     let text = match text.split_once('/') {
-        Some((numerator, denominator)) => format!("(/ {numerator} {denominator})"),
-        None => text,
+        Some((numerator, denominator)) => format!("(/ {numerator}.0 {denominator}.0)"),
+        None => format!("{text}.0"),
     };
     if value.is_negative() {
         format!("(- {text})")
@@ -118,7 +118,7 @@ fn or(parts: &[String]) -> String {
 }
 
 fn sum(parts: &[String]) -> String {
-    apply("+", "0", parts)
+    apply("+", "0.0", parts)
 }
 
 /// Where an expression is read.
@@ -217,9 +217,7 @@ impl<'a> Encoder<'a> {
     /// Each node has a position, each position a node, and times follow positions.
     fn positions(&mut self) {
         let count = self.count();
-        // Not defined as 0: older versions of Z3 take a whole number there for an `Int` only.
-        self.line("(declare-const tau0 Real)");
-        self.line("(assert (= tau0 0))");
+        self.line("(define-fun tau0 () Real 0.0)");
         for k in 1..=count {
             self.line(&format!("(declare-const tau{k} Real)"));
             self.assert(&format!("(<= tau{} tau{k})", k - 1));
@@ -309,8 +307,7 @@ impl<'a> Encoder<'a> {
                 Some(id) => format!("g{}", id.0),
                 None => number(value),
             };
-            self.line(&format!("(declare-const v{}_0 Real)", fluent.0));
-            self.line(&format!("(assert (= v{}_0 {value}))", fluent.0));
+            self.line(&format!("(define-fun v{}_0 () Real {value})", fluent.0));
         }
         for k in 1..=self.count() {
             for fluent in 0..fluents {
@@ -365,7 +362,7 @@ impl<'a> Encoder<'a> {
     ) -> Result<String, NotEncoded> {
         let rate = self.expression(&effect.rate, &At::After(from), Some(id))?;
         Ok(format!(
-            "(ite (and {} (not {}) guard{}_{}) (* {rate} (- {until} tau{from})) 0)",
+            "(ite (and {} (not {}) guard{}_{}) (* {rate} (- {until} tau{from})) 0.0)",
             self.before(self.start(id), next),
             self.before(self.end(id), next),
             id.0,
@@ -642,7 +639,7 @@ impl<'a> Encoder<'a> {
             Expression::Unknown(Unknown::Parameter(id)) => format!("g{id}"),
             Expression::Unknown(_) | Expression::TotalTime => return Err(NotEncoded),
             Expression::Add(parts) => sum(&all(parts)?),
-            Expression::Multiply(parts) => apply("*", "1", &all(parts)?),
+            Expression::Multiply(parts) => apply("*", "1.0", &all(parts)?),
             Expression::Subtract(left, right) => format!(
                 "(- {} {})",
                 self.expression(left, at, action)?,

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
 
-use super::reading::{Moment, holds};
+use super::reading::Fault;
 use super::state::Reading;
 use super::violation::{Occurrence, Reason};
+use crate::derivation::{Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::task::Task;
 
@@ -16,7 +17,7 @@ pub(super) struct Witness<'a> {
     /// Numbers at the moment in question.
     pub(super) reading: &'a Reading<'a>,
     /// Facts, derived ones included, at that moment.
-    pub(super) moment: &'a dyn Moment,
+    pub(super) moment: &'a dyn Moment<Fault>,
     /// What last changed a fact.
     pub(super) since: &'a dyn Fn(FactId) -> Option<Occurrence>,
 }

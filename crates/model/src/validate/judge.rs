@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use super::derived::{Derivation, Derived};
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
-use super::piece::{Break, Piece, mentions_derived};
-use super::reading::{Fault, Moment, holds};
+use super::piece::{Break, Piece};
+use super::reading::Fault;
 use super::state::{Motion, Now, Reading};
 use super::stop::{Place, Stop};
 use super::timeline::{Group, What};
 use super::violation::{Mistake, Reason, When};
 use super::{Settings, effects, interference};
+use crate::derivation::{Derivation, Derived, Moment, holds};
 use crate::ground::{Body, Condition, DurativeBody, FactId, SnapAction};
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::task::Task;
@@ -27,7 +27,7 @@ pub(super) struct Judge<'a> {
     pub(super) derivation: Derivation<'a>,
     pub(super) now: Now,
     /// The derived facts that hold in `now`, once something has asked for them.
-    pub(super) derived: OnceCell<Derived>,
+    pub(super) derived: OnceCell<Derived<Fault>>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
     /// What last changed each fact: time and happening.
@@ -269,12 +269,12 @@ impl<'a> Judge<'a> {
     fn with_moment<T>(
         &self,
         condition: &Condition,
-        (now, derived): (&Now, &OnceCell<Derived>),
+        (now, derived): (&Now, &OnceCell<Derived<Fault>>),
         step: Option<usize>,
-        look: &dyn Fn(&Reading<'_>, &dyn Moment) -> T,
+        look: &dyn Fn(&Reading<'_>, &dyn Moment<Fault>) -> T,
     ) -> T {
         let reading = self.reading_of(now, step);
-        if mentions_derived(condition, &self.derivation) {
+        if self.derivation.is_read_by(condition) {
             // Rules know no `?duration`.
             let derive = || self.derivation.derive(&self.reading_of(now, None));
             let derived = derived.get_or_init(derive);

@@ -6,10 +6,10 @@
 
 use elbowroom_num::Rational;
 
-use super::derived::Derivation;
 use super::polynomial::{Polynomial, Root};
-use super::reading::{Fault, Moment, compare_signs, evaluate, holds};
+use super::reading::{Fault, compare_signs, evaluate};
 use super::state::{Motion, Now};
+use crate::derivation::{Derivation, Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::problem::Comparison;
 
@@ -53,7 +53,7 @@ impl Piece<'_> {
         duration: Option<&Rational>,
         includes_start: bool,
     ) -> Result<Option<Break>, Fault> {
-        let reads_derived = mentions_derived(condition, self.derivation);
+        let reads_derived = self.derivation.is_read_by(condition);
         if !self.concerns(condition, reads_derived) {
             let view = self.view(duration, Place::Point(Rational::ZERO));
             let is_broken = !self.look(condition, &view, reads_derived)?;
@@ -198,15 +198,6 @@ fn visit_comparisons(condition: &Condition, visit: &mut impl FnMut(&Expression, 
     }
 }
 
-/// Whether rules define any fact that the condition reads.
-pub(super) fn mentions_derived(condition: &Condition, derivation: &Derivation<'_>) -> bool {
-    let mut mentions = false;
-    if !derivation.is_empty() {
-        condition.visit_facts(&mut |fact| mentions |= derivation.defines(fact));
-    }
-    mentions
-}
-
 /// One cut, or the moments strictly between two neighbouring cuts.
 struct Cell {
     /// Where to look.
@@ -290,7 +281,7 @@ impl View<'_> {
     }
 }
 
-impl Moment for View<'_> {
+impl Moment<Fault> for View<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Fault> {
         Ok(self.piece.now.facts[fact.index()])
     }

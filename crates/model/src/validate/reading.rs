@@ -1,9 +1,9 @@
-//! What a condition or an expression says at one moment.
+//! What an expression says at one moment.
 
 use elbowroom_num::Rational;
 
 use super::polynomial::Polynomial;
-use crate::ground::{Condition, Expression, FactId, FluentId};
+use crate::ground::{Expression, FluentId};
 use crate::problem::{Comparison, Unknown};
 
 /// Why a condition or an expression says nothing.
@@ -21,45 +21,6 @@ pub(super) enum Fault {
     Quotient(Expression),
     /// It reads a fluent whose rate of change depends, in the end, on the fluent itself.
     Circular(FluentId),
-}
-
-/// A moment at which conditions are read.
-pub(super) trait Moment {
-    /// Whether a fact, basic or derived, is true.
-    fn fact(&self, fact: FactId) -> Result<bool, Fault>;
-
-    /// Whether `left comparison right`.
-    fn compare(
-        &self,
-        comparison: Comparison,
-        left: &Expression,
-        right: &Expression,
-    ) -> Result<bool, Fault>;
-}
-
-/// Whether the condition holds. A part that says nothing does not matter where the other parts
-/// decide: `(or (p) (> (undefined) 0))` holds if `(p)` does.
-pub(super) fn holds(condition: &Condition, moment: &dyn Moment) -> Result<bool, Fault> {
-    match condition {
-        Condition::Fact(fact) => moment.fact(*fact),
-        Condition::Compare(comparison, left, right) => moment.compare(*comparison, left, right),
-        Condition::Not(part) => holds(part, moment).map(|value| !value),
-        Condition::And(parts) => combine(parts, moment, false),
-        Condition::Or(parts) => combine(parts, moment, true),
-    }
-}
-
-/// `decisive` if one part is, its opposite if no part is, else the first fault.
-fn combine(parts: &[Condition], moment: &dyn Moment, decisive: bool) -> Result<bool, Fault> {
-    let mut fault = None;
-    for part in parts {
-        match holds(part, moment) {
-            Ok(value) if value == decisive => return Ok(decisive),
-            Ok(_) => {}
-            Err(new) => fault = fault.or(Some(new)),
-        }
-    }
-    fault.map_or(Ok(!decisive), Err)
 }
 
 /// Numbers, or numbers that change with time.

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use elbowroom_num::Rational;
 
 use super::polynomial::Polynomial;
-use super::reading::{Fault, Moment, compare_signs, evaluate};
+use super::reading::{Fault, compare_signs, evaluate};
+use crate::derivation::Moment;
 use crate::ground::{Expression, FactId, FluentId};
 use crate::problem::Comparison;
 use crate::task::{State, Task};
@@ -66,7 +67,7 @@ impl Reading<'_> {
     }
 }
 
-impl Moment for Reading<'_> {
+impl Moment<Fault> for Reading<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Fault> {
         Ok(self.now.facts[fact.index()])
     }

@@ -1,5 +1,6 @@
 //! The symbolic run.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -602,6 +603,7 @@ impl Compiler<'_> {
             action,
             substitution: &self.substitution,
             place,
+            derived: OnceCell::new(),
         }
     }
 }

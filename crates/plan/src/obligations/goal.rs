@@ -1,5 +1,6 @@
 //! The goal holds after the last happening of the plan's actions.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use elbowroom_model::Task;
@@ -8,7 +9,10 @@ use elbowroom_model::ground::Condition;
 use super::dnf::Wanted;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Refusal, Substitution};
-use crate::stn_plan::{Node, NodeId, StnPlan};
+use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
+
+/// How many timed initials at open times one conjunct of the goal may depend on.
+const MOST_OPEN: usize = 10;
 
 /// How one conjunct of the goal can be violated.
 ///
@@ -23,10 +27,8 @@ pub(super) fn goal_cases(
     condition: &Condition,
 ) -> Result<Vec<BadCase>, Refusal> {
     let mut touched = BTreeSet::new();
-    condition.visit_facts(&mut |fact| {
-        task.for_each_basis(fact, &mut |basis| {
-            touched.extend(timeline.fact_nodes(basis));
-        });
+    task.visit_facts_of(condition, &mut |fact| {
+        touched.extend(timeline.fact_nodes(fact));
     });
     task.visit_fluents_of(condition, &mut |fluent| {
         touched.extend(timeline.fluent_nodes(fluent));
@@ -36,34 +38,63 @@ pub(super) fn goal_cases(
         .filter(|(id, node)| matches!(node, Node::Timed(_)) && touched.contains(id))
         .map(|(id, _)| id)
         .collect();
+    let (open, fixed): (Vec<_>, Vec<_>) = timed.into_iter().partition(|&id| is_open(plan, id));
+    if open.len() > MOST_OPEN {
+        return Err(Refusal::TooManyCases {
+            place: "timed initials that the goal depends on".to_owned(),
+            limit: 1 << MOST_OPEN,
+        });
+    }
     let lasts = lasts(plan);
     let mut cases = Vec::new();
-    for happened in 0..=timed.len() {
-        let (before, after) = timed.split_at(happened);
+    let choices =
+        (0..=fixed.len()).flat_map(|count| (0..1_usize << open.len()).map(move |w| (count, w)));
+    for (happened, which) in choices {
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        for (index, &node) in open.iter().enumerate() {
+            let side = if which >> index & 1 == 1 {
+                &mut before
+            } else {
+                &mut after
+            };
+            side.push(node);
+        }
+        let has_happened =
+            |node: NodeId| !after.contains(&node) && !fixed[happened..].contains(&node);
         let reading = Reading {
             task,
             timeline,
-            cut: &|node| !after.contains(&node),
+            cut: &has_happened,
             // Nothing drifts any more, so the moment of reading does not matter.
             moment: NodeId::ZERO,
             action: None,
             substitution,
             place: "goal",
+            derived: OnceCell::new(),
         };
-        let mut common = Vec::new();
-        if let Some(&next) = after.first() {
-            common.extend(lasts.iter().map(|&last| Difference::before(last, next)));
-        }
-        let windows: Vec<Vec<Difference>> = match before.last() {
-            None => vec![common],
-            Some(&previous) => lasts
+        // Of the fixed ones the next to happen and the latest that has are enough.
+        let latest = happened.checked_sub(1).map(|index| fixed[index]);
+        let not_yet: Vec<_> = after.iter().chain(fixed.get(happened)).collect();
+        let already: Vec<_> = before.iter().chain(&latest).collect();
+        let common: Vec<_> = lasts
+            .iter()
+            .flat_map(|&last| {
+                not_yet
+                    .iter()
+                    .map(move |&&next| Difference::before(last, next))
+            })
+            .collect();
+        let windows: Vec<Vec<Difference>> = if already.is_empty() {
+            vec![common]
+        } else {
+            lasts
                 .iter()
                 .map(|&last| {
-                    let mut window = common.clone();
-                    window.push(Difference::not_after(previous, last));
-                    window
+                    let window = already.iter();
+                    let window = window.map(|&&node| Difference::not_after(node, last));
+                    window.chain(common.iter().cloned()).collect()
                 })
-                .collect(),
+                .collect()
         };
         for inequalities in reading.alternatives(condition, Wanted::NotTrue)? {
             for differences in &windows {
@@ -85,4 +116,14 @@ pub(super) fn lasts(plan: &StnPlan) -> Vec<NodeId> {
         .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
         .map(|(id, _)| id)
         .collect()
+}
+
+/// Whether the node's time depends on a parameter.
+fn is_open(plan: &StnPlan, node: NodeId) -> bool {
+    plan.constraints.iter().any(|constraint| {
+        (constraint.from == node || constraint.to == node)
+            && [&constraint.lower, &constraint.upper]
+                .iter()
+                .any(|bound| matches!(bound, Bound::Parameter(_)))
+    })
 }

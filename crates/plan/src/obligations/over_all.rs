@@ -1,5 +1,6 @@
 //! Over-all conditions: what must hold at every moment of an action's open interval.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
@@ -47,10 +48,8 @@ impl OverAll {
         substitution: &Rc<Substitution>,
     ) -> Self {
         let mut touched = BTreeSet::new();
-        condition.visit_facts(&mut |fact| {
-            task.for_each_basis(fact, &mut |basis| {
-                touched.extend(timeline.fact_nodes(basis));
-            });
+        task.visit_facts_of(condition, &mut |fact| {
+            touched.extend(timeline.fact_nodes(fact));
         });
         task.visit_fluents_of(condition, &mut |fluent| {
             touched.extend(timeline.fluent_nodes(fluent));
@@ -91,6 +90,7 @@ impl OverAll {
             action: Some((self.start, self.end)),
             substitution: &self.substitution,
             place: &plan.instance(self.instance).action.name,
+            derived: OnceCell::new(),
         };
         reading.alternatives(&self.condition, Wanted::NotTrue)
     }

@@ -1,10 +1,12 @@
 //! What happens to each fact and fluent, in the order of a nominal schedule.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
-use elbowroom_model::problem::Unknown;
+use elbowroom_model::derivation::{Derived, Moment};
+use elbowroom_model::ground::{Expression, FactId, FluentId};
+use elbowroom_model::problem::{Comparison, Unknown};
 use elbowroom_num::Rational;
 
 use super::{Inequality, Refusal, Substitution};
@@ -68,6 +70,8 @@ pub(crate) struct Reading<'a> {
     pub(crate) substitution: &'a Substitution,
     /// For messages.
     pub(crate) place: &'a str,
+    /// The derived facts at the cut, once something has asked for one.
+    pub(crate) derived: OnceCell<Derived<Refusal>>,
 }
 
 impl Timeline {
@@ -189,70 +193,18 @@ pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> L
 impl Reading<'_> {
     /// Whether the fact is true at the cut.
     pub(crate) fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
-        if self.task.is_derived(fact) {
-            return self.derived_fact(fact);
-        }
-        Ok(self.timeline.is_true(fact, self.cut))
-    }
-
-    /// A derived fact, by recursion over its rules with the facts on the way assumed false: for
-    /// stratified rules that is the least fixpoint.
-    fn derived_fact(&self, fact: FactId) -> Result<bool, Refusal> {
-        self.derivable(fact, &mut Vec::new())
-    }
-
-    fn derivable(&self, fact: FactId, on_the_way: &mut Vec<FactId>) -> Result<bool, Refusal> {
         if !self.task.is_derived(fact) {
             return Ok(self.timeline.is_true(fact, self.cut));
         }
-        if on_the_way.contains(&fact) {
-            return Ok(false);
-        }
-        on_the_way.push(fact);
-        let mut derived = false;
-        for rule in self.task.rules().iter().filter(|rule| rule.head == fact) {
-            if self.body_holds(&rule.body, on_the_way)? {
-                derived = true;
-                break;
-            }
-        }
-        on_the_way.pop();
-        Ok(derived)
-    }
-
-    fn body_holds(&self, body: &Condition, on_the_way: &mut Vec<FactId>) -> Result<bool, Refusal> {
-        Ok(match body {
-            Condition::Fact(fact) => self.derivable(*fact, on_the_way)?,
-            Condition::Not(part) => !self.body_holds(part, on_the_way)?,
-            Condition::And(parts) => {
-                for part in parts {
-                    if !self.body_holds(part, on_the_way)? {
-                        return Ok(false);
-                    }
-                }
-                true
-            }
-            Condition::Or(parts) => {
-                for part in parts {
-                    if self.body_holds(part, on_the_way)? {
-                        return Ok(true);
-                    }
-                }
-                false
-            }
-            Condition::Compare(comparison, left, right) => {
-                let (Some(left), Some(right)) = (self.linear(left)?, self.linear(right)?) else {
-                    return Ok(false);
-                };
-                let (Some(left), Some(right)) = (left.as_constant(), right.as_constant()) else {
-                    return Err(Refusal::NotLinear {
-                        place: self.place.to_owned(),
-                        expression: "a derived predicate over numbers that vary".to_owned(),
-                    });
-                };
-                comparison.holds(left, right)
-            }
-        })
+        let derivation = self
+            .task
+            .derivation()
+            .ok_or_else(|| Refusal::Unstratified {
+                place: self.place.to_owned(),
+            })?;
+        let basic = Basic(self);
+        let derived = self.derived.get_or_init(|| derivation.derive(&basic));
+        derivation.on_top_of(&basic, derived).fact(fact)
     }
 
     /// The expression's value at the cut and moment; `None` where it is undefined.
@@ -320,3 +272,34 @@ impl Reading<'_> {
         }
     }
 }
+
+/// What rules read: basic facts, and comparisons of constants.
+struct Basic<'a>(&'a Reading<'a>);
+
+impl Moment<Refusal> for Basic<'_> {
+    fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
+        Ok(self.0.timeline.is_true(fact, self.0.cut))
+    }
+
+    /// A comparison with an undefined number is false.
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, Refusal> {
+        let (Some(left), Some(right)) = (self.0.linear(left)?, self.0.linear(right)?) else {
+            return Ok(false);
+        };
+        let (Some(left), Some(right)) = (left.as_constant(), right.as_constant()) else {
+            return Err(Refusal::NotLinear {
+                place: self.0.place.to_owned(),
+                expression: "a derived predicate over numbers that vary".to_owned(),
+            });
+        };
+        Ok(comparison.holds(left, right))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,204 @@
+//! Derived facts: the stratified least fixpoint of their rules.
+//!
+//! Facts that rest on each other form a stratum; a stratum is settled after those it rests on, in
+//! time linear in the size of its rules, and without recursion along chains of rules.
+
+mod circuit;
+mod rules;
+mod strata;
+
+use std::collections::BTreeMap;
+
+use crate::ground::{Condition, Expression, FactId};
+use crate::problem::Comparison;
+
+pub use rules::GroundRule;
+pub(crate) use rules::Rules;
+pub(crate) use strata::Strata;
+
+/// A moment at which conditions are read. A fact or a comparison may say nothing, for the reason
+/// given as `F`.
+pub trait Moment<F> {
+    /// Whether a fact is true.
+    ///
+    /// # Errors
+    /// When that cannot be said.
+    fn fact(&self, fact: FactId) -> Result<bool, F>;
+
+    /// Whether `left comparison right`.
+    ///
+    /// # Errors
+    /// When that cannot be said.
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, F>;
+}
+
+/// Whether the condition holds. A part that says nothing does not matter where the other parts
+/// decide: `(or (p) (> (undefined) 0))` holds if `(p)` does.
+///
+/// # Errors
+/// The first fault, when the other parts do not decide.
+pub fn holds<F>(condition: &Condition, moment: &dyn Moment<F>) -> Result<bool, F> {
+    match condition {
+        Condition::Fact(fact) => moment.fact(*fact),
+        Condition::Compare(comparison, left, right) => moment.compare(*comparison, left, right),
+        Condition::Not(part) => holds(part, moment).map(|value| !value),
+        Condition::And(parts) => decided_by(parts, moment, false),
+        Condition::Or(parts) => decided_by(parts, moment, true),
+    }
+}
+
+/// `decisive` if one part is, its opposite if no part is, else the first fault.
+fn decided_by<'a, F>(
+    parts: impl IntoIterator<Item = &'a Condition>,
+    moment: &dyn Moment<F>,
+    decisive: bool,
+) -> Result<bool, F> {
+    let mut fault = None;
+    for part in parts {
+        match holds(part, moment) {
+            Ok(value) if value == decisive => return Ok(decisive),
+            Ok(_) => {}
+            Err(new) => fault = fault.or(Some(new)),
+        }
+    }
+    fault.map_or(Ok(!decisive), Err)
+}
+
+/// The rules of a task, sorted so that what a rule negates is settled before the rule is used.
+#[derive(Clone, Copy, Debug)]
+pub struct Derivation<'a> {
+    rules: &'a Rules,
+    strata: &'a Strata,
+}
+
+impl<'a> Derivation<'a> {
+    /// `strata` are those of `rules`.
+    pub(crate) fn new(rules: &'a Rules, strata: &'a Strata) -> Self {
+        Self { rules, strata }
+    }
+
+    /// Whether rules define the fact.
+    pub fn defines(&self, fact: FactId) -> bool {
+        self.rules.define(fact)
+    }
+
+    /// Whether rules define any fact that the condition reads.
+    pub fn is_read_by(&self, condition: &Condition) -> bool {
+        let mut is_read = false;
+        if !self.rules.as_slice().is_empty() {
+            condition.visit_facts(&mut |fact| is_read |= self.defines(fact));
+        }
+        is_read
+    }
+
+    /// Calls `visit` for the body of each rule.
+    pub fn visit_bodies(&self, visit: &mut impl FnMut(&Condition)) {
+        for rule in self.rules.as_slice() {
+            visit(&rule.body);
+        }
+    }
+
+    /// The truth of derived facts when basic facts and numbers are as `basic` says.
+    ///
+    /// In each stratum comes first what certainly holds, then what rests on something that says
+    /// nothing; all else is false.
+    pub fn derive<F: Clone>(&self, basic: &dyn Moment<F>) -> Derived<F> {
+        let mut derived = Derived {
+            holding: vec![false; self.strata.table_size()],
+            unclear: BTreeMap::new(),
+        };
+        for stratum in self.strata.iter() {
+            match stratum {
+                [fact] if !self.strata.is_recursive(*fact) => {
+                    let bodies = self.rules.of(*fact).iter().map(|rule| &rule.body);
+                    let truth = decided_by(bodies, &self.on_top_of(basic, &derived), true);
+                    match truth {
+                        Ok(truth) => derived.holding[fact.index()] = truth,
+                        Err(fault) => derived.set_unclear(*fact, fault),
+                    }
+                }
+                stratum => circuit::settle(self, stratum, basic, &mut derived),
+            }
+        }
+        derived
+    }
+
+    /// A moment with its derived facts.
+    pub fn on_top_of<'b, F: Clone>(
+        &'b self,
+        basic: &'b dyn Moment<F>,
+        derived: &'b Derived<F>,
+    ) -> impl Moment<F> + 'b {
+        With {
+            derivation: self,
+            basic,
+            derived,
+        }
+    }
+}
+
+/// The truth of derived facts at one moment.
+#[derive(Clone, Debug)]
+pub struct Derived<F> {
+    /// By position in the task's table.
+    holding: Vec<bool>,
+    unclear: BTreeMap<FactId, F>,
+}
+
+impl<F: Clone> Derived<F> {
+    /// Whether a derived fact holds.
+    ///
+    /// # Errors
+    /// When that rests on something that says nothing.
+    pub fn truth(&self, fact: FactId) -> Result<bool, F> {
+        match self.unclear.get(&fact) {
+            Some(fault) => Err(fault.clone()),
+            None => Ok(self.holds(fact)),
+        }
+    }
+
+    fn holds(&self, fact: FactId) -> bool {
+        self.holding.get(fact.index()).copied().unwrap_or(false)
+    }
+
+    fn is_settled(&self, fact: FactId) -> bool {
+        self.holds(fact) || self.unclear.contains_key(&fact)
+    }
+
+    fn set_unclear(&mut self, fact: FactId, fault: F) {
+        self.unclear.insert(fact, fault);
+    }
+}
+
+struct With<'a, F> {
+    derivation: &'a Derivation<'a>,
+    basic: &'a dyn Moment<F>,
+    derived: &'a Derived<F>,
+}
+
+impl<F: Clone> Moment<F> for With<'_, F> {
+    fn fact(&self, fact: FactId) -> Result<bool, F> {
+        if self.derivation.defines(fact) {
+            self.derived.truth(fact)
+        } else {
+            self.basic.fact(fact)
+        }
+    }
+
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, F> {
+        self.basic.compare(comparison, left, right)
+    }
+}
+
+#[cfg(test)]
+mod tests;

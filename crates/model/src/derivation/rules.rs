@@ -1,0 +1,59 @@
+//! Ground rules, found by their heads.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::ground::{Condition, FactId};
+
+/// `head` holds whenever `body` does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundRule {
+    /// The derived fact.
+    pub head: FactId,
+    /// When it holds.
+    pub body: Condition,
+}
+
+/// Rules; those of one head stand together.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rules {
+    list: Vec<GroundRule>,
+    by_head: BTreeMap<FactId, Range<usize>>,
+}
+
+impl Rules {
+    /// Adds all rules of a head that has none yet.
+    pub(crate) fn add(&mut self, head: FactId, bodies: Vec<Condition>) {
+        if bodies.is_empty() {
+            return;
+        }
+        let first = self.list.len();
+        self.list
+            .extend(bodies.into_iter().map(|body| GroundRule { head, body }));
+        let before = self.by_head.insert(head, first..self.list.len());
+        debug_assert!(before.is_none(), "the rules of a head come at once");
+    }
+
+    /// All rules.
+    pub(crate) fn as_slice(&self) -> &[GroundRule] {
+        &self.list
+    }
+
+    /// The rules with this head.
+    pub(crate) fn of(&self, head: FactId) -> &[GroundRule] {
+        match self.by_head.get(&head) {
+            Some(range) => &self.list[range.clone()],
+            None => &[],
+        }
+    }
+
+    /// Whether a rule has this head.
+    pub(crate) fn define(&self, fact: FactId) -> bool {
+        self.by_head.contains_key(&fact)
+    }
+
+    /// Each fact that has rules, once.
+    pub(crate) fn heads(&self) -> impl ExactSizeIterator<Item = FactId> + '_ {
+        self.by_head.keys().copied()
+    }
+}
