@@ -71,7 +71,7 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
         most_checks: None,
     };
     let search = irr(&mut oracle, &settings, &mut on_step).map_err(|r| refused(&r))?;
-    let stop = match search.stop {
+    let mut stop = match search.stop {
         StopReason::Converged => Stop::Converged,
         StopReason::CheckLimit => Stop::CheckLimit,
         StopReason::Cancelled => watch.stop(),
@@ -83,12 +83,15 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
     if subject.arguments.sharpen && stop == Stop::Converged {
         envelope =
             sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
+        if watch.flow().is_break() {
+            stop = watch.stop();
+        }
     }
     let seconds = seconds();
     let checks = oracle.checks();
     drop(progress);
     let outcome = Outcome {
-        limits: what_limits(subject, &mut oracle, &envelope, stop)?,
+        limits: what_limits(subject, &mut oracle, &envelope, watch)?,
         envelope,
         widenings,
         checks,
@@ -113,16 +116,20 @@ fn nothing_yet(subject: &Subject<'_>, stop: Stop) -> Answer {
     Ok(Exit::Limit)
 }
 
-/// What keeps the lower and the upper end of each interval from moving, in words.
+/// What keeps the lower and the upper end of each interval from moving, in words; nothing if there
+/// is no time left to ask.
 fn what_limits(
     subject: &Subject<'_>,
     oracle: &mut Oracle<'_>,
     envelope: &DecoupledEnvelope,
-    stop: Stop,
+    watch: &Watch,
 ) -> Result<Vec<[Option<String>; 2]>, Failure> {
+    if watch.flow().is_break() {
+        return Ok(vec![[None, None]; subject.plan.parameters.len()]);
+    }
     let precision = &subject.arguments.precision;
     // A sharpened end has no room at all, so the smallest step tells what it touches.
-    let mut distance = if subject.arguments.sharpen && stop == Stop::Converged {
+    let mut distance = if subject.arguments.sharpen {
         precision * &Rational::new(1, SHARP)
     } else {
         precision.clone()
@@ -133,7 +140,7 @@ fn what_limits(
     );
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
-        if words.iter().flatten().all(Option::is_some) {
+        if watch.flow().is_break() || words.iter().flatten().all(Option::is_some) {
             break;
         }
         distance = &distance + &distance;

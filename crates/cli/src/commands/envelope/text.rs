@@ -36,8 +36,11 @@ pub(super) fn envelope(subject: &Subject<'_>, outcome: &Outcome, look: Look) -> 
     text.push('\n');
     push_paragraph(&mut text, meaning(&rows), look.width);
     text.push('\n');
-    text.push_str(&limits::render(&limits_of(subject, outcome), look));
-    text.push('\n');
+    let limits = limits::render(&limits_of(subject, outcome), look);
+    if !limits.is_empty() {
+        text.push_str(&limits);
+        text.push('\n');
+    }
     if let Some(makespan) = makespan(subject, outcome) {
         push_paragraph(&mut text, &makespan, look.width);
     }
