@@ -143,7 +143,7 @@ fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
     };
     for _ in 0..*dice.pick(timed) {
         time += dice.half(1, if theme == Theme::Timed { 3 } else { 6 });
-        for _ in 0..1 + dice.below(2) {
+        for _ in 0..=dice.below(2) {
             problem.timed.push(TimedInitial {
                 time: time.clone(),
                 change: timed_change(dice, facts, fluents),

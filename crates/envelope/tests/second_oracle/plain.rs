@@ -290,7 +290,7 @@ impl<'a> Search<'a> {
         }
         let mut values = vec![None; self.task.fluent_count()];
         for (fluent, value) in &self.task.initial().values {
-            values[fluent.index()] = Some(Polynomial::constant(value.clone()));
+            values[fluent.index()] = Some(Polynomial::constant(value));
         }
         for (fluent, id) in &self.plan.initial {
             values[fluent.index()] = Some(self.parameter(id.index()));
@@ -307,7 +307,7 @@ impl<'a> Search<'a> {
 
     fn parameter(&self, index: usize) -> Polynomial {
         match self.fixed.get(&index) {
-            Some(value) => Polynomial::constant(value.clone()),
+            Some(value) => Polynomial::constant(value),
             None => Polynomial::symbol(Symbol::Parameter(index)),
         }
     }
@@ -380,7 +380,7 @@ impl<'a> Search<'a> {
             let mut world = world.clone();
             self.pass(&mut world, group[0])?;
             if self.found.is_none() {
-                self.arrive(world, group)?;
+                self.arrive(&world, group)?;
             }
         }
         self.system.pop();
@@ -480,9 +480,9 @@ impl<'a> Search<'a> {
     }
 
     /// The conditions of a group, and its distance from others.
-    fn arrive(&mut self, world: World, group: &[usize]) -> Step {
+    fn arrive(&mut self, world: &World, group: &[usize]) -> Step {
         for &node in group {
-            let context = self.context(&world, node);
+            let context = self.context(world, node);
             let what = format!("{:?}", self.node(node));
             match self.node(node) {
                 Node::Zero | Node::Timed(_) => {}
@@ -508,15 +508,15 @@ impl<'a> Search<'a> {
                 return Ok(());
             }
         }
-        self.separate(&world, group)?;
+        self.separate(world, group)?;
         if self.found.is_some() {
             return Ok(());
         }
         let mut guards = Vec::new();
         for &node in group {
-            guards.extend(self.guards(&world, node)?);
+            guards.extend(self.guards(world, node)?);
         }
-        self.decide(&world, group, &guards, &mut BTreeMap::new())
+        self.decide(world, group, &guards, &mut BTreeMap::new())
     }
 
     fn snap(&self, id: InstanceId) -> &'a SnapAction {
@@ -583,7 +583,7 @@ impl<'a> Search<'a> {
                     }
                 }
                 let gap = Polynomial::difference(Symbol::Time(other), Symbol::Time(node));
-                let missing = gap.minus(&Polynomial::constant(self.epsilon.clone()));
+                let missing = gap.minus(&Polynomial::constant(self.epsilon));
                 self.system.push();
                 self.assert(&missing, Relation::Below)?;
                 if self.system.is_feasible() {
@@ -925,7 +925,7 @@ impl<'a> Search<'a> {
             parts.iter().map(|part| self.value(part, context)).collect()
         };
         Ok(match expression {
-            Expression::Constant(value) => Some(Polynomial::constant(value.clone())),
+            Expression::Constant(value) => Some(Polynomial::constant(value)),
             Expression::Fluent(fluent) => context.values[fluent.index()].clone(),
             Expression::Duration => context.duration.clone(),
             Expression::Unknown(Unknown::Parameter(id)) => Some(self.parameter(*id as usize)),
@@ -937,7 +937,7 @@ impl<'a> Search<'a> {
                 parts.iter().fold(zero, |sum, part| sum.plus(part))
             }),
             Expression::Multiply(parts) => all(parts)?.map(|parts| {
-                let one = Polynomial::constant(Rational::ONE);
+                let one = Polynomial::constant(&Rational::ONE);
                 parts.iter().fold(one, |product, part| product.times(part))
             }),
             Expression::Subtract(left, right) => {
@@ -952,7 +952,7 @@ impl<'a> Search<'a> {
                 let divisor = right.as_constant();
                 let divisor = divisor.ok_or(Trouble::GaveUp(GaveUp::NotCovered))?;
                 let factor = divisor.reciprocal();
-                factor.map(|factor| left.times(&Polynomial::constant(factor)))
+                factor.map(|factor| left.times(&Polynomial::constant(&factor)))
             }
             Expression::Negate(part) => self
                 .value(part, context)?

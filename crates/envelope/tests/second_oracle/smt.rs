@@ -121,6 +121,12 @@ fn sum(parts: &[String]) -> String {
     apply("+", "0.0", parts)
 }
 
+/// The node's position is less than `k`.
+fn before(node: usize, k: usize) -> String {
+    let earlier: Vec<_> = (1..k).map(|j| format!("at{node}_{j}")).collect();
+    or(&earlier)
+}
+
 /// Where an expression is read.
 #[derive(Clone)]
 enum At {
@@ -240,12 +246,6 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// The node's position is less than `k`.
-    fn before(&self, node: usize, k: usize) -> String {
-        let earlier: Vec<_> = (1..k).map(|j| format!("at{node}_{j}")).collect();
-        or(&earlier)
-    }
-
     fn snap(&self, node: usize) -> Option<&'a SnapAction> {
         let action = |id: InstanceId| &self.plan.plan.instances[id.index()].action;
         match self.node(node) {
@@ -363,8 +363,8 @@ impl<'a> Encoder<'a> {
         let rate = self.expression(&effect.rate, &At::After(from), Some(id))?;
         Ok(format!(
             "(ite (and {} (not {}) guard{}_{}) (* {rate} (- {until} tau{from})) 0.0)",
-            self.before(self.start(id), next),
-            self.before(self.end(id), next),
+            before(self.start(id), next),
+            before(self.end(id), next),
             id.0,
             body.end.effects.len() + index
         ))
@@ -637,7 +637,6 @@ impl<'a> Encoder<'a> {
                 format!("(- t{} t{})", self.end(id), self.start(id))
             }
             Expression::Unknown(Unknown::Parameter(id)) => format!("g{id}"),
-            Expression::Unknown(_) | Expression::TotalTime => return Err(NotEncoded),
             Expression::Add(parts) => sum(&all(parts)?),
             Expression::Multiply(parts) => apply("*", "1.0", &all(parts)?),
             Expression::Subtract(left, right) => format!(
@@ -645,7 +644,9 @@ impl<'a> Encoder<'a> {
                 self.expression(left, at, action)?,
                 self.expression(right, at, action)?
             ),
-            Expression::Divide(..) => return Err(NotEncoded),
+            Expression::Unknown(_) | Expression::TotalTime | Expression::Divide(..) => {
+                return Err(NotEncoded);
+            }
             Expression::Negate(part) => format!("(- {})", self.expression(part, at, action)?),
         })
     }
