@@ -47,35 +47,43 @@ impl Given<'_> {
         )
         .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
         let mut task = Task::new(problem);
-        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &mut task).unwrap();
-        let specs: Vec<_> = self.vary.iter().map(|spec| spec.parse().unwrap()).collect();
+        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &mut task).expect("a plan");
+        let specs: Vec<_> = self
+            .vary
+            .iter()
+            .map(|spec| spec.parse().expect("a quantity"))
+            .collect();
         let nominal = vec![Rational::ZERO; plan.plan.nodes.len()];
-        let plan = vary(&task, plan, &nominal, &specs).unwrap();
+        let plan = vary(&task, plan, &nominal, &specs).expect("quantities of the plan");
         (task, plan)
     }
 
     /// What one oracle with ε = 1/4 says of these boxes, one after the other: `inside`, or why not.
     fn answers(&self, boxes: &[&str]) -> Vec<String> {
         let (task, plan) = self.task_and_plan();
-        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
+        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).expect("within reach");
         boxes
             .iter()
-            .map(|text| match oracle.objection(&envelope(text)).unwrap() {
-                None => "inside".to_owned(),
-                Some(Objection::NoSchedule(_)) => "no schedule".to_owned(),
-                Some(Objection::Broken(broken)) => broken.requirement.describe(&task, &plan.plan),
-            })
+            .map(
+                |text| match oracle.objection(&envelope(text)).expect("few cases") {
+                    None => "inside".to_owned(),
+                    Some(Objection::NoSchedule(_)) => "no schedule".to_owned(),
+                    Some(Objection::Broken(broken)) => {
+                        broken.requirement.describe(&task, &plan.plan)
+                    }
+                },
+            )
             .collect()
     }
 
     /// What shows that the box is not inside.
     fn counterexample(&self, text: &str) -> Counterexample {
         let (task, plan) = self.task_and_plan();
-        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
-        match oracle.objection(&envelope(text)).unwrap() {
-            Some(Objection::Broken(broken)) => {
-                oracle.counterexample(&envelope(text), &broken).unwrap()
-            }
+        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).expect("within reach");
+        match oracle.objection(&envelope(text)).expect("few cases") {
+            Some(Objection::Broken(broken)) => oracle
+                .counterexample(&envelope(text), &broken)
+                .expect("it breaks"),
             other => panic!("{other:?}"),
         }
     }
@@ -89,7 +97,7 @@ impl Given<'_> {
 fn envelope(text: &str) -> DecoupledEnvelope {
     let end = |text: &str| match text.trim() {
         "inf" | "-inf" => End::Infinite,
-        number => End::Closed(number.parse().unwrap()),
+        number => End::Closed(number.parse().expect("a number")),
     };
     let intervals = text.split(']').filter_map(|interval| {
         let (lower, upper) = interval.trim().strip_prefix('[')?.split_once(',')?;

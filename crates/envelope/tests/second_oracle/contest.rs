@@ -284,8 +284,8 @@ impl Contest<'_> {
     }
 
     fn timed_change_places(&self, schedule: &[Rational]) -> bool {
-        let timed = self.plan.plan.nodes();
-        let times: Vec<_> = timed
+        let nodes = self.plan.plan.nodes();
+        let times: Vec<_> = nodes
             .filter(|(_, node)| matches!(node, Node::Timed(_)))
             .map(|(id, _)| &schedule[id.index()])
             .collect();
@@ -403,6 +403,10 @@ impl Contest<'_> {
                 self.tally.count("plain: agreed outside, no schedule");
             }
             Ok(Answer::Broken(found)) => {
+                let details = format!(
+                    "{} at {:?}, {:?}",
+                    found.what, found.valuation, found.schedule
+                );
                 if !self.is_schedule(&found.valuation, &found.schedule)
                     || !envelope.contains(&found.valuation)
                     || (!found.is_only_timed
@@ -411,11 +415,9 @@ impl Contest<'_> {
                             .judge(&found.valuation, &found.schedule)
                             .is_valid())
                 {
-                    let details = format!("{found:?}");
                     return self.mismatch("plain is wrong", envelope, &details);
                 }
                 if is_inside {
-                    let details = format!("{found:?}");
                     return self.mismatch("inside, but broken", envelope, &details);
                 }
                 self.tally.count("plain: agreed outside, broken");

@@ -74,6 +74,7 @@ fn compare(cases: std::ops::Range<u64>, mut solver: Option<Z3>) -> (Tally, Vec<S
     (tally, complaints)
 }
 
+#[allow(clippy::print_stdout, reason = "says what was compared")]
 fn expect_agreement(cases: u64, solver: Option<Z3>) {
     let first = setting("ELBOWROOM_FIRST_CASE", 0);
     let cases = setting("ELBOWROOM_CASES", cases);

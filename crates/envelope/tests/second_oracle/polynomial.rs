@@ -20,8 +20,8 @@ pub(crate) enum Symbol {
 pub(crate) struct Polynomial(BTreeMap<Vec<Symbol>, Rational>);
 
 impl Polynomial {
-    pub(crate) fn constant(value: Rational) -> Self {
-        Self::default().plus_term(Vec::new(), &value)
+    pub(crate) fn constant(value: &Rational) -> Self {
+        Self::default().plus_term(Vec::new(), value)
     }
 
     pub(crate) fn symbol(symbol: Symbol) -> Self {
@@ -51,7 +51,7 @@ impl Polynomial {
     }
 
     pub(crate) fn minus(&self, other: &Self) -> Self {
-        self.plus(&other.times(&Self::constant(Rational::from(-1))))
+        self.plus(&other.times(&Self::constant(&Rational::from(-1))))
     }
 
     pub(crate) fn times(&self, other: &Self) -> Self {

@@ -1,6 +1,6 @@
 //! Smaller cases with the same mistake.
 
-use elbowroom_model::problem::{Body, Condition, Effect, Expression, SchemaId};
+use elbowroom_model::problem::{Body, Condition, Effect, Expression, Unknown};
 use elbowroom_plan::reduction::BoxEnd;
 use elbowroom_plan::{Bound, InstanceId, Node, ParameterId, ParameterKind};
 
@@ -33,13 +33,14 @@ fn smaller(script: &Script) -> Vec<Script> {
     let case = &script.case;
     let actions = case.problem.schemas.len();
     if actions > 1 {
-        candidates.extend((0..actions).filter_map(|index| with_case(without_action(case, index))));
+        let smaller = (0..actions).map(|index| without_action(case, index));
+        candidates.extend(smaller.filter_map(|case| with_case(Some(case))));
     }
     for index in 0..case.timed_times().len() {
         candidates.extend(with_case(without_timed(case, index)));
     }
     for index in 0..case.parameters.len() {
-        candidates.extend(without_parameter(script, index));
+        candidates.push(without_parameter(script, index));
     }
     for index in 0..case.gaps.len() {
         let mut smaller = case.clone();
@@ -67,7 +68,7 @@ fn smaller(script: &Script) -> Vec<Script> {
     candidates
 }
 
-fn without_action(case: &Case, removed: usize) -> Option<Case> {
+fn without_action(case: &Case, removed: usize) -> Case {
     let mut case = case.clone();
     let moved = |id: InstanceId| InstanceId::from(id.index() - usize::from(id.index() > removed));
     let own = InstanceId::from(removed);
@@ -93,7 +94,7 @@ fn without_action(case: &Case, removed: usize) -> Option<Case> {
             };
         }
     }
-    (case.problem.schemas.len() > usize::from(SchemaId::from(0).0 > 0)).then_some(case)
+    case
 }
 
 fn without_timed(case: &Case, removed: usize) -> Option<Case> {
@@ -126,7 +127,7 @@ fn without_timed(case: &Case, removed: usize) -> Option<Case> {
 }
 
 /// The parameter's nominal value stands in its place.
-fn without_parameter(script: &Script, removed: usize) -> Option<Script> {
+fn without_parameter(script: &Script, removed: usize) -> Script {
     let mut script = script.clone();
     let case = &mut script.case;
     let nominal = case.parameters.remove(removed).nominal;
@@ -144,7 +145,7 @@ fn without_parameter(script: &Script, removed: usize) -> Option<Script> {
         }
     }
     numbers::visit(&mut case.problem, &mut |leaf| {
-        if let Expression::Unknown(elbowroom_model::problem::Unknown::Domain(index)) = leaf {
+        if let Expression::Unknown(Unknown::Domain(index)) = leaf {
             let id = ParameterId(*index);
             if id == gone {
                 *leaf = Expression::Constant(nominal.clone());
@@ -172,7 +173,7 @@ fn without_parameter(script: &Script, removed: usize) -> Option<Script> {
             keeps
         }
     });
-    Some(script)
+    script
 }
 
 /// One condition, effect or duration bound less.
@@ -266,10 +267,10 @@ fn remove_conjunct(condition: &mut Condition, left: &mut usize) -> bool {
     let Condition::And(parts) = condition else {
         return false;
     };
-    for index in 0..parts.len() {
-        if let Condition::Or(alternatives) = &parts[index] {
+    for part in parts.iter_mut() {
+        if let Condition::Or(alternatives) = part {
             if *left < alternatives.len() {
-                parts[index] = alternatives[*left].clone();
+                *part = alternatives[*left].clone();
                 return true;
             }
             *left -= alternatives.len();

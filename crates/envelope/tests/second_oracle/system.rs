@@ -51,10 +51,10 @@ impl System {
         for (index, interval) in envelope.intervals.iter().enumerate() {
             let value = Polynomial::symbol(Symbol::Parameter(index));
             if let Some(lower) = interval.lower.value() {
-                system.at_most(&Polynomial::constant(lower.clone()), &value);
+                system.at_most(&Polynomial::constant(lower), &value);
             }
             if let Some(upper) = interval.upper.value() {
-                system.at_most(&value, &Polynomial::constant(upper.clone()));
+                system.at_most(&value, &Polynomial::constant(upper));
             }
         }
         system
@@ -110,14 +110,9 @@ impl System {
             .iter()
             .map(|(symbol, factor)| (self.variables[symbol], factor / &leading))
             .collect();
-        let variable = match self.rows.get(&row) {
-            Some(&variable) => variable,
-            None => {
-                let variable = self.simplex.define(&row);
-                self.rows.insert(row, variable);
-                variable
-            }
-        };
+        let known = self.rows.get(&row).copied();
+        let variable = known.unwrap_or_else(|| self.simplex.define(&row));
+        self.rows.insert(row, variable);
         let limit = -constant / &leading;
         let (is_upper, is_lower) = match relation {
             Relation::Zero => (true, true),
@@ -179,7 +174,7 @@ impl System {
     ) -> Option<(Valuation, Vec<Rational>)> {
         self.push();
         for node in 0..self.nodes {
-            let latest = Polynomial::constant(Rational::from(horizon));
+            let latest = Polynomial::constant(&Rational::from(horizon));
             self.at_most(&Polynomial::symbol(Symbol::Time(node)), &latest);
         }
         let objective: Vec<_> = weights
@@ -200,7 +195,7 @@ impl System {
 fn bound(bound: &Bound) -> Option<Polynomial> {
     match bound {
         Bound::Infinite => None,
-        Bound::Finite(value) => Some(Polynomial::constant(value.clone())),
+        Bound::Finite(value) => Some(Polynomial::constant(value)),
         Bound::Parameter(id) => Some(Polynomial::symbol(Symbol::Parameter(id.index()))),
     }
 }
