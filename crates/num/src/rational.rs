@@ -55,6 +55,14 @@ impl Rational {
     /// Brings `numerator / denominator` (not zero) to lowest terms.
     fn reduced(numerator: i128, denominator: i128) -> Self {
         debug_assert!(denominator != 0);
+        // Divisions of 128 bits cost many times those of 64, and nearly all operands are small.
+        if let (Ok(numerator), Ok(denominator)) =
+            (i64::try_from(numerator), i64::try_from(denominator))
+            && numerator != i64::MIN
+            && denominator > 0
+        {
+            return Self::reduced_small(numerator, denominator);
+        }
         let divisor = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
         // `divisor` is at most the smaller magnitude; it exceeds i128 only for i128::MIN twice.
         let divisor = i128::try_from(divisor).unwrap_or(1);
@@ -72,6 +80,17 @@ impl Rational {
                 UBig::try_from(d).expect("the denominator was made positive"),
             )),
         }
+    }
+
+    /// Brings `numerator / denominator` to lowest terms; `numerator` is not `i64::MIN` and
+    /// `denominator` positive.
+    fn reduced_small(numerator: i64, denominator: i64) -> Self {
+        let divisor = gcd_u64(numerator.unsigned_abs(), denominator.unsigned_abs());
+        let divisor = i64::try_from(divisor).expect("not above the denominator");
+        Self(Small {
+            numerator: numerator / divisor,
+            denominator: denominator / divisor,
+        })
     }
 
     fn from_big(big: RBig) -> Self {

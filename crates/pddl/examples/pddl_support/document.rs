@@ -81,28 +81,37 @@ pub(crate) fn document(survey: Option<&Survey>) -> String {
 fn benchmarks(survey: &Survey, text: &mut String) {
     let instances: usize = survey.domains.iter().map(|domain| domain.instances).sum();
     let read: usize = survey.domains.iter().map(|domain| domain.read).sum();
+    let grounded: usize = survey.domains.iter().map(|domain| domain.grounded).sum();
     let (plans, plans_read) = survey.plans;
     line(
         text,
         format_args!(
-            "\n## Benchmarks\n\nOf {instances} instances {read} are read; of the {plans} plans for \
-             these, {plans_read}. The others, by reason:\n"
+            "\n## Benchmarks\n\nOf {instances} instances {read} are read, and {grounded} of these \
+             made ground; of the {plans} plans for them, {plans_read} are read. The instances that \
+             are not read, by reason:\n"
         ),
     );
     line(text, format_args!("|reason|instances|\n|---|---:|"));
     for (reason, count) in reasons(survey) {
         line(text, format_args!("|{reason}|{count}|"));
     }
-    text.push_str("\n### By domain\n\n<!-- Room for columns on grounding. -->\n\n");
-    text.push_str("|domain|instances|read|refused|why|\n|---|---:|---:|---:|---|\n");
+    text.push_str("\n### By domain\n\n");
+    text.push_str(
+        "*Ground* counts the problems made ground, *actions* the ground actions that can be \
+         reached in them, all together.\n\n",
+    );
+    text.push_str("|domain|instances|read|ground|actions|refused|why|\n");
+    text.push_str("|---|---:|---:|---:|---:|---:|---|\n");
     for domain in &survey.domains {
         line(
             text,
             format_args!(
-                "|{}|{}|{}|{}|{}|",
+                "|{}|{}|{}|{}|{}|{}|{}|",
                 domain.name,
                 domain.instances,
                 domain.read,
+                domain.grounded,
+                domain.actions,
                 domain.refused.len(),
                 why(domain)
             ),

@@ -1,10 +1,12 @@
-//! Reads all problems and plans of the benchmark set, and sums up what became of them.
+//! Reads all problems and plans of the benchmark set, makes the problems ground, and sums up what
+//! became of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use elbowroom_model::Task;
+use elbowroom_model::reachability::{self, Answer, ground};
 use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_plan, read_problem};
 
 /// What became of all texts.
@@ -25,6 +27,10 @@ pub(crate) struct Domain {
     pub(crate) instances: usize,
     /// How many of them were read.
     pub(crate) read: usize,
+    /// How many of these were made ground, within the limits.
+    pub(crate) grounded: usize,
+    /// How many ground actions can be reached in them, all together.
+    pub(crate) actions: usize,
     /// The refused ones, with all errors.
     pub(crate) refused: Vec<(String, Vec<Diagnostic>)>,
     /// How often each thing was warned of.
@@ -65,8 +71,13 @@ pub(crate) fn survey(folder: &Path) -> Survey {
         domain.instances += 1;
         let read = read_problem(&source(folder, &row[3]), &source(folder, &row[4]));
         let diagnostics = match read {
-            Ok((_, warnings)) => {
+            Ok((problem, warnings)) => {
                 domain.read += 1;
+                let settings = reachability::Settings::default();
+                if let Answer::Complete(grounding) = ground(&mut Task::new(problem), &settings) {
+                    domain.grounded += 1;
+                    domain.actions += grounding.actions.len();
+                }
                 warnings
             }
             Err(diagnostics) => {
