@@ -365,3 +365,14 @@ fn in_a_box_beside_the_nominal_values_happenings_may_come_in_another_order() {
         ]
     );
 }
+
+#[test]
+fn timed_initials_may_be_close_to_each_other() {
+    let given = Given {
+        domain: "(:action look :parameters () :precondition (p) :effect (and))",
+        init: "(at 2 (not (p))) (at 2.1 (p))",
+        plan: "action instance l : (look); c: l - .zero in [5, 6];",
+        ..Given::default()
+    };
+    assert_eq!(given.answer(""), "inside");
+}

@@ -249,6 +249,11 @@ impl<'a> Encoder<'a> {
                 .collect()
         };
         Ok(match condition {
+            Condition::Fact(fact) if self.task.is_derived(*fact) => {
+                let rules = self.task.rules().iter().filter(|rule| rule.head == *fact);
+                let bodies = rules.map(|rule| self.condition(&rule.body, at, None));
+                or(&bodies.collect::<Result<Vec<_>, _>>()?)
+            }
             Condition::Fact(fact) => match at {
                 At::Arrival(k) => format!("f{}_{}", fact.0, k - 1),
                 At::After(k) | At::Moment(k, _) => format!("f{}_{k}", fact.0),

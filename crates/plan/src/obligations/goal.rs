@@ -7,9 +7,10 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::Condition;
 
 use super::dnf::Wanted;
+use super::separation::is_fixed;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Refusal, Substitution};
-use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
+use crate::stn_plan::{Node, NodeId, StnPlan};
 
 /// How many timed initials at open times one conjunct of the goal may depend on.
 const MOST_OPEN: usize = 10;
@@ -38,7 +39,7 @@ pub(super) fn goal_cases(
         .filter(|(id, node)| matches!(node, Node::Timed(_)) && touched.contains(id))
         .map(|(id, _)| id)
         .collect();
-    let (open, fixed): (Vec<_>, Vec<_>) = timed.into_iter().partition(|&id| is_open(plan, id));
+    let (open, fixed): (Vec<_>, Vec<_>) = timed.into_iter().partition(|&id| !is_fixed(plan, id));
     if open.len() > MOST_OPEN {
         return Err(Refusal::TooManyCases {
             place: "timed initials that the goal depends on".to_owned(),
@@ -116,14 +117,4 @@ pub(super) fn lasts(plan: &StnPlan) -> Vec<NodeId> {
         .filter(|(_, node)| matches!(node, Node::End(_) | Node::Instant(_)))
         .map(|(id, _)| id)
         .collect()
-}
-
-/// Whether the node's time depends on a parameter.
-fn is_open(plan: &StnPlan, node: NodeId) -> bool {
-    plan.constraints.iter().any(|constraint| {
-        (constraint.from == node || constraint.to == node)
-            && [&constraint.lower, &constraint.upper]
-                .iter()
-                .any(|bound| matches!(bound, Bound::Parameter(_)))
-    })
 }

@@ -6,12 +6,13 @@ use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
 use super::{BadCase, Difference, Obligation, Requirement};
-use crate::stn_plan::{NodeId, StnPlan};
+use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
 
 /// The separation of every two interfering happenings, less those implied by others.
 ///
 /// `order` lists all nodes in nominal order. If `a` is ε before `b` and `b` is ε before `c`, then
-/// `a` is before `c`: only pairs without such a detour are obligations of their own.
+/// `a` is before `c`: only pairs without such a detour are obligations of their own. Nor are pairs
+/// of timed initials at fixed times: the plan is not to blame for when they happen.
 pub(super) fn separations(
     task: &Task,
     plan: &StnPlan,
@@ -20,6 +21,7 @@ pub(super) fn separations(
 ) -> Vec<Obligation> {
     interfering_in_order(task, plan, order)
         .into_iter()
+        .filter(|&(first, second)| !is_fixed(plan, first) || !is_fixed(plan, second))
         .map(|(first, second)| Obligation {
             requirement: Requirement::Separation { first, second },
             bad_cases: vec![BadCase {
@@ -33,6 +35,17 @@ pub(super) fn separations(
             }],
         })
         .collect()
+}
+
+/// Whether the node is a group of timed initials at a time that depends on no parameter.
+pub(super) fn is_fixed(plan: &StnPlan, node: NodeId) -> bool {
+    matches!(plan.nodes[node.index()], Node::Timed(_))
+        && plan.constraints.iter().any(|constraint| {
+            constraint.from == NodeId::ZERO
+                && constraint.to == node
+                && constraint.lower == constraint.upper
+                && matches!(constraint.lower, Bound::Finite(_))
+        })
 }
 
 /// The interfering pairs, earlier node first, less those connected through a third node.

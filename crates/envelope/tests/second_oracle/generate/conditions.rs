@@ -5,7 +5,7 @@ use elbowroom_model::problem::{Body, Comparison, Condition, DurationConstraint, 
 use elbowroom_model::validate::Verdict;
 use elbowroom_num::Rational;
 
-use super::skeleton::{atom, constant, fluent};
+use super::skeleton::{constant, fact, fluent};
 use super::{Nominal, Theme};
 
 /// The place of a condition in an action, or the goal.
@@ -66,12 +66,7 @@ impl Nominal<'_> {
             self.case.problem.functions.len(),
         );
         if self.dice.chance(40) {
-            let atom = Condition::Atom(atom(self.dice.below(facts)));
-            return if self.dice.chance(50) {
-                atom
-            } else {
-                Condition::Not(Box::new(atom))
-            };
+            return fact(self.dice, facts);
         }
         let first = Expression::Fluent(fluent(self.dice.below(fluents)));
         let left = match self.dice.below(6) {
@@ -82,6 +77,9 @@ impl Nominal<'_> {
                 } else {
                     Expression::Subtract(Box::new(first), Box::new(second))
                 }
+            }
+            1 if self.dice.chance(20) => {
+                Expression::Divide(Box::new(first), Box::new(constant(self.dice.half(1, 3))))
             }
             1 if self.has_duration(place) => {
                 Expression::Subtract(Box::new(first), Box::new(Expression::Duration))

@@ -3,8 +3,8 @@
 use elbowroom_model::Problem;
 use elbowroom_model::problem::{
     Atom, Body, Change, Comparison, Condition, ContinuousEffect, Effect, Expression, Fluent,
-    Function, FunctionId, Guard, Predicate, PredicateId, Schema, TimedChange, TimedInitial, Type,
-    UpdateOperator,
+    Function, FunctionId, Guard, Predicate, PredicateId, Rule, Schema, TimedChange, TimedInitial,
+    Type, UpdateOperator,
 };
 use elbowroom_num::Rational;
 
@@ -58,6 +58,9 @@ pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
             body,
         });
     }
+    if dice.chance(25) {
+        derive(dice, &mut problem);
+    }
     let mut time = Rational::ZERO;
     let timed: &[usize] = if theme == Theme::Timed {
         &[2, 3]
@@ -65,7 +68,11 @@ pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
         &[0, 0, 1, 1, 2]
     };
     for _ in 0..*dice.pick(timed) {
-        time += dice.half(1, if theme == Theme::Timed { 3 } else { 6 });
+        time += if dice.chance(15) {
+            Rational::new(1, 8)
+        } else {
+            dice.half(1, if theme == Theme::Timed { 3 } else { 6 })
+        };
         for _ in 0..=dice.below(2) {
             problem.timed.push(TimedInitial {
                 time: time.clone(),
@@ -74,6 +81,48 @@ pub(super) fn skeleton(dice: &mut Dice, theme: Theme) -> Problem {
         }
     }
     problem
+}
+
+/// A derived predicate over the others, and now and then over a number.
+fn derive(dice: &mut Dice, problem: &mut Problem) {
+    let facts = problem.predicates.len();
+    problem.predicates.push(Predicate {
+        name: "derived".to_owned(),
+        parameters: Vec::new(),
+        is_derived: true,
+    });
+    let has_values = problem.initial_values.len() == problem.functions.len();
+    for _ in 0..=dice.below(2) {
+        let fluents = problem.functions.len();
+        let part = |dice: &mut Dice| {
+            if has_values && dice.chance(10) {
+                let left = Expression::Fluent(fluent(dice.below(fluents)));
+                Condition::Compare(Comparison::AtLeast, left, constant(dice.half(0, 10)))
+            } else {
+                fact(dice, facts)
+            }
+        };
+        let parts = vec![part(dice), part(dice)];
+        problem.rules.push(Rule {
+            predicate: PredicateId::from(facts),
+            parameters: Vec::new(),
+            body: if dice.chance(50) {
+                Condition::And(parts)
+            } else {
+                Condition::Or(parts)
+            },
+        });
+    }
+}
+
+/// A fact or its opposite.
+pub(super) fn fact(dice: &mut Dice, facts: usize) -> Condition {
+    let atom = Condition::Atom(atom(dice.below(facts)));
+    if dice.chance(50) {
+        atom
+    } else {
+        Condition::Not(Box::new(atom))
+    }
 }
 
 fn timed_change(dice: &mut Dice, facts: usize, fluents: usize) -> TimedChange {
@@ -172,6 +221,7 @@ fn effects(
                     5..=6 => UpdateOperator::Increase,
                     7..=8 => UpdateOperator::Decrease,
                     _ if dice.chance(10) => UpdateOperator::ScaleUp,
+                    _ if dice.chance(10) => UpdateOperator::ScaleDown,
                     _ => UpdateOperator::Assign,
                 },
                 fluent: fluent(dice.below(fluents)),
@@ -204,12 +254,7 @@ fn amount(dice: &mut Dice, fluents: usize, is_durative: bool) -> Expression {
 
 fn literal(dice: &mut Dice, facts: usize, fluents: usize) -> Condition {
     if dice.chance(70) {
-        let atom = Condition::Atom(atom(dice.below(facts)));
-        if dice.chance(50) {
-            atom
-        } else {
-            Condition::Not(Box::new(atom))
-        }
+        fact(dice, facts)
     } else {
         let comparison = *dice.pick(&[Comparison::AtLeast, Comparison::Less]);
         let left = Expression::Fluent(fluent(dice.below(fluents)));

@@ -154,7 +154,13 @@ impl<'a> Search<'a> {
                     UpdateOperator::Decrease => old.minus(&amount),
                     UpdateOperator::ScaleUp => old.times(&amount),
                     UpdateOperator::ScaleDown => {
-                        return Err(Trouble::GaveUp(GaveUp::NotCovered));
+                        let divisor = amount.as_constant();
+                        let divisor = divisor.ok_or(Trouble::GaveUp(GaveUp::NotCovered))?;
+                        let Some(factor) = divisor.reciprocal() else {
+                            self.report("division by zero".to_owned());
+                            return Ok(());
+                        };
+                        old.times(&Polynomial::constant(&factor))
                     }
                 });
             }

@@ -62,8 +62,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Interfering happenings are at least epsilon apart. Of two timed initials that holds only if
-    /// their times are open; then they also keep their order.
+    /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only if
+    /// the time of one is open.
     fn separate(&mut self, world: &World, group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
             for &other in world.placed.iter().chain(&group[..position]) {
@@ -71,19 +71,10 @@ impl Search<'_> {
                 if !footprint(node).interferes_with(&footprint(other)) {
                     continue;
                 }
-                let are_timed = match (self.node(node), self.node(other)) {
-                    (Node::Timed(late), Node::Timed(early)) => Some((late, early)),
-                    _ => None,
-                };
-                if let Some((late, early)) = are_timed {
-                    if !self.is_open(node) && !self.is_open(other) {
-                        continue;
-                    }
-                    if late < early {
-                        self.report("timed initials change places".to_owned());
-                        self.mark_timed();
-                        return Ok(());
-                    }
+                let is_timed = |node: usize| matches!(self.node(node), Node::Timed(_));
+                let are_timed = is_timed(node) && is_timed(other);
+                if are_timed && !self.is_open(node) && !self.is_open(other) {
+                    continue;
                 }
                 let gap = Polynomial::difference(Symbol::Time(other), Symbol::Time(node));
                 let missing = gap.minus(&Polynomial::constant(self.epsilon));
@@ -92,7 +83,7 @@ impl Search<'_> {
                 if self.system.is_feasible() {
                     let (first, second) = (self.node(other), self.node(node));
                     self.report(format!("{first:?} and {second:?} too near"));
-                    if are_timed.is_some() {
+                    if are_timed {
                         self.mark_timed();
                     }
                 }

@@ -62,6 +62,23 @@ impl Search<'_> {
         };
         let is_positive = matches!(want, Want::True | Want::NotFalse);
         match condition {
+            Condition::Fact(fact) if self.task.is_derived(*fact) => {
+                let task = self.task;
+                // Conditions of the action and of the rules from here on.
+                let mut wanted: Vec<Wanted<'_>> = wanted;
+                let rules = task.rules().iter().filter(|rule| rule.head == *fact);
+                let bodies: Vec<_> = rules.map(|rule| (&rule.body, want)).collect();
+                if is_positive {
+                    for body in bodies {
+                        let mut wanted = wanted.clone();
+                        wanted.push(body);
+                        self.ways(wanted, context, then)?;
+                    }
+                } else {
+                    wanted.extend(bodies);
+                    self.ways(wanted, context, then)?;
+                }
+            }
             Condition::Fact(fact) => {
                 if context.facts[fact.index()] == is_positive {
                     self.ways(wanted, context, then)?;

@@ -31,19 +31,14 @@ impl Encoder<'_> {
                 if !left.interferes_with(&right) {
                     continue;
                 }
-                let near = match (self.node(node), self.node(other)) {
-                    (Node::Timed(_), Node::Timed(_)) => {
-                        if !self.is_open(node) && !self.is_open(other) {
-                            continue;
-                        }
-                        // Of two timed initials the one listed first comes first.
-                        format!("(< (- t{node} t{other}) {epsilon})")
-                    }
-                    _ => format!(
-                        "(and (< (- t{node} t{other}) {epsilon}) (< (- t{other} t{node}) {epsilon}))"
-                    ),
-                };
-                self.violations.push(near);
+                let is_timed = |node: usize| matches!(self.node(node), Node::Timed(_));
+                let are_timed = is_timed(node) && is_timed(other);
+                if are_timed && !self.is_open(node) && !self.is_open(other) {
+                    continue;
+                }
+                self.violations.push(format!(
+                    "(and (< (- t{node} t{other}) {epsilon}) (< (- t{other} t{node}) {epsilon}))"
+                ));
             }
         }
     }
