@@ -8,7 +8,7 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{
     Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
 };
-use elbowroom_model::problem::{Comparison, UpdateOperator};
+use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
 use super::dnf::{Alternatives, Wanted, compared};
@@ -495,12 +495,16 @@ impl Compiler<'_> {
         let (start, end) = (self.plan.plan.start(instance), self.plan.plan.end(instance));
         let duration = Linear::difference(start, end);
         if !at_end {
-            let broken = compared(Comparison::AtLeast, &duration, &Linear::default(), false);
-            let requirement = Requirement::Duration {
-                instance,
-                constraint: None,
-            };
-            oblige(obligations, requirement, &run.timeline, broken);
+            obligations.direct.push(Obligation {
+                requirement: Requirement::Duration {
+                    instance,
+                    constraint: None,
+                },
+                bad_cases: vec![BadCase {
+                    differences: vec![Difference::before(end, start)],
+                    inequalities: run.timeline.assumptions.clone(),
+                }],
+            });
         }
         let is_open = self
             .plan
