@@ -57,10 +57,14 @@ mod plan_file;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
+pub use elbowroom_execution as execution;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
+pub use elbowroom_planner as planner;
+pub use elbowroom_probability as probability;
+pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;

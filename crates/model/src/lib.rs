@@ -11,7 +11,8 @@
 //! 3. [`Task`]: a problem with its table of ground facts and fluents; instantiates schemas on
 //!    demand ([`Task::instantiate`]).
 //! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
-//! 5. [`validate()`]: the judge. PDDL 2.1 semantics alone; it shares no code with
+//! 5. [`Situation`]: the same problem in mid-execution, with actions under way.
+//! 6. [`validate()`], [`validate_from()`]: the judge. PDDL 2.1 semantics alone; it shares no code with
 //!    networks, encodings or solvers, because every other claim is attacked with it.
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
@@ -28,6 +29,7 @@ mod plan;
 pub mod problem;
 pub mod reachability;
 mod simplify;
+mod situation;
 mod task;
 mod terms;
 pub mod validate;
@@ -37,5 +39,6 @@ pub use interference::Footprint;
 pub use plan::{Step, TimeTriggeredPlan};
 pub use problem::Problem;
 pub use simplify::Constants;
+pub use situation::{RunningAction, Situation};
 pub use task::{InstantiateError, State, Task, TimedHappening};
-pub use validate::{Verdict, validate};
+pub use validate::{Verdict, validate, validate_from};

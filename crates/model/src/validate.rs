@@ -57,6 +57,7 @@ pub use violation::{
 use crate::ground::{Body, Condition};
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::Comparison;
+use crate::situation::Situation;
 use crate::task::{State, Task};
 
 /// How strictly to judge.
@@ -151,28 +152,50 @@ pub struct Report {
 
 /// Judges a plan. The plan's actions must have been instantiated from this task.
 pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> Verdict {
+    judge(task, None, plan, settings)
+}
+
+/// Judges a plan that goes on from `situation`: see [`Situation`] for what such a plan looks like.
+/// What happened before is not judged.
+pub fn validate_from(
+    task: &Task,
+    situation: &Situation,
+    plan: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> Verdict {
+    judge(task, Some(situation), plan, settings)
+}
+
+fn judge(
+    task: &Task,
+    situation: Option<&Situation>,
+    plan: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> Verdict {
     let Some(derivation) = task.derivation() else {
         return Verdict::Undecided(Undecided {
             time: None,
             difficulty: Difficulty::Unstratified,
         });
     };
-    if let Some(violation) = malformed_step(plan) {
+    if let Some(violation) = malformed_step(situation, plan) {
         return Verdict::Invalid(violation);
     }
-    let groups = timeline::timeline(task, plan, settings);
+    let groups = timeline::timeline(task, situation, plan, settings);
+    let state = situation.map_or(task.initial(), |situation| &situation.state);
     let mut judge = judge::Judge {
         task,
         plan,
         settings,
         derivation,
-        now: state::Now::initial(task),
+        now: state::Now::of(task, state),
         derived: OnceCell::new(),
-        running: BTreeMap::new(),
+        running: situation.map_or_else(BTreeMap::new, judge::running),
         since: BTreeMap::new(),
         margins: margin::Margins::default(),
     };
-    match judge.run(&groups) {
+    let from = situation.map(|situation| &situation.time);
+    match judge.run(from, &groups) {
         Ok(()) => Verdict::Valid(Report {
             makespan: plan.makespan(),
             state: judge.now.to_state(),
@@ -183,14 +206,38 @@ pub fn validate(task: &Task, plan: &TimeTriggeredPlan, settings: &Settings) -> V
     }
 }
 
-/// The first step whose times make no sense by themselves.
-fn malformed_step(plan: &TimeTriggeredPlan) -> Option<Violation> {
+/// The first step whose times make no sense by themselves, or do not continue what is running.
+fn malformed_step(situation: Option<&Situation>, plan: &TimeTriggeredPlan) -> Option<Violation> {
+    let running = situation.map_or(&[][..], |situation| &situation.running);
+    let earliest = situation.map_or(Rational::ZERO, |situation| situation.time.clone());
+    if let Some(missing) = running.get(plan.steps.len()) {
+        return Some(Violation {
+            time: earliest,
+            action: None,
+            mistake: Mistake::Abandoned(missing.action.name.clone()),
+        });
+    }
     plan.steps.iter().enumerate().find_map(|(position, step)| {
+        let continued = running.get(position);
         let mistake = match (&step.action.body, &step.duration) {
-            _ if step.start.is_negative() => Mistake::TooEarly,
+            _ if continued.is_some_and(|running| !running.is_continued_by(step)) => {
+                Mistake::Abandoned(running[position].action.name.clone())
+            }
+            _ if continued.is_none() && step.start < earliest => {
+                Mistake::TooEarly(earliest.clone())
+            }
             (Body::Durative(_), None) => Mistake::NoDuration,
             (Body::Durative(_), Some(duration)) if duration.is_negative() => {
                 Mistake::NegativeDuration(duration.clone())
+            }
+            (_, Some(duration))
+                if continued.is_some_and(|running| !running.may_last(duration, &earliest)) =>
+            {
+                Mistake::Elapsed {
+                    duration: duration.clone(),
+                    possible: running[position].duration.clone(),
+                    now: earliest.clone(),
+                }
             }
             _ => return None,
         };

@@ -77,7 +77,21 @@ impl fmt::Display for Violation {
 impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooEarly => write!(f, "starts before time 0"),
+            Self::TooEarly(earliest) => write!(f, "starts before time {}", decimal(earliest)),
+            Self::Abandoned(action) => write!(
+                f,
+                "the plan must begin by going on with {action}, which is running"
+            ),
+            Self::Elapsed {
+                duration,
+                possible,
+                now,
+            } => write!(
+                f,
+                "has the duration {}, where {possible} was possible and it is {} already",
+                decimal(duration),
+                decimal(now)
+            ),
             Self::NoDuration => write!(f, "has no duration"),
             Self::NegativeDuration(duration) => {
                 write!(f, "has the duration {}, below 0", decimal(duration))

@@ -17,6 +17,7 @@ use super::{Settings, effects, interference};
 use crate::derivation::{Derivation, Derived, Moment, holds};
 use crate::ground::{Body, Condition, DurativeBody, FactId, SnapAction};
 use crate::plan::{Step, TimeTriggeredPlan};
+use crate::situation::Situation;
 use crate::task::Task;
 
 /// The course of events up to some moment.
@@ -46,21 +47,41 @@ pub(super) struct Running {
     pub(super) continuous: Vec<bool>,
 }
 
+/// What is under way in mid-execution, by the position of the step that continues it.
+pub(super) fn running(situation: &Situation) -> BTreeMap<usize, Running> {
+    let under_way = situation.running.iter().enumerate();
+    under_way
+        .filter_map(|(position, running)| {
+            let body = running.action.durative()?;
+            let state = Running {
+                is_new: false,
+                end_guards: vec![true; body.end.effects.len()],
+                continuous: vec![true; body.continuous.len()],
+            };
+            Some((position, state))
+        })
+        .collect()
+}
+
 impl<'a> Judge<'a> {
-    /// Lives through all groups, then looks at the goal.
-    pub(super) fn run(&mut self, groups: &[Group<'a>]) -> Result<(), Stop> {
+    /// Lives through all groups, then looks at the goal. With `from`, things are under way
+    /// already at that time.
+    pub(super) fn run(
+        &mut self,
+        from: Option<&Rational>,
+        groups: &[Group<'a>],
+    ) -> Result<(), Stop> {
+        let mut before = from;
         for (position, group) in groups.iter().enumerate() {
-            if let Some(before) = position.checked_sub(1) {
-                self.pass(&groups[before].time, &group.time)?;
+            if let Some(before) = before.filter(|before| **before < group.time) {
+                self.pass(before, &group.time)?;
             }
+            before = Some(&group.time);
             self.arrive(group)?;
             interference::check(self, &groups[..=position])?;
             self.apply(group)?;
         }
-        let end = groups
-            .last()
-            .map(|group| group.time.clone())
-            .unwrap_or_default();
+        let end = before.cloned().unwrap_or_default();
         self.require(self.task.goal(), When::Goal, None, &end)
     }
 

@@ -19,13 +19,13 @@ pub(super) struct Now {
 }
 
 impl Now {
-    pub(super) fn initial(task: &Task) -> Self {
+    pub(super) fn of(task: &Task, state: &State) -> Self {
         let mut facts = vec![false; task.fact_count()];
         let mut values = vec![None; task.fluent_count()];
-        for fact in &task.initial().facts {
+        for fact in &state.facts {
             facts[fact.index()] = true;
         }
-        for (fluent, value) in &task.initial().values {
+        for (fluent, value) in &state.values {
             values[fluent.index()] = Some(value.clone());
         }
         Self { facts, values }

@@ -6,6 +6,7 @@ use super::Settings;
 use crate::ground::Body;
 use crate::interference::Footprint;
 use crate::plan::TimeTriggeredPlan;
+use crate::situation::Situation;
 use crate::task::{Task, TimedHappening};
 
 /// What a happening is.
@@ -48,23 +49,28 @@ pub(super) struct Group<'a> {
 
 /// All happenings by time; those that the tolerance does not tell apart form one group.
 ///
-/// Timed initials after the last happening of the plan are left out.
+/// Timed initials after the last happening of the plan are left out, and so is all that has
+/// happened when the plan begins in mid-execution.
 pub(super) fn timeline<'a>(
     task: &'a Task,
+    situation: Option<&Situation>,
     plan: &TimeTriggeredPlan,
     settings: &Settings,
 ) -> Vec<Group<'a>> {
     let mut happenings = Vec::new();
+    let running = situation.map_or(0, |situation| situation.running.len());
     for (position, step) in plan.steps.iter().enumerate() {
         let footprint = Footprint::of_start(task, &step.action);
         let time = step.start.clone();
         if let (Body::Durative(_), Some(duration)) = (&step.action.body, &step.duration) {
             let end = &time + duration;
-            happenings.push(Happening {
-                what: What::Start(position),
-                time,
-                footprint,
-            });
+            if position >= running {
+                happenings.push(Happening {
+                    what: What::Start(position),
+                    time,
+                    footprint,
+                });
+            }
             let footprint = Footprint::of_end(task, &step.action);
             happenings.push(Happening {
                 what: What::End(position),
@@ -84,7 +90,9 @@ pub(super) fn timeline<'a>(
         .map(|happening| &happening.time)
         .max()
         .cloned();
-    for timed in task.timed() {
+    let is_to_come =
+        |timed: &&TimedHappening| situation.is_none_or(|situation| timed.time > situation.time);
+    for timed in task.timed().iter().filter(is_to_come) {
         happenings.push(Happening {
             what: What::Timed(timed),
             time: timed.time.clone(),

@@ -1,6 +1,6 @@
 //! Why a plan is not valid, or why that cannot be decided.
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::Comparison;
@@ -41,8 +41,19 @@ impl ActionInstance {
 /// What can be wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mistake {
-    /// An action starts before time 0.
-    TooEarly,
+    /// An action starts before the plan begins, at this time.
+    TooEarly(Rational),
+    /// The plan does not go on with this action, which is running when it begins.
+    Abandoned(String),
+    /// An action that is running when the plan begins can no longer have this duration.
+    Elapsed {
+        /// The duration in the plan.
+        duration: Rational,
+        /// Those it may have, as far as they do not end before `now`.
+        possible: Interval,
+        /// When the plan begins.
+        now: Rational,
+    },
     /// A durative action has no duration.
     NoDuration,
     /// A duration is below 0.

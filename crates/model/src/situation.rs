@@ -1,0 +1,79 @@
+//! A problem in mid-execution.
+
+use elbowroom_num::{Interval, Rational};
+
+use crate::ground::Action;
+use crate::plan::{Step, TimeTriggeredPlan};
+use crate::task::{State, Task};
+
+/// Where things stand at one moment, and what is still under way.
+///
+/// Times are those of the task's own clock: its timed initials up to and including
+/// [`Situation::time`] have happened, the later ones are to come.
+///
+/// A plan from here is a [`TimeTriggeredPlan`] whose first steps continue the running actions, in
+/// their order, each with its own start (in the past) and a duration chosen among those still
+/// possible; all further steps start at [`Situation::time`] or later. Whoever makes the situation
+/// sees to it that `time` is far enough from the last happening for anything to be done at `time`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Situation {
+    /// Now.
+    pub time: Rational,
+    /// What holds now, after all that has happened.
+    pub state: State,
+    /// What has started and not ended.
+    pub running: Vec<RunningAction>,
+}
+
+/// A durative action under way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunningAction {
+    /// What is being done. Its guards have been decided as far as they could be: effects that
+    /// will not take place are left out, and so is `Guard::at_start`.
+    pub action: Action,
+    /// When it started; not after [`Situation::time`].
+    pub start: Rational,
+    /// The durations it may turn out to have had, counted from its start. Those that would have
+    /// it end before [`Situation::time`] are no longer possible, whatever stands here.
+    pub duration: Interval,
+}
+
+impl Situation {
+    /// A task's beginning: time 0, nothing running. Timed initials at time 0, if there are any,
+    /// are to come.
+    pub fn initial(task: &Task) -> Self {
+        Self {
+            time: Rational::ZERO,
+            state: task.initial().clone(),
+            running: Vec::new(),
+        }
+    }
+}
+
+impl RunningAction {
+    /// The action as a step of a plan, with the duration it will have had.
+    pub fn step(&self, duration: Rational) -> Step {
+        Step {
+            start: self.start.clone(),
+            action: self.action.clone(),
+            duration: Some(duration),
+        }
+    }
+
+    /// Whether it may still turn out to have had this duration.
+    pub fn may_last(&self, duration: &Rational, now: &Rational) -> bool {
+        self.duration.contains(duration) && &self.start + duration >= *now
+    }
+
+    /// Whether a step continues this action, apart from its duration.
+    pub(crate) fn is_continued_by(&self, step: &Step) -> bool {
+        step.start == self.start && step.action == self.action
+    }
+}
+
+impl TimeTriggeredPlan {
+    /// The steps that a plan from `situation` adds to what is running.
+    pub fn new_steps(&self, situation: &Situation) -> &[Step] {
+        self.steps.get(situation.running.len()..).unwrap_or(&[])
+    }
+}

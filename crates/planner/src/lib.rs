@@ -1,0 +1,1 @@
+//! Finds plans: an embedded temporal planner, and any external planner as a supervised process.

@@ -1,0 +1,1 @@
+//! How likely a plan is to succeed, and the order most likely to (Olisipo).

@@ -1,0 +1,1 @@
+//! Seeded worlds to execute plans in.
