@@ -3,10 +3,14 @@
 
 use std::fmt::Write as _;
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use proptest::prelude::*;
 
 use super::world::World;
+use crate::plan::TimeTriggeredPlan;
+use crate::situation::{RunningAction, Situation};
+use crate::task::{State, Task};
+use crate::validate::{Verdict, validate, validate_from};
 
 /// Facts `p` and `q` hold, and `x` is 5, at the beginning; `q` ends at 9/2 and returns at 11/2.
 fn world() -> World {
@@ -191,19 +195,136 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     prop::collection::vec(step, 0..4)
 }
 
+fn text(steps: &[Step]) -> String {
+    let mut text = String::new();
+    for step in steps {
+        let duration = &step.end - &step.start;
+        let _ = writeln!(text, "{}: {}", step.start, step.action);
+        if !duration.is_zero() {
+            text.truncate(text.len() - 1);
+            let _ = writeln!(text, " [{duration}]");
+        }
+    }
+    text
+}
+
+/// Where the plan stands at a moment at which nothing happens, and the plan from there.
+fn cut(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    steps: &[Step],
+    now: &Rational,
+) -> (Situation, TimeTriggeredPlan) {
+    let here = seen(steps, now, true);
+    let fact = |name| {
+        let predicate = task.problem().predicate(name).expect("declared");
+        task.find_fact(predicate, &[]).expect("mentioned")
+    };
+    let function = task.problem().function("x").expect("declared");
+    let x = task.find_fluent(function, &[]).expect("mentioned");
+    let facts = [("p", here.p), ("q", here.q)];
+    let (running, later): (Vec<_>, Vec<_>) = plan
+        .steps
+        .iter()
+        .filter(|step| step.end() > *now)
+        .cloned()
+        .partition(|step| step.start < *now);
+    let situation = Situation {
+        time: now.clone(),
+        state: State {
+            facts: facts
+                .into_iter()
+                .filter(|(_, holds)| *holds)
+                .map(|(name, _)| fact(name))
+                .collect(),
+            values: [(x, here.x)].into(),
+        },
+        running: running
+            .iter()
+            .map(|step| RunningAction {
+                action: step.action.clone(),
+                start: step.start.clone(),
+                duration: Interval::at_least(Rational::ZERO),
+            })
+            .collect(),
+    };
+    let steps = running.into_iter().chain(later).collect();
+    (situation, TimeTriggeredPlan { steps })
+}
+
 proptest! {
     #[test]
     fn the_judge_agrees_with_its_slow_twin(steps in steps()) {
-        let mut text = String::new();
-        for step in &steps {
-            let duration = &step.end - &step.start;
-            let _ = writeln!(text, "{}: {}", step.start, step.action);
-            if !duration.is_zero() {
-                text.truncate(text.len() - 1);
-                let _ = writeln!(text, " [{duration}]");
-            }
-        }
-        let said = world().judge(&text);
+        let said = world().judge(&text(&steps));
         prop_assert_eq!(is_valid(&steps), said == "valid", "{}", said);
     }
+
+    #[test]
+    fn what_is_left_of_a_plan_is_judged_as_the_plan_is(steps in steps(), half in 0..12_i64) {
+        let now = Rational::new(2 * half + 1, 4);
+        let world = world();
+        let (task, plan) = world.task_and_plan(&text(&steps));
+        let whole = validate(&task, &plan, &world.settings);
+        let (situation, rest) = cut(&task, &plan, &steps, &now);
+        // A plan that is over at the cut reaches its goal before what is left does.
+        if rest.steps.is_empty() {
+            return Ok(());
+        }
+        let rest = validate_from(&task, &situation, &rest, &world.settings);
+        match &whole {
+            Verdict::Invalid(violation) if violation.time < now => {}
+            _ => prop_assert_eq!(whole.is_valid(), rest.is_valid(), "{:?} {:?}", whole, rest),
+        }
+    }
+}
+
+#[test]
+fn a_plan_in_mid_execution_goes_on_with_what_is_running() {
+    let world = world();
+    let steps = [Step {
+        action: "drain",
+        start: Rational::ZERO,
+        end: Rational::from(3),
+    }];
+    let (task, plan) = world.task_and_plan(&text(&steps));
+    let (mut situation, rest) = cut(&task, &plan, &steps, &Rational::ONE);
+    let said = |situation: &Situation, plan: &TimeTriggeredPlan| match validate_from(
+        &task,
+        situation,
+        plan,
+        &world.settings,
+    ) {
+        Verdict::Invalid(violation) => violation.to_string(),
+        other => format!("{:?}", other.is_valid()),
+    };
+    assert_eq!(said(&situation, &rest), "true");
+    let abandoned = said(&situation, &TimeTriggeredPlan::default());
+    assert!(abandoned.contains("going on with (drain)"), "{abandoned}");
+    // Drained below 2 at 3, when x must be at least 2 all the time.
+    let mut long = rest.clone();
+    long.steps[0].duration = Some(Rational::from(4));
+    assert!(
+        said(&situation, &long).contains("(>= (x) 2)"),
+        "{}",
+        said(&situation, &long)
+    );
+    let mut over = rest.clone();
+    over.steps[0].duration = Some(Rational::new(1, 2));
+    assert!(
+        said(&situation, &over).contains("it is 1 already"),
+        "{}",
+        said(&situation, &over)
+    );
+    situation.running[0].duration = Interval::closed(Rational::ONE, Rational::from(2));
+    assert!(
+        said(&situation, &rest).contains("[1, 2] was possible"),
+        "{}",
+        said(&situation, &rest)
+    );
+    situation.running.clear();
+    assert!(
+        said(&situation, &rest).contains("starts before time 1"),
+        "{}",
+        said(&situation, &rest)
+    );
 }

@@ -133,6 +133,12 @@ impl World {
 
     /// Lines `time: name` or `time: name [duration]`.
     pub(super) fn verdict(&self, plan: &str) -> Verdict {
+        let (task, plan) = self.task_and_plan(plan);
+        validate(&task, &plan, &self.settings)
+    }
+
+    /// Lines `time: name` or `time: name [duration]`.
+    pub(super) fn task_and_plan(&self, plan: &str) -> (Task, TimeTriggeredPlan) {
         let mut task = Task::new(self.problem.clone());
         let mut steps = Vec::new();
         for line in plan.lines().map(str::trim).filter(|line| !line.is_empty()) {
@@ -148,7 +154,7 @@ impl World {
                     .map(|text| number(text.trim_matches(['[', ']']))),
             });
         }
-        validate(&task, &TimeTriggeredPlan { steps }, &self.settings)
+        (task, TimeTriggeredPlan { steps })
     }
 
     fn schema(mut self, name: &str, body: Body) -> Self {
