@@ -21,6 +21,7 @@ mod instances;
 mod numbers;
 mod plain;
 mod polynomial;
+mod schedules;
 mod shrink;
 mod smt;
 mod system;

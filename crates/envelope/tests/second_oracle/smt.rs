@@ -5,8 +5,10 @@
 //! precise, the text follows the judge: over-all conditions are read at every moment between two
 //! positions of different times, and timed initials after the last action do not count.
 
+mod causes;
 mod effects;
 mod obligations;
+mod places;
 mod text;
 
 use std::fmt::Write;
@@ -17,7 +19,10 @@ use elbowroom_model::problem::{Comparison, Unknown};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, DecoupledEnvelope, InstanceId, Node, ParametrizedPlan};
 
-use text::{and, apply, number, or, sum};
+use crate::schedules;
+use crate::z3::{Found, Z3};
+pub(crate) use places::Places;
+use text::{and, apply, not, number, or, sum};
 
 /// The plan has something that is not encoded here.
 #[derive(Clone, Copy, Debug)]
@@ -27,22 +32,18 @@ pub(crate) struct NotEncoded;
 pub(crate) struct Encoding {
     schedules: String,
     effects: String,
-    violation: String,
+    violations: Vec<String>,
 }
 
 impl Encoding {
+    /// Each time point may be at one of its `places`.
     pub(crate) fn new(
         task: &Task,
         plan: &ParametrizedPlan,
         epsilon: &Rational,
+        places: &Places,
     ) -> Result<Self, NotEncoded> {
-        let mut encoder = Encoder {
-            task,
-            plan,
-            epsilon,
-            text: String::new(),
-            violations: Vec::new(),
-        };
+        let mut encoder = Encoder::new(task, plan, epsilon, places);
         encoder.check_covered()?;
         encoder.network();
         let schedules = std::mem::take(&mut encoder.text);
@@ -58,25 +59,64 @@ impl Encoding {
         Ok(Self {
             schedules,
             effects: encoder.text,
-            violation: or(&encoder.violations),
+            violations: encoder.violations,
         })
     }
 
     /// Satisfiable if some schedule for some values in the box breaks something.
     pub(crate) fn broken(&self, envelope: &DecoupledEnvelope) -> String {
-        format!(
-            "{}{}{}(assert {})\n",
-            self.schedules,
-            in_box(envelope),
-            self.effects,
-            self.violation
-        )
+        let violation = or(&self.violations);
+        format!("{}(assert {violation})\n", self.lives(envelope))
+    }
+
+    /// What holds in all schedules for values in the box.
+    fn lives(&self, envelope: &DecoupledEnvelope) -> String {
+        format!("{}{}{}", self.schedules, in_box(envelope), self.effects)
     }
 
     /// Satisfiable if there is a schedule for some values in the box.
     pub(crate) fn scheduled(&self, envelope: &DecoupledEnvelope) -> String {
         format!("{}{}", self.schedules, in_box(envelope))
     }
+}
+
+/// Whether the box is inside; `None` if Z3 cannot tell in time, or something is not encoded.
+pub(crate) fn contained(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    epsilon: &Rational,
+    envelope: &DecoupledEnvelope,
+    solver: &mut Z3,
+) -> Option<bool> {
+    if schedules::are_missing(plan, envelope)? {
+        return Some(false);
+    }
+    let places = Places::within(plan, envelope)?;
+    let mut encoder = Encoder::new(task, plan, epsilon, &places);
+    let (lives, violations) = match encoder.causes(envelope) {
+        Ok(lives) => (lives, encoder.violations),
+        Err(NotEncoded) => {
+            let encoding = Encoding::new(task, plan, epsilon, &places).ok()?;
+            (encoding.lives(envelope), encoding.violations)
+        }
+    };
+    let mut ask = |violation: &str| match solver.ask(&format!("{lives}(assert {violation})\n")) {
+        Found::Model => Some(false),
+        Found::NoModel => Some(true),
+        Found::Unknown => None,
+    };
+    // All at once is quick where it is quick at all; one by one takes longer, and goes further.
+    ask(&or(&violations)).or_else(|| {
+        let mut is_inside = Some(true);
+        for violation in &violations {
+            match ask(violation) {
+                Some(true) => {}
+                Some(false) => return Some(false),
+                None => is_inside = None,
+            }
+        }
+        is_inside
+    })
 }
 
 fn in_box(envelope: &DecoupledEnvelope) -> String {
@@ -90,12 +130,6 @@ fn in_box(envelope: &DecoupledEnvelope) -> String {
         }
     }
     text
-}
-
-/// The node's position is less than `k`.
-fn before(node: usize, k: usize) -> String {
-    let earlier: Vec<_> = (1..k).map(|j| format!("at{node}_{j}")).collect();
-    or(&earlier)
 }
 
 /// Where an expression is read.
@@ -113,11 +147,28 @@ struct Encoder<'a> {
     task: &'a Task,
     plan: &'a ParametrizedPlan,
     epsilon: &'a Rational,
+    places: &'a Places,
     text: String,
     violations: Vec<String>,
 }
 
 impl<'a> Encoder<'a> {
+    fn new(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &'a Rational,
+        places: &'a Places,
+    ) -> Self {
+        Self {
+            task,
+            plan,
+            epsilon,
+            places,
+            text: String::new(),
+            violations: Vec::new(),
+        }
+    }
+
     fn line(&mut self, line: &str) {
         self.text.push_str(line);
         self.text.push('\n');
@@ -200,21 +251,53 @@ impl<'a> Encoder<'a> {
             self.assert(&format!("(<= tau{} tau{k})", k - 1));
         }
         for node in self.nodes() {
-            let mut here = Vec::new();
-            for k in 1..=count {
-                self.line(&format!("(declare-const at{node}_{k} Bool)"));
-                self.assert(&format!("(=> at{node}_{k} (= t{node} tau{k}))"));
-                here.push(format!("at{node}_{k}"));
-            }
+            let here: Vec<_> = self
+                .places
+                .of(node)
+                .map(|k| {
+                    let at = self.at(node, k);
+                    if at != "true" {
+                        self.line(&format!("(declare-const {at} Bool)"));
+                    }
+                    self.assert(&or(&[not(&at), format!("(= t{node} tau{k})")]));
+                    at
+                })
+                .collect();
             self.assert(&or(&here));
         }
-        for k in 1..=count {
-            for node in self.nodes() {
-                for other in 1..node {
-                    self.assert(&format!("(not (and at{node}_{k} at{other}_{k}))"));
+        for node in self.nodes() {
+            for other in 1..node {
+                for k in self.places.of(node) {
+                    let both = and(&[self.at(node, k), self.at(other, k)]);
+                    self.assert(&not(&both));
                 }
             }
         }
+    }
+
+    /// The node's position is `k`.
+    fn at(&self, node: usize, k: usize) -> String {
+        let places = self.places.of(node);
+        if !places.contains(&k) {
+            "false".to_owned()
+        } else if places.end() == places.start() {
+            "true".to_owned()
+        } else {
+            format!("at{node}_{k}")
+        }
+    }
+
+    /// The node's position is less than `k`.
+    fn before(&self, node: usize, k: usize) -> String {
+        let places = self.places.of(node);
+        if *places.end() < k {
+            return "true".to_owned();
+        }
+        let earlier: Vec<_> = places
+            .filter(|j| *j < k)
+            .map(|j| self.at(node, j))
+            .collect();
+        or(&earlier)
     }
 
     fn snap(&self, node: usize) -> Option<&'a SnapAction> {
@@ -258,7 +341,7 @@ impl<'a> Encoder<'a> {
                 At::Arrival(k) => format!("f{}_{}", fact.0, k - 1),
                 At::After(k) | At::Moment(k, _) => format!("f{}_{k}", fact.0),
             },
-            Condition::Not(part) => format!("(not {})", self.condition(part, at, action)?),
+            Condition::Not(part) => not(&self.condition(part, at, action)?),
             Condition::And(parts) => and(&all(parts)?),
             Condition::Or(parts) => or(&all(parts)?),
             Condition::Compare(comparison, left, right) => format!(

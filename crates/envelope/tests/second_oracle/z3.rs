@@ -3,11 +3,14 @@
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+use crate::setting;
+
 /// A running solver.
 pub(crate) struct Z3 {
     child: Child,
     input: ChildStdin,
     output: BufReader<ChildStdout>,
+    milliseconds: u64,
 }
 
 /// Whether a text has a model.
@@ -52,12 +55,16 @@ impl Z3 {
             child,
             input,
             output,
+            milliseconds: setting("ELBOWROOM_Z3_MILLISECONDS", 3000),
         })
     }
 
     /// Whether the text, declarations and assertions, has a model.
     pub(crate) fn ask(&mut self, text: &str) -> Found {
-        let question = format!("(reset)\n(set-option :timeout 3000)\n{text}(check-sat)\n");
+        let question = format!(
+            "(reset)\n(set-option :timeout {})\n{text}(check-sat)\n",
+            self.milliseconds
+        );
         self.input
             .write_all(question.as_bytes())
             .and_then(|()| self.input.flush())

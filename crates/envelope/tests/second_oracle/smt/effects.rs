@@ -4,8 +4,8 @@ use elbowroom_model::ground::{Change, ContinuousEffect, DurativeBody, Effect};
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_plan::{InstanceId, Node};
 
-use super::text::{number, or, sum};
-use super::{At, Encoder, NotEncoded, before};
+use super::text::{and, not, number, or, sum};
+use super::{At, Encoder, NotEncoded};
 
 impl<'a> Encoder<'a> {
     /// Constants for what the guards read at an action's start say: of end effects, then of
@@ -27,9 +27,9 @@ impl<'a> Encoder<'a> {
                     return Err(NotEncoded);
                 }
                 let mut holds = Vec::new();
-                for k in 1..=self.count() {
+                for k in self.places.of(self.start(id)) {
                     let here = self.condition(&guard.at_start, &At::Arrival(k), Some(id))?;
-                    holds.push(format!("(and at{}_{k} {here})", self.start(id)));
+                    holds.push(and(&[self.at(self.start(id), k), here]));
                 }
                 self.assert(&format!("(= guard{}_{index} {})", id.0, or(&holds)));
             }
@@ -55,24 +55,33 @@ impl<'a> Encoder<'a> {
         for k in 1..=self.count() {
             for fluent in 0..fluents {
                 let drift = self.drift(fluent, k - 1, k, &format!("tau{k}"))?;
-                self.line(&format!("(declare-const r{fluent}_{k} Real)"));
-                self.assert(&format!(
-                    "(= r{fluent}_{k} (+ v{fluent}_{} {drift}))",
-                    k - 1
-                ));
+                let before = format!("v{fluent}_{}", k - 1);
+                let arriving = match drift.as_str() {
+                    "0.0" => before,
+                    _ => format!("(+ {before} {drift})"),
+                };
+                self.copy(&format!("r{fluent}_{k}"), "Real", &arriving);
             }
             for fact in 0..facts {
                 let after = self.fact_after(fact, k)?;
-                self.line(&format!("(declare-const f{fact}_{k} Bool)"));
-                self.assert(&format!("(= f{fact}_{k} {after})"));
+                self.copy(&format!("f{fact}_{k}"), "Bool", &after);
             }
             for fluent in 0..fluents {
                 let after = self.value_after(fluent, k)?;
-                self.line(&format!("(declare-const v{fluent}_{k} Real)"));
-                self.assert(&format!("(= v{fluent}_{k} {after})"));
+                self.copy(&format!("v{fluent}_{k}"), "Real", &after);
             }
         }
         Ok(())
+    }
+
+    /// A constant with a value; only another name for it, if the value is simple.
+    fn copy(&mut self, name: &str, sort: &str, value: &str) {
+        if value.contains(' ') {
+            self.line(&format!("(declare-const {name} {sort})"));
+            self.assert(&format!("(= {name} {value})"));
+        } else {
+            self.line(&format!("(define-fun {name} () {sort} {value})"));
+        }
     }
 
     /// How much a fluent moves continuously from position `from` until the time `until`, which
@@ -92,6 +101,7 @@ impl<'a> Encoder<'a> {
                 terms.push(self.drift_of(id, body, index, effect, (from, next, until))?);
             }
         }
+        terms.retain(|term| term != "0.0");
         Ok(sum(&terms))
     }
 
@@ -103,18 +113,24 @@ impl<'a> Encoder<'a> {
         effect: &ContinuousEffect,
         (from, next, until): (usize, usize, &str),
     ) -> Result<String, NotEncoded> {
+        let guard = format!("guard{}_{}", id.0, body.end.effects.len() + index);
+        let runs = and(&[
+            self.before(self.start(id), next),
+            not(&self.before(self.end(id), next)),
+            guard,
+        ]);
+        if runs == "false" {
+            return Ok("0.0".to_owned());
+        }
         let rate = self.expression(&effect.rate, &At::After(from), Some(id))?;
-        Ok(format!(
-            "(ite (and {} (not {}) guard{}_{}) (* {rate} (- {until} tau{from})) 0.0)",
-            before(self.start(id), next),
-            before(self.end(id), next),
-            id.0,
-            body.end.effects.len() + index
-        ))
+        Ok(format!("(ite {runs} (* {rate} (- {until} tau{from})) 0.0)"))
     }
 
     /// The effects of a node with the formula for whether they happen at position `k`.
     fn changes(&self, node: usize, k: usize) -> Result<Vec<(String, &'a Change)>, NotEncoded> {
+        if self.at(node, k) == "false" {
+            return Ok(Vec::new());
+        }
         if let Node::Timed(group) = self.node(node) {
             let changes = self.task.timed()[group].changes.iter();
             return Ok(changes.map(|change| ("true".to_owned(), change)).collect());
@@ -127,7 +143,7 @@ impl<'a> Encoder<'a> {
             .map(|(index, effect)| {
                 let now = self.condition(&effect.guard.now, &At::Arrival(k), id)?;
                 let happens = match (self.node(node), id) {
-                    (Node::End(_), Some(id)) => format!("(and guard{}_{index} {now})", id.0),
+                    (Node::End(_), Some(id)) => and(&[format!("guard{}_{index}", id.0), now]),
                     _ => now,
                 };
                 Ok((happens, &effect.change))
@@ -139,7 +155,7 @@ impl<'a> Encoder<'a> {
         let (mut adds, mut deletes) = (Vec::new(), Vec::new());
         for node in self.nodes() {
             for (happens, change) in self.changes(node, k)? {
-                let happens = format!("(and at{node}_{k} {happens})");
+                let happens = and(&[self.at(node, k), happens]);
                 match change {
                     Change::Add(other) if other.index() == fact => adds.push(happens),
                     Change::Delete(other) if other.index() == fact => deletes.push(happens),
@@ -147,12 +163,9 @@ impl<'a> Encoder<'a> {
                 }
             }
         }
-        Ok(format!(
-            "(or {} (and f{fact}_{} (not {})))",
-            or(&adds),
-            k - 1,
-            or(&deletes)
-        ))
+        let kept = and(&[format!("f{fact}_{}", k - 1), not(&or(&deletes))]);
+        adds.push(kept);
+        Ok(or(&adds))
     }
 
     fn value_after(&self, fluent: usize, k: usize) -> Result<String, NotEncoded> {
@@ -187,7 +200,7 @@ impl<'a> Encoder<'a> {
                 value = format!("(ite {happens} {new} {value})");
             }
             if count > 0 {
-                after = format!("(ite at{node}_{k} {value} {after})");
+                after = format!("(ite {} {value} {after})", self.at(node, k));
             }
         }
         Ok(after)

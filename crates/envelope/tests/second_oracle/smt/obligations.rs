@@ -4,7 +4,7 @@ use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_plan::{Bound, InstanceId, Node, NodeId};
 
-use super::text::{and, number, or};
+use super::text::{and, not, number, or};
 use super::{At, Encoder, NotEncoded};
 
 impl Encoder<'_> {
@@ -13,11 +13,10 @@ impl Encoder<'_> {
             let Some(snap) = self.snap(node) else {
                 continue;
             };
-            for k in 1..=self.count() {
+            for k in self.places.of(node) {
                 let holds =
                     self.condition(&snap.condition, &At::Arrival(k), self.instance(node))?;
-                self.violations
-                    .push(format!("(and at{node}_{k} (not {holds}))"));
+                self.violations.push(and(&[self.at(node, k), not(&holds)]));
             }
         }
         Ok(())
@@ -69,10 +68,9 @@ impl Encoder<'_> {
                 let node = if limit.at_end { end } else { start };
                 let condition =
                     Condition::Compare(limit.comparison, Expression::Duration, limit.bound.clone());
-                for k in 1..=self.count() {
+                for k in self.places.of(node) {
                     let holds = self.condition(&condition, &At::Arrival(k), Some(id))?;
-                    self.violations
-                        .push(format!("(and at{node}_{k} (not {holds}))"));
+                    self.violations.push(and(&[self.at(node, k), not(&holds)]));
                 }
             }
         }
@@ -93,6 +91,13 @@ impl Encoder<'_> {
                 self.end(id)
             );
             for k in 1..self.count() {
+                let is_under_way = and(&[
+                    self.before(self.start(id), k + 1),
+                    not(&self.before(self.end(id), k + 1)),
+                ]);
+                if is_under_way == "false" {
+                    continue;
+                }
                 let at = At::Moment(k, moment.clone());
                 let holds = self.condition(&body.over_all, &at, Some(id))?;
                 self.violations.push(format!(
@@ -111,6 +116,12 @@ impl Encoder<'_> {
             .filter(|&node| !matches!(self.node(node), Node::Timed(_)))
             .collect();
         for k in 1..=self.count() {
+            if actions
+                .iter()
+                .any(|node| *self.places.of(*node).start() > k)
+            {
+                continue;
+            }
             let mut parts = Vec::new();
             let last: Vec<_> = actions
                 .iter()
@@ -122,7 +133,7 @@ impl Encoder<'_> {
                 parts.push(format!("(< tau{k} tau{})", k + 1));
             }
             let holds = self.condition(&self.plan.goal, &At::After(k), None)?;
-            parts.push(format!("(not {holds})"));
+            parts.push(not(&holds));
             self.violations.push(and(&parts));
         }
         Ok(())

@@ -24,11 +24,32 @@ pub(super) fn apply(operator: &str, empty: &str, parts: &[String]) -> String {
 }
 
 pub(super) fn and(parts: &[String]) -> String {
-    apply("and", "true", parts)
+    junction("and", ("true", "false"), parts)
 }
 
 pub(super) fn or(parts: &[String]) -> String {
-    apply("or", "false", parts)
+    junction("or", ("false", "true"), parts)
+}
+
+/// `empty` says nothing among the parts, `decided` says it all.
+fn junction(operator: &str, (empty, decided): (&str, &str), parts: &[String]) -> String {
+    if parts.iter().any(|part| part == decided) {
+        return decided.to_owned();
+    }
+    let parts: Vec<_> = parts
+        .iter()
+        .filter(|part| *part != empty)
+        .cloned()
+        .collect();
+    apply(operator, empty, &parts)
+}
+
+pub(super) fn not(part: &str) -> String {
+    match part {
+        "true" => "false".to_owned(),
+        "false" => "true".to_owned(),
+        _ => format!("(not {part})"),
+    }
 }
 
 pub(super) fn sum(parts: &[String]) -> String {

@@ -1,0 +1,169 @@
+//! Values in a box for which there is no schedule, by branching.
+//!
+//! Each bound is first taken at its worst, whatever the others of its parameter say. If there is no
+//! cycle of negative weight even so, all values have a schedule. If there is one that no parameter
+//! is on in both directions, its bounds are at their worst all at once, for some values. Else one
+//! such parameter is set to one end, then to the other: the values with a schedule form a convex
+//! set.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
+
+/// How many branches are looked at before giving up.
+const MOST_BRANCHES: usize = 200_000;
+
+/// A number, and how often infinity is added to it.
+type Extended = (i64, Rational);
+
+/// An upper bound on how much later `to` is than `from`.
+struct Edge {
+    from: usize,
+    to: usize,
+    bound: Limit,
+}
+
+enum Limit {
+    Number(Rational),
+    /// The value of the parameter, times 1 or -1.
+    Parameter(usize, i64),
+}
+
+/// Whether some values in the box have no schedule; `None` if that takes too long.
+pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<bool> {
+    let edges = edges(plan);
+    let mut branches: Vec<BTreeMap<usize, Extended>> = vec![BTreeMap::new()];
+    for _ in 0..MOST_BRANCHES {
+        let Some(chosen) = branches.pop() else {
+            return Some(false);
+        };
+        let worst = |edge: &Edge| match &edge.bound {
+            Limit::Number(value) => (0, value.clone()),
+            Limit::Parameter(index, sign) => match chosen.get(index) {
+                Some(value) => times(value, *sign),
+                None => least(&envelope.intervals[*index], *sign),
+            },
+        };
+        let Some(cycle) = negative_cycle(plan.plan.nodes.len(), &edges, &worst) else {
+            continue;
+        };
+        let mut weight = (0, Rational::ZERO);
+        let mut multiples: BTreeMap<usize, i64> = BTreeMap::new();
+        for edge in &cycle {
+            match &edges[*edge].bound {
+                Limit::Number(_) => weight = plus(&weight, &worst(&edges[*edge])),
+                Limit::Parameter(index, sign) => *multiples.entry(*index).or_default() += sign,
+            }
+        }
+        for (index, multiple) in multiples {
+            let share = match chosen.get(&index) {
+                Some(value) => times(value, multiple),
+                None => least(&envelope.intervals[index], multiple),
+            };
+            weight = plus(&weight, &share);
+        }
+        if weight < (0, Rational::ZERO) {
+            return Some(true);
+        }
+        // Its bounds on the cycle were not all at their worst at once.
+        let torn = cycle.iter().find_map(|edge| match edges[*edge].bound {
+            Limit::Parameter(index, sign) if !chosen.contains_key(&index) => cycle
+                .iter()
+                .any(|other| matches!(edges[*other].bound, Limit::Parameter(i, s) if i == index && s != sign))
+                .then_some(index),
+            _ => None,
+        });
+        let index = torn.expect("else the cycle has the weight for which it was found");
+        for sign in [1, -1] {
+            let end = times(&least(&envelope.intervals[index], sign), sign);
+            let mut branch = chosen.clone();
+            branch.insert(index, end);
+            branches.push(branch);
+        }
+    }
+    None
+}
+
+fn edges(plan: &ParametrizedPlan) -> Vec<Edge> {
+    let mut edges = Vec::new();
+    for node in 1..plan.plan.nodes.len() {
+        // No time is negative.
+        let bound = Limit::Number(Rational::ZERO);
+        edges.push(Edge {
+            from: node,
+            to: 0,
+            bound,
+        });
+    }
+    for constraint in &plan.plan.constraints {
+        let (from, to) = (constraint.from.index(), constraint.to.index());
+        let ways = [
+            (from, to, &constraint.upper, 1),
+            (to, from, &constraint.lower, -1),
+        ];
+        for (from, to, bound, sign) in ways {
+            let bound = match bound {
+                Bound::Infinite => continue,
+                Bound::Finite(value) => Limit::Number(value * Rational::from(sign)),
+                Bound::Parameter(id) => Limit::Parameter(id.index(), sign),
+            };
+            edges.push(Edge { from, to, bound });
+        }
+    }
+    edges
+}
+
+/// The least of `multiple` times a value in the interval.
+fn least(interval: &Interval, multiple: i64) -> Extended {
+    let end = |end: &End, infinite: i64| match end.value() {
+        Some(value) => (0, value.clone()),
+        None => (infinite, Rational::ZERO),
+    };
+    let ends = [end(&interval.lower, -1), end(&interval.upper, 1)];
+    let [lower, upper] = ends.map(|end| times(&end, multiple));
+    lower.min(upper)
+}
+
+fn times(value: &Extended, multiple: i64) -> Extended {
+    (value.0 * multiple, &value.1 * Rational::from(multiple))
+}
+
+fn plus(a: &Extended, b: &Extended) -> Extended {
+    (a.0 + b.0, &a.1 + &b.1)
+}
+
+/// The edges of a cycle of negative weight, by Bellman and Ford's algorithm.
+fn negative_cycle(
+    nodes: usize,
+    edges: &[Edge],
+    weight: &dyn Fn(&Edge) -> Extended,
+) -> Option<Vec<usize>> {
+    let weights: Vec<_> = edges.iter().map(weight).collect();
+    let mut distance = vec![(0, Rational::ZERO); nodes];
+    let mut arrived_by: Vec<Option<usize>> = vec![None; nodes];
+    let mut last = None;
+    for _ in 0..nodes {
+        last = None;
+        for (index, edge) in edges.iter().enumerate() {
+            let here = plus(&distance[edge.from], &weights[index]);
+            if here < distance[edge.to] {
+                distance[edge.to] = here;
+                arrived_by[edge.to] = Some(index);
+                last = Some(edge.to);
+            }
+        }
+        last?;
+    }
+    let mut node = last?;
+    let back = |node: usize| arrived_by[node].expect("it was reached over an edge");
+    for _ in 0..nodes {
+        node = edges[back(node)].from;
+    }
+    let mut cycle = vec![back(node)];
+    while edges[cycle[cycle.len() - 1]].from != node {
+        let from = edges[cycle[cycle.len() - 1]].from;
+        cycle.push(back(from));
+    }
+    Some(cycle)
+}
