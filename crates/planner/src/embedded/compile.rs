@@ -39,6 +39,9 @@ pub(crate) struct Compiled {
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,
+    /// For each fact the stamps of its latest addition and deletion; [`NONE`] if nothing waits for
+    /// them.
+    pub(crate) fact_stamps: Vec<[u32; 2]>,
     /// How many stamps there are.
     pub(crate) stamp_count: usize,
     /// The timed initials to come, by time.

@@ -8,6 +8,7 @@
 //! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
 //! plan.
 
+mod deadlines;
 mod graph;
 mod numbers;
 
@@ -16,6 +17,9 @@ use super::compile::Compiled;
 use super::state::State;
 
 pub(crate) use graph::Graph;
+use super::network::SETTLED;
+use super::time::{NEVER, Ticks};
+use deadlines::Deadlines;
 use graph::Kind;
 
 /// Beyond this, costs are all alike.
@@ -55,6 +59,9 @@ pub(crate) struct Relaxed<'a> {
     gaps: Vec<f64>,
     buckets: Vec<Vec<u32>>,
     applicable: Vec<u32>,
+    deadlines: Deadlines,
+    /// Nothing may happen later.
+    pub(crate) horizon: Ticks,
 }
 
 impl<'a> Relaxed<'a> {
@@ -74,6 +81,8 @@ impl<'a> Relaxed<'a> {
             gaps: vec![0.0; compiled.tests.len()],
             buckets: Vec::new(),
             applicable: Vec::new(),
+            deadlines: Deadlines::default(),
+            horizon: NEVER,
             graph,
         }
     }
@@ -110,6 +119,13 @@ impl<'a> Relaxed<'a> {
             *cost = operator.cost;
         }
         self.applicable.clear();
+        if self.horizon < NEVER
+            || !self.graph.windows.is_empty()
+            || state.open.iter().any(|open| open.node == SETTLED && open.most < NEVER)
+        {
+            self.deadlines
+                .exclude_late(self.compiled, &self.graph, state, self.horizon, &mut self.missing);
+        }
         let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {
                 cost[proposition as usize] = 0;
@@ -149,7 +165,7 @@ impl<'a> Relaxed<'a> {
                 self.graph.operators[operator as usize].kind,
                 Kind::Timed(timed) if timed < state.timed
             );
-            if !is_past {
+            if !is_past && self.missing[operator as usize] == 0 {
                 self.fire(operator);
             }
         }

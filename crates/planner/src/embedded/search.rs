@@ -125,6 +125,7 @@ impl<'a> Search<'a> {
     /// From now on only plans count that end by then.
     pub(crate) fn set_horizon(&mut self, horizon: Ticks) {
         self.stepper.horizon = horizon;
+        self.relaxed.horizon = horizon;
         self.is_timeless = false;
     }
 

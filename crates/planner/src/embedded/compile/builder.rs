@@ -526,6 +526,7 @@ impl<'a> Builder<'a> {
             scale,
             epsilon,
             now: now.0,
+            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
             facts: self.symbols.facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,

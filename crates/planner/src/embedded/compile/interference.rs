@@ -344,6 +344,11 @@ impl Stamps {
         self.count
     }
 
+    /// The stamps of the latest addition and deletion of a fact.
+    pub(super) fn of_fact(&self, fact: FactId) -> [u32; 2] {
+        [Added(fact), Deleted(fact)].map(|access| self.number(access).unwrap_or(NONE))
+    }
+
     fn number(&self, access: Access) -> Option<u32> {
         let number = *self.numbers.get(&access)?;
         (number != NONE).then_some(number)

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use super::super::compile::{Action, Change, Compiled, NONE, Snap, Update};
-use super::super::formula::Formula;
+use super::super::compile::{Action, Change, Compiled, NONE, Snap, Timed, Update};
+use super::super::formula::{Formula, Literal};
+use super::super::time::{NEVER, Ticks};
 use super::numbers;
 
 /// What an operator stands for.
@@ -28,6 +29,21 @@ pub(crate) struct Operator {
     pub(crate) preconditions: Range<usize>,
     pub(crate) effects: Range<usize>,
     pub(crate) gains: Range<usize>,
+    /// Positions in [`Graph::windows`].
+    pub(crate) windows: Range<usize>,
+    /// The least time from when the preconditions hold to when it is over.
+    pub(crate) span: Ticks,
+}
+
+/// A literal that changes at fixed times only, and an operator needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window {
+    /// Position in [`Graph::timetable`].
+    pub(crate) timetable: u32,
+    /// The operator must begin at least so long after the literal has become true …
+    pub(crate) lead: Ticks,
+    /// … and at least so long before it becomes false.
+    pub(crate) tail: Ticks,
 }
 
 /// See the module.
@@ -38,6 +54,14 @@ pub(crate) struct Graph {
     pub(crate) preconditions: Vec<u32>,
     pub(crate) precondition_counts: Vec<u32>,
     pub(crate) effects: Vec<u32>,
+    /// For each effect, the least time after the beginning of its operator.
+    pub(crate) delays: Vec<Ticks>,
+    /// See [`Window`].
+    pub(crate) windows: Vec<Window>,
+    /// From when until when a literal holds that changes at fixed times only.
+    pub(crate) timetable: Vec<Vec<(Ticks, Ticks)>>,
+    /// The timetable of each literal; [`NONE`] if it has none.
+    timetable_of: Vec<u32>,
     /// Tests, and what an operator adds to their difference.
     pub(crate) gains: Vec<(u32, f64)>,
     /// Operators without preconditions.
@@ -58,7 +82,7 @@ pub(crate) struct Graph {
 struct Draft<'a> {
     kind: Kind,
     needs: Vec<u32>,
-    more_effects: Vec<u32>,
+    is_running: Option<u32>,
     action: &'a Action,
     snaps: &'a [&'a Snap],
 }
@@ -84,6 +108,7 @@ impl Graph {
             tests_of_fluent,
             ..Self::default()
         };
+        graph.add_timetables(compiled);
         for (number, action) in compiled.actions.iter().enumerate() {
             graph.add_action(compiled, narrow(number), action, merges_eager);
         }
@@ -123,7 +148,7 @@ impl Graph {
             self.proposition_count += 1;
             for part in choice {
                 let needs = self.propositions(part);
-                self.add(Kind::Axiom, 0, needs, &[chosen], Vec::new());
+                self.add(Kind::Axiom, 0, needs, &[(chosen, 0)], Vec::new());
             }
             list.push(chosen);
         }
@@ -135,7 +160,7 @@ impl Graph {
         kind: Kind,
         cost: u32,
         mut needs: Vec<u32>,
-        effects: &[u32],
+        effects: &[(u32, Ticks)],
         gains: Vec<(u32, f64)>,
     ) -> u32 {
         needs.sort_unstable();
@@ -144,7 +169,10 @@ impl Graph {
         self.precondition_counts.push(narrow(needs.len()));
         self.preconditions.extend(needs);
         let first_effect = self.effects.len();
-        self.effects.extend_from_slice(effects);
+        for &(effect, delay) in effects {
+            self.effects.push(effect);
+            self.delays.push(delay);
+        }
         let first_gain = self.gains.len();
         self.gains.extend(gains);
         self.operators.push(Operator {
@@ -154,6 +182,8 @@ impl Graph {
             preconditions,
             effects: first_effect..self.effects.len(),
             gains: first_gain..self.gains.len(),
+            windows: 0..0,
+            span: 0,
         });
         narrow(self.operators.len() - 1)
     }
@@ -173,7 +203,7 @@ impl Graph {
                 Draft {
                     kind: Kind::Start(number),
                     needs,
-                    more_effects: Vec::new(),
+                    is_running: None,
                     action,
                     snaps: &[snap],
                 },
@@ -212,7 +242,7 @@ impl Graph {
                 Draft {
                     kind,
                     needs,
-                    more_effects: if is_whole { Vec::new() } else { vec![running] },
+                    is_running: (!is_whole).then_some(running),
                     action,
                     snaps: &snaps,
                 },
@@ -224,7 +254,7 @@ impl Graph {
             Draft {
                 kind: Kind::End(number),
                 needs: end_needs,
-                more_effects: Vec::new(),
+                is_running: None,
                 action,
                 snaps: &[end],
             },
@@ -233,17 +263,23 @@ impl Graph {
 
     /// Adds an operator for the snaps together, and one for each conditional effect.
     fn add_snaps(&mut self, compiled: &Compiled, draft: Draft<'_>) -> u32 {
-        let mut effects = draft.more_effects;
-        for snap in draft.snaps {
-            effects.extend(effects_of(snap));
+        let least = least_ticks(compiled, draft.action);
+        let mut effects: Vec<(u32, Ticks)> = Vec::new();
+        effects.extend(draft.is_running.map(|running| (running, least)));
+        for (snap, delay) in draft.snaps.iter().zip([0, least]) {
+            effects.extend(effects_of(snap).map(|effect| (effect, delay)));
         }
+        let span = if draft.snaps.len() > 1 { least } else { 0 };
         let updates: Vec<&Update> = draft.snaps.iter().flat_map(|snap| &snap.updates).collect();
         let mut gains = self.gains_of(compiled, &updates);
         // A continuous change may reach any value, from the start to the end.
         for flow in &draft.action.flows {
             self.add_any_gain(flow.fluent, &mut gains);
         }
+        let windows = self.windows_of(compiled, &draft);
         let operator = self.add(draft.kind, 1, draft.needs.clone(), &effects, gains);
+        self.operators[operator as usize].windows = windows.clone();
+        self.operators[operator as usize].span = span;
         for effect in draft.snaps.iter().flat_map(|snap| &snap.conditional) {
             let mut needs = draft.needs.clone();
             needs.extend(self.propositions(&effect.now));
@@ -253,12 +289,13 @@ impl Graph {
                 needs.extend(self.propositions(&draft.action.guards[guard as usize]));
             }
             let (effects, gains) = match &effect.change {
-                Change::Add(fact) => (vec![2 * fact], Vec::new()),
-                Change::Delete(fact) => (vec![2 * fact + 1], Vec::new()),
+                Change::Add(fact) => (vec![(2 * fact, 0)], Vec::new()),
+                Change::Delete(fact) => (vec![(2 * fact + 1, 0)], Vec::new()),
                 Change::Update(update) => (Vec::new(), self.gains_of(compiled, &[update])),
             };
             let extra = self.add(draft.kind, 1, needs, &effects, gains);
             self.operators[extra as usize].is_step = false;
+            self.operators[extra as usize].windows = windows.clone();
         }
         operator
     }
@@ -288,11 +325,11 @@ impl Graph {
     fn add_rules(&mut self, compiled: &Compiled) {
         for rule in compiled.strata.iter().flatten() {
             let needs = self.propositions(&rule.body);
-            self.add(Kind::Axiom, 0, needs, &[2 * rule.head], Vec::new());
+            self.add(Kind::Axiom, 0, needs, &[(2 * rule.head, 0)], Vec::new());
         }
         // What makes a derived fact false is not followed up: it is taken to be possible.
         for &head in compiled.derived.iter().flatten() {
-            self.add(Kind::Axiom, 1, Vec::new(), &[2 * head + 1], Vec::new());
+            self.add(Kind::Axiom, 1, Vec::new(), &[(2 * head + 1, 0)], Vec::new());
         }
     }
 
@@ -300,7 +337,7 @@ impl Graph {
         for (number, timed) in compiled.timed.iter().enumerate() {
             let adds = timed.adds.iter().map(|fact| 2 * fact);
             let deletes = timed.deletes.iter().map(|fact| 2 * fact + 1);
-            let effects: Vec<u32> = adds.chain(deletes).collect();
+            let effects: Vec<(u32, Ticks)> = adds.chain(deletes).map(|e| (e, 0)).collect();
             let mut gains = Vec::new();
             for (fluent, _) in &timed.assigns {
                 self.add_any_gain(*fluent, &mut gains);
@@ -308,6 +345,89 @@ impl Graph {
             let kind = Kind::Timed(narrow(number));
             self.add(kind, 1, Vec::new(), &effects, gains);
         }
+    }
+
+    /// Finds the literals that only timed initials change.
+    fn add_timetables(&mut self, compiled: &Compiled) {
+        self.timetable_of = vec![NONE; 2 * compiled.facts.len()];
+        if compiled.timed.is_empty() {
+            return;
+        }
+        let mut is_changed = vec![false; compiled.facts.len()];
+        for snap in &compiled.snaps {
+            for &fact in snap.adds.iter().chain(&snap.deletes) {
+                is_changed[fact as usize] = true;
+            }
+            for effect in &snap.conditional {
+                if let Change::Add(fact) | Change::Delete(fact) = effect.change {
+                    is_changed[fact as usize] = true;
+                }
+            }
+        }
+        for &fact in compiled.derived.iter().flatten() {
+            is_changed[fact as usize] = true;
+        }
+        for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
+            let touches = |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
+            if !compiled.timed.iter().any(|timed| touches(&timed)) {
+                continue;
+            }
+            for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
+                let mut spans = Vec::new();
+                let mut since = literal
+                    .holds(&compiled.initial.facts)
+                    .then_some(-NEVER);
+                for timed in compiled.timed.iter().filter(touches) {
+                    let is_true = timed.adds.contains(&fact);
+                    match (since, is_true == literal.truth()) {
+                        (None, true) => since = Some(timed.time),
+                        (Some(begin), false) => {
+                            spans.push((begin, timed.time));
+                            since = None;
+                        }
+                        _ => {}
+                    }
+                }
+                spans.extend(since.map(|begin| (begin, NEVER)));
+                self.timetable_of[literal.index()] = narrow(self.timetable.len());
+                self.timetable.push(spans);
+            }
+        }
+    }
+
+    /// The windows in which the operator can begin.
+    fn windows_of(&mut self, compiled: &Compiled, draft: &Draft<'_>) -> Range<usize> {
+        let begin = self.windows.len();
+        if self.timetable.is_empty() {
+            return begin..begin;
+        }
+        let epsilon = compiled.epsilon;
+        let least = least_ticks(compiled, draft.action);
+        let most = most_ticks(compiled, draft.action);
+        let mut add = |formula: &Formula, lead: Ticks, tail: Ticks| {
+            for literal in &formula.literals {
+                let timetable = self.timetable_of[literal.index()];
+                if timetable != NONE {
+                    self.windows.push(Window {
+                        timetable,
+                        lead,
+                        tail,
+                    });
+                }
+            }
+        };
+        match draft.kind {
+            Kind::End(_) => add(&draft.snaps[0].condition, epsilon, epsilon),
+            _ => {
+                add(&draft.snaps[0].condition, epsilon, epsilon);
+                add(&draft.action.over_all, 0, least);
+                if draft.action.end != NONE {
+                    let end = &compiled.snap(draft.action.end).condition;
+                    add(end, (epsilon - most).max(-NEVER), least + epsilon);
+                }
+            }
+        }
+        begin..self.windows.len()
     }
 
     /// Sorts the operators by what they need.
@@ -336,6 +456,16 @@ impl Graph {
             }
         }
     }
+}
+
+/// The least duration of an action, as far as it does not depend on the state.
+fn least_ticks(compiled: &Compiled, action: &Action) -> Ticks {
+    compiled.scale.floor(&action.duration.least).0
+}
+
+fn most_ticks(compiled: &Compiled, action: &Action) -> Ticks {
+    let most = action.duration.most.as_ref();
+    most.map_or(NEVER, |most| compiled.scale.ceil(most).0)
 }
 
 fn effects_of(snap: &Snap) -> impl Iterator<Item = u32> + '_ {
