@@ -28,10 +28,21 @@ pub(crate) struct Stepper<'a> {
     pub(crate) compiled: &'a Compiled,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
-    /// Whether all happenings stay in the network, to be read off at the end.
-    pub(crate) keeps_all: bool,
+    /// If present, all happenings stay in the network, to be read off at the end, and what is
+    /// needed to compute their times exactly is noted here.
+    pub(crate) log: Option<Log>,
     /// Whether a duration had to be rounded to a tick, so that nothing is proved.
     pub(crate) has_rounded: bool,
+}
+
+/// What the network does not say of its nodes, whose times are rounded to ticks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Log {
+    /// For each node the time before which it cannot happen, whatever else happens.
+    pub(crate) floors: Vec<Ticks>,
+    /// For each end of an action its node, that of its start if it started in the plan, and the
+    /// duration's exact bounds.
+    pub(crate) ends: Vec<(NodeId, NodeId, Rational, Option<Rational>)>,
 }
 
 /// When a happening may be.
@@ -46,7 +57,7 @@ impl<'a> Stepper<'a> {
         Self {
             compiled,
             horizon: NEVER,
-            keeps_all: false,
+            log: None,
             has_rounded: false,
         }
     }
@@ -98,7 +109,7 @@ impl<'a> Stepper<'a> {
             self.require(state, &snap.condition, None)?;
             let place = self.place(state, snap);
             let node = self.insert(state, snap, &place, false)?;
-            debug_assert!(self.keeps_all || node == SETTLED || !state.network.is_empty());
+            debug_assert!(self.log.is_some() || node == SETTLED || !state.network.is_empty());
             self.take_effect(state, snap, u64::MAX, None)?;
             return Some(0);
         }
@@ -152,9 +163,20 @@ impl<'a> Stepper<'a> {
             if open.most < NEVER {
                 state.network.add_edge(node, open.node, -open.most).ok()?;
             }
+            if let Some(log) = &mut self.log {
+                let (least, most) = match &open.duration {
+                    Some(duration) => (duration.clone(), Some(duration.clone())),
+                    None => {
+                        let units = |ticks| self.compiled.scale.units(ticks);
+                        let most = (open.most < NEVER).then(|| units(open.most));
+                        (units(open.least), most)
+                    }
+                };
+                log.ends.push((node, open.node, least, most));
+            }
         }
         self.take_effect(state, snap, open.guards, open.duration.as_ref())?;
-        if !self.keeps_all {
+        if self.log.is_none() {
             settle(state);
         }
         Some(())
@@ -207,13 +229,13 @@ impl<'a> Stepper<'a> {
     /// Gives the happening its place in time. It is settled if nothing can push it and nothing
     /// pushes back.
     fn insert(
-        &self,
+        &mut self,
         state: &mut State,
         snap: &Snap,
         place: &Place,
         is_unsettled: bool,
     ) -> Option<NodeId> {
-        if !is_unsettled && place.after.is_empty() && !self.keeps_all {
+        if !is_unsettled && place.after.is_empty() && self.log.is_none() {
             if place.earliest > place.latest {
                 return None;
             }
@@ -230,6 +252,9 @@ impl<'a> Stepper<'a> {
             .ok()?;
         for &stamp in &snap.marks {
             state.network.mark(stamp, node);
+        }
+        if let Some(log) = &mut self.log {
+            log.floors.push(place.earliest);
         }
         Some(node)
     }

@@ -205,14 +205,16 @@ impl Network {
     pub(crate) fn distances_from(&self, origin: NodeId) -> Vec<Ticks> {
         let mut distances = vec![-NEVER; self.nodes.len()];
         distances[origin as usize] = 0;
-        let mut waiting = vec![origin];
-        while let Some(node) = waiting.pop() {
-            let reached = distances[node as usize];
-            for edge in self.edges.iter().filter(|edge| edge.from == node) {
+        // Edges stand in the order of happenings, so that few rounds are needed.
+        let mut changed = true;
+        while changed {
+            changed = false;
+            for edge in &self.edges {
+                let reached = distances[edge.from as usize];
                 let distance = reached + edge.distance;
-                if distance > distances[edge.to as usize] {
+                if reached > -NEVER && distance > distances[edge.to as usize] {
                     distances[edge.to as usize] = distance;
-                    waiting.push(edge.to);
+                    changed = true;
                 }
             }
         }
