@@ -1,0 +1,189 @@
+//! From the choices of a search to a plan with times.
+
+use elbowroom_model::validate::{self, Verdict};
+use elbowroom_model::{Situation, Step as PlanStep, Task, TimeTriggeredPlan, validate_from};
+use elbowroom_num::Rational;
+
+use super::answer::Settings;
+use super::apply::{Log, Step, Stepper};
+use super::compile::{Compiled, NONE};
+use super::network::{Network, NodeId};
+use super::time::NEVER;
+
+/// A step of the plan to be.
+#[derive(Clone, Debug)]
+struct Timing {
+    action: u32,
+    /// `None`: it was under way before.
+    start: Option<NodeId>,
+    end: Option<NodeId>,
+}
+
+/// The plan that the choices stand for, everything as early as possible; `None` if the judge does
+/// not find it valid.
+pub(crate) fn plan_of(
+    task: &mut Task,
+    situation: &Situation,
+    compiled: &Compiled,
+    steps: &[Step],
+    settings: &Settings,
+) -> Option<(TimeTriggeredPlan, validate::Report)> {
+    let mut stepper = Stepper::new(compiled);
+    stepper.log = Some(Log::default());
+    let mut state = compiled.initial.clone();
+    let under_way = situation.running.len();
+    let mut timings: Vec<Timing> = (0..under_way)
+        .map(|number| Timing {
+            action: u32::try_from(number).unwrap_or(NONE),
+            start: None,
+            end: None,
+        })
+        .collect();
+    // For each action under way, its step.
+    let mut open: Vec<usize> = (0..under_way).collect();
+    for &step in steps {
+        let node = NodeId::try_from(state.network.node_count()).ok()?;
+        let ended = match step {
+            Step::End(place) => Some(open.remove(place as usize)),
+            _ => None,
+        };
+        stepper.advance(&mut state, step)?;
+        match step {
+            Step::Start(action) | Step::Whole(action) => {
+                let place = state.open.iter().position(|open| open.node == node);
+                let is_whole = matches!(step, Step::Whole(_));
+                timings.push(Timing {
+                    action,
+                    start: Some(node),
+                    end: is_whole.then_some(node + 1),
+                });
+                if let Some(place) = place {
+                    open.insert(place, timings.len() - 1);
+                }
+            }
+            Step::End(_) => timings[ended?].end = Some(node),
+            Step::Timed => {}
+        }
+    }
+    // The goal may need a timed initial that comes after all else: then something must wait.
+    let needed = compiled
+        .goal_timed
+        .iter()
+        .filter(|&&timed| timed < state.timed)
+        .map(|&timed| compiled.timed[timed as usize].time)
+        .max()
+        .unwrap_or(-NEVER);
+    if state.earliest_end() < needed {
+        let nodes = (0..state.network.node_count()).rev();
+        state.network = nodes
+            .filter_map(|node| {
+                let mut network = state.network.clone();
+                let node = NodeId::try_from(node).ok()?;
+                network.delay(node, needed).ok().map(|()| network)
+            })
+            .next()?;
+    }
+    let times = exact_times(compiled, &state.network, stepper.log.as_ref()?, settings)?;
+    let mut plan = TimeTriggeredPlan::default();
+    for (number, timing) in timings.iter().enumerate() {
+        let at = |node: NodeId| times[node as usize].clone();
+        if let Some(running) = situation.running.get(number) {
+            let duration = at(timing.end?) - &running.start;
+            plan.steps.push(running.step(duration));
+            continue;
+        }
+        let action = compiled.action(timing.action);
+        let start = at(timing.start?);
+        let duration = match action.end {
+            NONE => None,
+            _ => Some(at(timing.end?) - &start),
+        };
+        let ground = task.instantiate(action.schema, &action.arguments).ok()?;
+        plan.steps.push(PlanStep {
+            start,
+            action: ground,
+            duration,
+        });
+    }
+    plan.steps[under_way..].sort_by(|a, b| a.start.cmp(&b.start));
+    let strictness = validate::Settings {
+        epsilon: Some(settings.epsilon.clone()),
+        ..validate::Settings::default()
+    };
+    match validate_from(task, situation, &plan, &strictness) {
+        Verdict::Valid(report) => Some((plan, report)),
+        Verdict::Invalid(_) | Verdict::Undecided(_) => None,
+    }
+}
+
+/// The earliest times of all happenings in exact numbers.
+///
+/// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
+/// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
+/// rounding.
+fn exact_times(
+    compiled: &Compiled,
+    network: &Network,
+    log: &Log,
+    settings: &Settings,
+) -> Option<Vec<Rational>> {
+    let scale = compiled.scale;
+    let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
+    let are_durations_on_grid = log.ends.iter().all(|(_, _, least, most)| {
+        is_on_grid(least) && most.as_ref().is_none_or(is_on_grid)
+    });
+    let is_exact = are_durations_on_grid && compiled.is_exact && is_on_grid(&settings.epsilon);
+    if is_exact {
+        let nodes = 0..network.node_count();
+        return nodes
+            .map(|node| Some(scale.units(network.earliest(NodeId::try_from(node).ok()?))))
+            .collect();
+    }
+    let slack = i64::from(!compiled.is_exact);
+    let mut times: Vec<Rational> = log
+        .floors
+        .iter()
+        .map(|&floor| {
+            let is_free = floor <= compiled.now;
+            scale.units(if is_free { floor } else { floor + slack })
+        })
+        .collect();
+    let of_end = |from: NodeId, to: NodeId| {
+        log.ends.iter().find_map(|(end, start, least, most)| {
+            if (from, to) == (*start, *end) {
+                Some(least.clone())
+            } else if (from, to) == (*end, *start) {
+                most.as_ref().map(|most| -most)
+            } else {
+                None
+            }
+        })
+    };
+    let edges: Vec<(usize, usize, Rational)> = network
+        .edges()
+        .map(|(from, to, distance)| {
+            let exact = of_end(from, to).unwrap_or_else(|| {
+                if distance == compiled.epsilon {
+                    settings.epsilon.clone()
+                } else {
+                    scale.units(distance)
+                }
+            });
+            (usize::from(from), usize::from(to), exact)
+        })
+        .collect();
+    for _ in 0..=times.len() {
+        let mut changed = false;
+        for (from, to, distance) in &edges {
+            let time = &times[*from] + distance;
+            if time > times[*to] {
+                times[*to] = time;
+                changed = true;
+            }
+        }
+        if !changed {
+            return Some(times);
+        }
+    }
+    None
+}
