@@ -95,8 +95,8 @@ fn rover() -> (Source, Task) {
 /// The running action of a plan line, and where things stand `elapsed` after its start at 0, with
 /// its start's changes as given.
 fn under_way(task: &mut Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
-    let (plan, _) = read_plan(&Source::new("plan", line), task).unwrap();
-    let step = plan.steps.into_iter().next().unwrap();
+    let (plan, _) = read_plan(&Source::new("plan", line), task).expect("a plan");
+    let step = plan.steps.into_iter().next().expect("one step");
     let mut state = task.initial().clone();
     let fact = |name: &str| {
         state
@@ -125,9 +125,9 @@ fn under_way(task: &mut Task, line: &str, elapsed: i64, duration: Interval) -> S
 }
 
 fn written(task: &Task, situation: &Situation) -> String {
-    let ends = end_times(situation, &Rational::new(1, 1000)).unwrap();
+    let ends = end_times(situation, &Rational::new(1, 1000)).expect("they are to come");
     let how = ProblemText { ends, digits: None };
-    write_problem(task, situation, &how).unwrap()
+    write_problem(task, situation, &how).expect("it can be said")
 }
 
 #[test]

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// What a line of a planner's log is, for programs that read a log while it is being written.
 ///
-/// A plan is a run of [`LineKind::Timed`] lines, perhaps with blank ones between; separators and
-/// noise end it. [`read_plan`](crate::read_plan) reads such a run.
+/// A plan is a run of [`LineKind::Timed`] and [`LineKind::Broken`] lines, perhaps with blank ones
+/// between; separators and noise end it. [`read_plan`](crate::read_plan) reads such a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineKind {
     /// Nothing, or a comment that says nothing.
@@ -14,8 +14,10 @@ pub enum LineKind {
     Separator,
     /// Anything else a planner may say.
     Noise,
-    /// Actions with times, or what begins like one.
+    /// Actions with times.
     Timed,
+    /// It begins like an action with a time, but is none.
+    Broken,
     /// Actions without times: a classical plan, or something else in parentheses.
     Untimed,
 }
@@ -28,7 +30,8 @@ impl LineKind {
             Line::Separator => Self::Separator,
             Line::Noise => Self::Noise,
             Line::Steps(steps) if steps.iter().all(|step| step.time.is_none()) => Self::Untimed,
-            Line::Steps(_) | Line::Broken(..) => Self::Timed,
+            Line::Steps(_) => Self::Timed,
+            Line::Broken(..) => Self::Broken,
         }
     }
 }

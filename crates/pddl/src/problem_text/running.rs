@@ -69,7 +69,7 @@ pub(super) fn ends_of_running(
     }
     // Increases add up in the order in which they happen.
     let mut order: Vec<_> = situation.running.iter().zip(ends).collect();
-    order.sort_by(|(_, a), (_, b)| a.cmp(b));
+    order.sort_by_key(|(_, end)| *end);
     let mut values = situation.state.values.clone();
     let mut happenings = Vec::new();
     for (running, end) in order {
