@@ -1,34 +1,36 @@
 //! `elbowroom plan`: find a plan, or have another planner find one.
 
 mod conclusion;
+mod embedded;
 mod external;
+mod watch;
 
 use elbowroom::model::Task;
 use elbowroom::pddl::Source;
 
 use crate::args::{EMBEDDED, PlanArgs};
-use crate::exit::{Answer, Failure};
+use crate::exit::Answer;
 use crate::input;
 
 /// Plans.
 pub(crate) fn run(arguments: &PlanArgs) -> Answer {
-    if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
-        return Err(Failure::new(
-            "--planner embedded is not available in this version",
-            "name another planner; `elbowroom plan --help` lists them",
-        ));
-    }
-    let planner = external::planner(arguments)?;
+    // A misspelt planner is told before files are read.
+    let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
+        None
+    } else {
+        Some(external::planner(arguments)?)
+    };
     let (task, domain, problem) = input::task_with_sources(&arguments.problem)?;
-    external::run(
-        &planner,
-        Subject {
-            arguments,
-            task,
-            domain,
-            problem,
-        },
-    )
+    let subject = Subject {
+        arguments,
+        task,
+        domain,
+        problem,
+    };
+    match planner {
+        None => embedded::run(subject),
+        Some(planner) => external::run(&planner, subject),
+    }
 }
 
 /// What to plan.

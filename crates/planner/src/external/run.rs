@@ -474,14 +474,19 @@ impl<'s> Reader<'s> {
         self.shared.mailbox.close();
     }
 
+    /// What it said; of two lines about the same, the one that says more.
     fn sayings(&self) -> Sayings {
-        let (output, error) = (self.output.sayings.clone(), self.error.sayings.clone());
+        let (output, error) = (&self.output.sayings, &self.error.sayings);
+        let more = |output: &Option<String>, error: &Option<String>| {
+            let said = output.iter().chain(error);
+            said.max_by_key(|line| line.len()).cloned()
+        };
         Sayings {
-            unsolvable: output.unsolvable.or(error.unsolvable),
-            gave_up: output.gave_up.or(error.gave_up),
-            unsupported: output.unsupported.or(error.unsupported),
-            missing: output.missing.or(error.missing),
-            out_of_memory: output.out_of_memory.or(error.out_of_memory),
+            unsolvable: more(&output.unsolvable, &error.unsolvable),
+            gave_up: more(&output.gave_up, &error.gave_up),
+            unsupported: more(&output.unsupported, &error.unsupported),
+            missing: more(&output.missing, &error.missing),
+            out_of_memory: more(&output.out_of_memory, &error.out_of_memory),
         }
     }
 

@@ -88,6 +88,8 @@ def main():
     warnings.simplefilter("ignore")
     environment = up.environment.get_environment()
     environment.credits_stream = None
+    # In PDDL an object may be called as its type is.
+    environment.error_used_name = False
     if engine not in environment.factory.engines:
         known = ", ".join(sorted(environment.factory.engines))
         print(f"elbowroom: missing: there is no engine `{engine}`, only {known}", flush=True)

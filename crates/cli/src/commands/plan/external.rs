@@ -2,11 +2,9 @@
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
-use std::time::Duration;
 
 use elbowroom::flow;
 use elbowroom::model::Situation;
-use elbowroom::num::Rational;
 use elbowroom::planner::external::{
     Ending, Event, Outcome, Planner, Report, Request, Settings, Statistics, plan,
 };
@@ -14,12 +12,9 @@ use serde_json::json;
 
 use super::Subject;
 use super::conclusion::{self, Conclusion, Found};
+use super::watch::Watch;
 use crate::args::PlanArgs;
 use crate::exit::{Answer, Failure};
-use crate::interrupt::Interrupt;
-use crate::number;
-use crate::output::counted;
-use crate::progress::Progress;
 
 /// The planner that the command line asks for.
 pub(super) fn planner(arguments: &PlanArgs) -> Result<Planner, Failure> {
@@ -34,14 +29,14 @@ pub(super) fn planner(arguments: &PlanArgs) -> Result<Planner, Failure> {
 /// Has it plan, and prints what came of it.
 pub(super) fn run(planner: &Planner, mut subject: Subject<'_>) -> Answer {
     let arguments = subject.arguments;
+    let mut watch = Watch::start(arguments);
     let situation = Situation::initial(&subject.task);
     let settings = Settings {
         epsilon: arguments.epsilon.clone(),
-        time_limit: arguments.time_limit.as_ref().map(duration),
+        time_limit: watch.limit(),
         memory_limit: arguments.memory.map(|megabytes| megabytes << 20),
         scratch: None,
     };
-    let mut observer = Observer::new(arguments, settings.time_limit);
     let report = plan(
         planner,
         &mut Request {
@@ -52,81 +47,22 @@ pub(super) fn run(planner: &Planner, mut subject: Subject<'_>) -> Answer {
         },
         &settings,
         &mut |task, plan| flow::repaired(task, plan, &arguments.epsilon),
-        &mut |event| observer.observe(event),
+        &mut |event| observe(&mut watch, event),
     );
-    let is_cancelled = observer.interrupt.is_requested();
-    drop(observer);
+    let is_cancelled = watch.is_cancelled();
+    // The line on the terminal goes before the answer comes.
+    drop(watch);
     let conclusion = conclude(planner, report, is_cancelled)?;
     conclusion::print(&subject.task, arguments, &conclusion)
 }
 
-/// Seconds as the clock understands them.
-pub(super) fn duration(seconds: &Rational) -> Duration {
-    Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
-}
-
-/// Shows how it is getting on, and decides when it is enough.
-struct Observer {
-    progress: Progress,
-    interrupt: Interrupt,
-    limit: Option<Duration>,
-    stops_at_first: bool,
-    plans: usize,
-    best: Option<Rational>,
-}
-
-impl Observer {
-    fn new(arguments: &PlanArgs, limit: Option<Duration>) -> Self {
-        Self {
-            progress: Progress::new(),
-            interrupt: Interrupt::listen(),
-            limit,
-            stops_at_first: arguments.first || limit.is_none(),
-            plans: 0,
-            best: None,
+fn observe(watch: &mut Watch, event: &Event<'_>) -> ControlFlow<()> {
+    match event {
+        Event::Running { elapsed, memory } => {
+            watch.show(*elapsed, || format!("{} MB", memory >> 20))
         }
-    }
-
-    fn observe(&mut self, event: &Event<'_>) -> ControlFlow<()> {
-        match event {
-            Event::Running { elapsed, memory } => {
-                let line = self.line(*elapsed, *memory);
-                self.progress.show(*elapsed, || line);
-            }
-            Event::Plan { found, .. } => {
-                self.plans += 1;
-                self.best = Some(found.makespan.clone());
-                if self.stops_at_first {
-                    return ControlFlow::Break(());
-                }
-            }
-            Event::Refused { .. } => {}
-        }
-        if self.interrupt.is_requested() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-
-    fn line(&self, elapsed: Duration, memory: u64) -> String {
-        let mut line = counted(self.plans, "plan");
-        if let Some(best) = &self.best {
-            let _ = write!(line, ", the last ends at {}", number::nearest(best));
-        }
-        if memory > 0 {
-            let _ = write!(line, ", {} MB", memory >> 20);
-        }
-        match self.limit {
-            Some(limit) => {
-                let left = limit.saturating_sub(elapsed).as_secs();
-                let _ = write!(line, ", {left} s left");
-            }
-            None => {
-                let _ = write!(line, ", {} s", elapsed.as_secs());
-            }
-        }
-        line
+        Event::Plan { found, elapsed } => watch.plan(&found.makespan, *elapsed),
+        Event::Refused { .. } => ControlFlow::Continue(()),
     }
 }
 
