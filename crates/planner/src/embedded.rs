@@ -50,6 +50,9 @@ const REPORT_EVERY: u64 = 256;
 /// How many states the hasty search may look at before the complete one gets its first turns.
 const HASTE: u64 = 20_000;
 
+/// How many turns the hasty search gets for each one of the complete search.
+const COMPLETE_SHARE: u64 = 10;
+
 /// Finds a plan from `situation`.
 ///
 /// `observe` is called now and then, and for each better plan; with `Break` the search ends, and
@@ -162,7 +165,7 @@ impl Planner<'_> {
                 }
                 Outcome::BudgetSpent => {}
             }
-            match self.work(&mut complete, Phase::Complete, budget) {
+            match self.work(&mut complete, Phase::Complete, budget / COMPLETE_SHARE) {
                 Outcome::Stop(stopped) => break stopped,
                 Outcome::Over => break Stopped::Exhausted,
                 Outcome::BudgetSpent => {}

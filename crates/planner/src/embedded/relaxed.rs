@@ -13,7 +13,7 @@ mod graph;
 mod numbers;
 
 use super::apply::Step;
-use super::compile::Compiled;
+use super::compile::{Compiled, NONE};
 use super::state::State;
 
 pub(crate) use graph::Graph;
@@ -23,7 +23,7 @@ use deadlines::Deadlines;
 use graph::Kind;
 
 /// Beyond this, costs are all alike.
-const MOST: u32 = 1 << 20;
+const MOST: u32 = 1 << 15;
 
 /// Not reached.
 const UNREACHED: u32 = u32::MAX;
@@ -273,7 +273,8 @@ impl<'a> Relaxed<'a> {
                 if let Kind::Start(action) = data.kind {
                     // What starts must end.
                     let end = self.graph.end_of[action as usize];
-                    if self.missing[end as usize] == 0
+                    if end != NONE
+                        && self.missing[end as usize] == 0
                         && Self::use_operator(&mut self.is_used, &mut used, end)
                     {
                         let needs = self.graph.operators[end as usize].preconditions.clone();

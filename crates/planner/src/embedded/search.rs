@@ -11,7 +11,7 @@ use super::apply::{Step, Stepper};
 use super::compile::Compiled;
 use super::hash::Map;
 use super::relaxed::Relaxed;
-use super::state::State;
+use super::state::{Outlook, State};
 use super::time::{NEVER, Ticks};
 
 /// How many turns the preferred successors get for a better estimate.
@@ -55,6 +55,8 @@ struct Node {
     parent: u32,
     step: Step,
     state: State,
+    /// What of the unsettled past matters, in a search that compares it exactly.
+    outlook: Option<Box<Outlook>>,
 }
 
 const ROOT: u32 = u32::MAX;
@@ -210,7 +212,9 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        if self.is_known(hash, &state) {
+        let outlook = (!self.style.is_hasty && !state.network.is_empty())
+            .then(|| Box::new(state.outlook()));
+        if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
         self.evaluated += 1;
@@ -219,12 +223,14 @@ impl<'a> Search<'a> {
         };
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         self.known.entry(hash).or_default().push(number);
-        self.memory += state.size() + size_of::<Node>() + 64;
+        let outlook_size = outlook.as_ref().map_or(0, |outlook| outlook.size());
+        self.memory += state.size() + outlook_size + size_of::<Node>() + 64;
         let is_goal = self.is_goal(&state);
         self.nodes.push(Node {
             parent,
             step,
             state,
+            outlook,
         });
         if is_goal {
             // A state in which the goal holds may still have successors worth looking at: the
@@ -253,15 +259,23 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a state that is at least as good has been looked at.
-    fn is_known(&mut self, hash: u64, state: &State) -> bool {
+    fn is_known(&mut self, hash: u64, state: &State, outlook: Option<&Outlook>) -> bool {
         let Some(similar) = self.known.get(&hash) else {
             return false;
         };
         let mut variants = 0;
         for &number in similar {
-            let other = &self.nodes[number as usize].state;
+            let node = &self.nodes[number as usize];
+            let other = &node.state;
             if other.is_discretely(state) {
-                if other.is_no_later_than(state, self.is_timeless) {
+                let mut is_no_later =
+                    self.is_timeless || other.has_no_later_stamps_than(state);
+                if self.style.is_hasty {
+                    self.has_lost |= is_no_later && !state.network.is_empty();
+                } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
+                    is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
+                }
+                if is_no_later {
                     return true;
                 }
                 variants += 1;

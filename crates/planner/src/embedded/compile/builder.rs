@@ -427,8 +427,7 @@ impl<'a> Builder<'a> {
             duration,
             flows,
             breaking_timed: Vec::new(),
-            is_eager: start != NONE
-                && is_eager(&self.snaps[start as usize], &self.snaps[end as usize]),
+            is_eager: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }
@@ -470,6 +469,18 @@ impl<'a> Builder<'a> {
                 }
                 let breaking = waiting.before(&needs.makes);
                 action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
+            }
+        }
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.start != NONE && action.end != NONE {
+                let (start, end) = (
+                    &self.snaps[action.start as usize],
+                    &self.snaps[action.end as usize],
+                );
+                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                self.actions[number].is_eager = is_eager(start, end, &offers);
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
@@ -574,13 +585,59 @@ impl Duration {
     }
 }
 
+/// Which actions need a fact to be true.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Readers {
+    None,
+    Only(u32),
+    Many,
+}
+
+impl Readers {
+    fn note(&mut self, action: u32) {
+        *self = match *self {
+            Self::None => Self::Only(action),
+            Self::Only(other) if other == action => Self::Only(action),
+            _ => Self::Many,
+        };
+    }
+
+    fn has_other_than(self, action: u32) -> bool {
+        !matches!(self, Self::None) && self != Self::Only(action)
+    }
+}
+
+/// For each fact, who needs it to be true.
+fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
+    let mut readers = vec![Readers::None; count];
+    for (number, action) in (0..).zip(actions) {
+        let mut note = |formula: &Formula| {
+            formula.visit_literals(&mut |literal| {
+                if literal.truth() {
+                    readers[literal.fact() as usize].note(number);
+                }
+            });
+        };
+        note(&action.over_all);
+        for snap in [action.start, action.end] {
+            if let Some(snap) = snaps.get(snap as usize) {
+                note(&snap.condition);
+                snap.conditional.iter().for_each(|effect| note(&effect.now));
+            }
+        }
+    }
+    readers
+}
+
 /// Whether it costs little to let the end follow the start at once in the order of happenings:
-/// unless the action offers something only while it runs.
-fn is_eager(start: &Snap, end: &Snap) -> bool {
-    let offers = end.deletes.iter().any(|fact| start.adds.contains(fact))
-        || end.conditional.iter().any(
-            |effect| matches!(effect.change, Change::Delete(fact) if start.adds.contains(&fact)),
-        );
+/// unless the action offers something to others only while it runs.
+fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
+    let conditional = end.conditional.iter().filter_map(|effect| match effect.change {
+        Change::Delete(fact) => Some(fact),
+        _ => None,
+    });
+    let mut withdrawn = end.deletes.iter().copied().chain(conditional);
+    let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
     let lends = end.updates.iter().any(|back| {
         back.operator.is_additive()
             && start
