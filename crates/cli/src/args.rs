@@ -14,8 +14,8 @@ use elbowroom::num::Rational;
     max_term_width = 100
 )]
 #[command(long_about = "How much elbow room does a temporal plan have?\n\n\
-    Elbowroom reads PDDL 2.1 problems with durative actions and a plan for them, and says whether \
-    the plan is valid (`check`), which of its orderings and times matter (`stn`), and how far each \
+    Elbowroom reads PDDL 2.1 problems with durative actions. It finds a plan for them, or has \
+    another planner find one (`plan`); says whether a plan is valid (`check`), which of its orderings and times matter (`stn`), and how far each \
     duration, rate or deadline may deviate while the plan is still guaranteed to work (`envelope`).")]
 #[command(after_help = "\
 Wherever a file is asked for, `-` means standard input.
@@ -31,6 +31,8 @@ pub(crate) struct CommandLine {
 pub(crate) enum Command {
     /// Say whether a plan is valid, and if not, what is wrong with it
     Check(CheckArgs),
+    /// Find a plan, or have another planner find one
+    Plan(PlanArgs),
     /// Turn a plan with fixed times into a network that leaves room (an STN plan)
     Stn(StnArgs),
     /// Find out how far each duration, rate or deadline may deviate
@@ -68,6 +70,55 @@ pub(crate) struct CheckArgs {
     #[arg(long)]
     pub(crate) json: bool,
 }
+
+#[derive(Args, Debug)]
+#[command(after_long_help = PLANNER_HELP)]
+pub(crate) struct PlanArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// Who plans: `embedded`, a planner known by name, `up:ENGINE`, or a command line with
+    /// `{domain}` and `{problem}` in it
+    #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
+    pub(crate) planner: String,
+    /// Go on to better plans until so many seconds have passed; without it, the first plan is
+    /// taken
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) time_limit: Option<Rational>,
+    /// Stop at the first plan, also with a time limit
+    #[arg(long)]
+    pub(crate) first: bool,
+    /// Use no more than so many MB of memory
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    pub(crate) memory: Option<u64>,
+    /// Write the plan there instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// How far apart interfering happenings must be
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The planner that is always there.
+pub(crate) const EMBEDDED: &str = "embedded";
+
+const PLANNER_HELP: &str = "\
+Planners:
+  embedded          the one that is part of this program
+  popf              POPF; found in PATH, or where ELBOWROOM_POPF says
+  optic             OPTIC; ELBOWROOM_OPTIC
+  tfd               Temporal Fast Downward; ELBOWROOM_TFD
+  lpg-td            LPG-td; ELBOWROOM_LPG
+  up:ENGINE         an engine of unified-planning, such as up:aries; ELBOWROOM_PYTHON names the
+                    Python that has it
+  \"CMD …\"           any program that prints a plan or writes it to {plan}. {domain} and {problem}
+                    are its files, {time} and {memory} the limits in seconds and MB
+
+Every plan is judged before it is printed, whoever made it. The best plan so far is printed when the
+time is up, and at Ctrl-C. docs/planners.md says how to get each planner, and what each outcome
+means.";
 
 #[derive(Args, Debug)]
 pub(crate) struct StnArgs {

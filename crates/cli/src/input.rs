@@ -23,10 +23,17 @@ const LARGEST_FILE: u64 = 256 << 20;
 
 /// Reads domain and problem. Warnings go to standard error.
 pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
+    Ok(task_with_sources(arguments)?.0)
+}
+
+/// The same, with the texts of domain and problem.
+pub(crate) fn task_with_sources(
+    arguments: &ProblemArgs,
+) -> Result<(Task, Source, Source), Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
-    let problem: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
-    Ok(Task::new(Arc::new(problem)))
+    let read: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
+    Ok((Task::new(Arc::new(read)), domain, problem))
 }
 
 /// A plan of either kind, as it stands in a file.

@@ -30,6 +30,7 @@ fn main() -> ExitCode {
     bug::install_hook();
     let answer = match CommandLine::parse().command {
         Command::Check(arguments) => commands::check::run(&arguments),
+        Command::Plan(arguments) => commands::plan::run(&arguments),
         Command::Stn(arguments) => commands::stn::run(&arguments),
         Command::Envelope(arguments) => commands::envelope::run(&arguments),
     };

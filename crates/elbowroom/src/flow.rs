@@ -124,6 +124,18 @@ pub fn free(
     }
 }
 
+/// A plan like the one given, with other times, if the judge rejects it but accepts those: what
+/// [`planner::external`](elbowroom_planner) asks for where a planner's times are rounded.
+pub fn repaired(
+    task: &Task,
+    time_triggered: &TimeTriggeredPlan,
+    epsilon: &Rational,
+) -> Option<TimeTriggeredPlan> {
+    let freed = free(task, time_triggered, epsilon).ok()?;
+    let Deordered { plan, nominal } = freed.deordered;
+    Some(plan.scheduled(&nominal))
+}
+
 /// The plan with quantities left open; all durations, if nothing is specified. Where needed,
 /// differences of times are fixed so that every schedule works as long as these quantities keep
 /// their nominal values.

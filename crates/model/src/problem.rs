@@ -64,6 +64,8 @@ pub struct Problem {
     pub types: Vec<Type>,
     /// The domain's constants, then the problem's objects.
     pub objects: Vec<Object>,
+    /// How many of the objects are the domain's constants.
+    pub constants: usize,
     /// Basic and derived predicates. `=` is not among them, see [`Condition::Equal`].
     pub predicates: Vec<Predicate>,
     /// Numeric functions.

@@ -11,6 +11,7 @@
 //! 2. `lower`: lists to the model, names resolved. One file for each part of the language.
 //!    After a mistake, reading goes on and reports the next one.
 //! 3. `plan_text`: what planners print, to a plan and back.
+//! 4. `problem_text`: a problem, also one in mid-execution, back to text.
 //!
 //! PDDL 2.1 levels 1 to 4 and PDDL 2.2 are read. What we do not execute ([`Feature`]) is refused
 //! by name and place, or ignored with a warning where it cannot affect validity. No bytes make
@@ -45,6 +46,7 @@ mod diagnostic;
 mod feature;
 mod lower;
 mod plan_text;
+mod problem_text;
 mod render;
 mod report;
 mod source;
@@ -54,5 +56,6 @@ mod syntax;
 pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 pub use feature::Feature;
 pub use lower::read_problem;
-pub use plan_text::{read_plan, write_plan};
+pub use plan_text::{LineKind, read_plan, write_plan};
+pub use problem_text::{ProblemText, WriteProblemError, end_times, write_problem};
 pub use source::Source;

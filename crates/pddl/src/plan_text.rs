@@ -5,5 +5,6 @@ mod line;
 mod read;
 mod write;
 
+pub use line::LineKind;
 pub use read::read_plan;
 pub use write::write_plan;

@@ -108,7 +108,7 @@ fn plan_steps(plan: &Source, mut task: Task) -> Result<usize, Diagnostics> {
 }
 
 /// The rows of a table without its head. None of its fields contains a comma.
-fn rows(path: &Path) -> Vec<Vec<String>> {
+pub(crate) fn rows(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).expect("the benchmark set has its tables");
     text.lines()
         .skip(1)
@@ -116,7 +116,7 @@ fn rows(path: &Path) -> Vec<Vec<String>> {
         .collect()
 }
 
-fn source(folder: &Path, path: &str) -> Source {
+pub(crate) fn source(folder: &Path, path: &str) -> Source {
     let bytes = fs::read(folder.join(path)).expect("the files of the tables exist");
     Source::from_bytes(path, &bytes)
 }

@@ -68,6 +68,7 @@ impl Reader {
         if let Some(section) = sections.only(":constants", &mut self.report) {
             self.objects(section);
         }
+        self.problem.constants = self.problem.objects.len();
         if let Some(section) = sections.only(":predicates", &mut self.report) {
             self.predicates(section);
         }

@@ -2,6 +2,40 @@
 
 use std::ops::Range;
 
+/// What a line of a planner's log is, for programs that read a log while it is being written.
+///
+/// A plan is a run of [`LineKind::Timed`] and [`LineKind::Broken`] lines, perhaps with blank ones
+/// between; separators and noise end it. [`read_plan`](crate::read_plan) reads such a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineKind {
+    /// Nothing, or a comment that says nothing.
+    Blank,
+    /// It announces a plan, or another one.
+    Separator,
+    /// Anything else a planner may say.
+    Noise,
+    /// Actions with times.
+    Timed,
+    /// It begins like an action with a time, but is none.
+    Broken,
+    /// Actions without times: a classical plan, or something else in parentheses.
+    Untimed,
+}
+
+impl LineKind {
+    /// What this line is.
+    pub fn of(text: &str) -> Self {
+        match line(text.trim_end(), 0) {
+            Line::Blank => Self::Blank,
+            Line::Separator => Self::Separator,
+            Line::Noise => Self::Noise,
+            Line::Steps(steps) if steps.iter().all(|step| step.time.is_none()) => Self::Untimed,
+            Line::Steps(_) => Self::Timed,
+            Line::Broken(..) => Self::Broken,
+        }
+    }
+}
+
 /// What a line is.
 #[derive(Debug, PartialEq)]
 pub(super) enum Line<'s> {

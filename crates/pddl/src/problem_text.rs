@@ -1,0 +1,218 @@
+//! From a problem, or what is left of one in mid-execution, to the text of a problem file.
+//!
+//! Programs that only read files can plan from any [`Situation`] that way: time 0 of the text is
+//! [`Situation::time`], the timed initials to come keep their distance from now, and an action
+//! under way becomes timed initials that do at its end what the action would do. What those cannot
+//! say, that nobody may break the conditions of an action under way, is left to the judge.
+
+mod running;
+mod term;
+
+use std::fmt::Write;
+
+use elbowroom_model::ground::{Change, Expression};
+use elbowroom_model::problem::{Object, TypeId};
+use elbowroom_model::{Situation, State, Task, TimedHappening};
+use elbowroom_num::Rational;
+
+pub use running::end_times;
+use running::ends_of_running;
+
+/// How a problem is written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProblemText {
+    /// For each running action, the time on the task's clock at which it will end; see
+    /// [`end_times`].
+    pub ends: Vec<Rational>,
+    /// Numbers without a finite decimal are rounded to so many digits. Without it they are written
+    /// as `p/q`, exactly, which [`read_problem`](crate::read_problem) reads and other programs may
+    /// not.
+    pub digits: Option<u32>,
+}
+
+/// A situation that a problem file cannot describe.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum WriteProblemError {
+    /// Not as many ends as running actions.
+    #[error("{running} actions are under way, but {ends} ends are given for them")]
+    EndCount {
+        /// How many actions are running.
+        running: usize,
+        /// How many ends were given.
+        ends: usize,
+    },
+    /// An action ends now, or should have ended.
+    #[error("{action} would end now or earlier: let its end happen, and plan from the state after")]
+    EndsNow {
+        /// The action.
+        action: String,
+    },
+    /// The end is not among those that are still possible.
+    #[error("{action} cannot end at {end}: it may take {possible} from its start")]
+    Impossible {
+        /// The action.
+        action: String,
+        /// The end.
+        end: Rational,
+        /// The durations that are possible.
+        possible: String,
+    },
+    /// What the action does at its end, or until then, cannot be said in advance.
+    #[error(
+        "a problem file cannot say that {action} is under way: {why}; \
+         the embedded planner takes it as it is"
+    )]
+    Unspeakable {
+        /// The action.
+        action: String,
+        /// What is beyond timed initials.
+        why: String,
+    },
+}
+
+/// The text of a problem file for `task`'s domain that begins in `situation`. Read back
+/// ([`read_problem`](crate::read_problem)), it gives the same problem, up to the order of facts.
+///
+/// Facts that follow from rules are not written. Preferences and a metric on them, which are
+/// ignored when read, are gone.
+///
+/// # Errors
+/// When an action under way cannot be expressed: it changes numbers while it runs, it has
+/// conditional effects that are still open, or it ends at no time later than now.
+///
+/// ```
+/// use elbowroom_model::{Situation, Task};
+/// use elbowroom_num::Rational;
+/// use elbowroom_pddl::{ProblemText, Source, read_problem, write_problem};
+///
+/// let domain = Source::new(
+///     "shop.pddl",
+///     "(define (domain shop) (:predicates (open) (sold))
+///        (:durative-action sell :duration (= ?duration 5)
+///          :condition (at end (open)) :effect (at end (sold))))",
+/// );
+/// let problem = Source::new(
+///     "day.pddl",
+///     "(define (problem day) (:domain shop)
+///        (:init (open) (at 30 (not (open)))) (:goal (sold)))",
+/// );
+/// let task = Task::new(read_problem(&domain, &problem)?.0);
+/// let later = Situation { time: Rational::from(20), ..Situation::initial(&task) };
+/// let text = write_problem(&task, &later, &ProblemText::default())?;
+/// assert!(text.contains("(at 10 (not (open)))"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_problem(
+    task: &Task,
+    situation: &Situation,
+    how: &ProblemText,
+) -> Result<String, WriteProblemError> {
+    let ends = ends_of_running(task, situation, &how.ends)?;
+    let problem = task.problem();
+    let mut text = format!(
+        "(define (problem {})\n(:domain {})\n",
+        problem.name, problem.domain
+    );
+    let writer = Writer { task, how };
+    writer.objects(&mut text);
+    text.push_str("(:init\n");
+    writer.state(&situation.state, &mut text);
+    let to_come = task.timed().iter().filter(|h| h.time > situation.time);
+    let mut timed: Vec<&TimedHappening> = to_come.chain(&ends).collect();
+    timed.sort_by(|a, b| a.time.cmp(&b.time));
+    for happening in timed {
+        writer.timed(happening, &situation.time, &mut text);
+    }
+    text.push_str(")\n");
+    let mut names = Vec::new();
+    // Writing to a string cannot fail.
+    let goal = writer.condition(&problem.goal, &mut names);
+    let _ = writeln!(text, "(:goal {goal})");
+    if let Some(metric) = &problem.metric
+        && let Some(expression) = &metric.expression
+    {
+        let direction = if metric.maximize {
+            "maximize"
+        } else {
+            "minimize"
+        };
+        let expression = writer.expression(expression, &names);
+        let _ = writeln!(text, "(:metric {direction} {expression})");
+    }
+    text.push_str(")\n");
+    Ok(text)
+}
+
+/// Writes the parts of a problem file.
+struct Writer<'a> {
+    task: &'a Task,
+    how: &'a ProblemText,
+}
+
+impl Writer<'_> {
+    /// `:objects`, without the domain's constants. Types are written if any object has one.
+    fn objects(&self, text: &mut String) {
+        let problem = self.task.problem();
+        let own = problem.objects.get(problem.constants..).unwrap_or(&[]);
+        if own.is_empty() {
+            return;
+        }
+        let is_plain = |object: &Object| object.types == [TypeId::OBJECT];
+        let is_typed = !own.iter().all(is_plain);
+        text.push_str("(:objects\n");
+        for object in own {
+            let _ = write!(text, "  {}", object.name);
+            if is_typed {
+                let _ = write!(text, " - {}", self.types(&object.types));
+            }
+            text.push('\n');
+        }
+        text.push_str(")\n");
+    }
+
+    fn state(&self, state: &State, text: &mut String) {
+        for &fact in &state.facts {
+            if !self.task.is_derived(fact) {
+                let _ = writeln!(text, "  {}", self.task.fact_name(fact));
+            }
+        }
+        for (&fluent, value) in &state.values {
+            let name = self.task.fluent_name(fluent);
+            let _ = writeln!(text, "  (= {name} {})", self.number(value));
+        }
+    }
+
+    fn timed(&self, happening: &TimedHappening, now: &Rational, text: &mut String) {
+        let time = self.number(&(&happening.time - now));
+        for change in &happening.changes {
+            let what = match change {
+                Change::Add(fact) => self.task.fact_name(*fact),
+                Change::Delete(fact) => format!("(not {})", self.task.fact_name(*fact)),
+                Change::Update { fluent, value, .. } => {
+                    let Expression::Constant(value) = value else {
+                        // Timed initials assign numbers, and so do the ends made from running
+                        // actions.
+                        continue;
+                    };
+                    format!(
+                        "(= {} {})",
+                        self.task.fluent_name(*fluent),
+                        self.number(value)
+                    )
+                }
+            };
+            let _ = writeln!(text, "  (at {time} {what})");
+        }
+    }
+
+    /// The number as a decimal where that is exact, else as [`ProblemText::digits`] says.
+    fn number(&self, value: &Rational) -> String {
+        let is_exact = |text: &String| text.parse().is_ok_and(|read: Rational| read == *value);
+        let exact = [12, 60].map(|digits| value.to_decimal(digits));
+        match (exact.into_iter().find(is_exact), self.how.digits) {
+            (Some(exact), _) => exact,
+            (None, Some(digits)) => value.to_decimal(digits),
+            (None, None) => value.to_string(),
+        }
+    }
+}

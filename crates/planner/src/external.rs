@@ -1,0 +1,44 @@
+//! Other people's planners, as supervised processes.
+//!
+//! In: a task and a situation, the texts that it was read from, and a [`Planner`]: one of the
+//! [`REGISTRY`], an engine of unified-planning (`up:NAME`), or any command line that says where
+//! the files go. Out: a [`Report`] with one of the [`Outcome`]s, which are never confused, and on
+//! the way an [`Event`] for each plan.
+//!
+//! The way through the module:
+//!
+//! 1. `registry`, `command`: which program to start with which arguments.
+//! 2. `request`: the files that it gets. At the beginning of a task these are the user's own
+//!    texts, to the letter; in mid-execution the problem is written anew
+//!    ([`elbowroom_pddl::write_problem`]).
+//! 3. `supervise`: the process. It has a process group, a folder and limits of its own, its output
+//!    is read as it comes, and at the end nothing of it is left.
+//! 4. `log`: plans and telling phrases in what it prints. Memory stays bounded whatever that is.
+//! 5. `judge`: each plan is judged before anyone sees it, and repaired where only its times are
+//!    rounded.
+//!
+//! This is the one place below the command line that looks at a clock, starts threads and
+//! processes and writes files; hence the feature `external`. Processes are supervised on Unix
+//! systems. Memory limits, and finding children that left the process group, need Linux's `/proc`.
+
+mod clock;
+mod command;
+mod judge;
+mod log;
+mod mailbox;
+mod outcome;
+#[cfg(target_os = "linux")]
+mod processes;
+mod registry;
+mod request;
+mod run;
+mod supervise;
+mod workspace;
+
+pub use command::{Command, CommandError};
+pub use judge::Repair;
+pub use outcome::{Event, Found, Outcome, Report, Statistics};
+pub use registry::{Habits, Kind, Planner, PlannerError, REGISTRY, Registered};
+pub use request::Request;
+pub use run::{Settings, plan};
+pub use supervise::Ending;

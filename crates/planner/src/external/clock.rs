@@ -1,0 +1,21 @@
+//! The one place of this module that looks at a clock.
+
+use std::time::{Duration, Instant};
+
+/// Measures the time since it was started.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock(Instant);
+
+impl Clock {
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "the time limit of another process cannot come in as a callback"
+    )]
+    pub(super) fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    pub(super) fn elapsed(self) -> Duration {
+        self.0.elapsed()
+    }
+}

@@ -1,0 +1,225 @@
+//! Command lines with places for the files.
+
+use std::env;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// A program and its arguments, with `{…}` where files and limits go.
+///
+/// | placeholder | stands for |
+/// |---|---|
+/// | `{domain}`, `{problem}` | the files to read |
+/// | `{plan}` | a file to write; also `{plan}.1`, `{plan}_1.SOL` and their like are read |
+/// | `{time}` | the time limit in whole seconds, rounded up; a day if there is none |
+/// | `{memory}` | the memory limit in MB; a million if there is none |
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Command {
+    /// The program: a path, or a name that is looked for in `PATH`.
+    pub program: PathBuf,
+    /// Its arguments, with placeholders.
+    pub arguments: Vec<String>,
+}
+
+/// What is wrong with a command line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CommandError {
+    /// There is nothing in it.
+    #[error(
+        "an empty command line: write a program and its arguments, with {{domain}} and {{problem}}"
+    )]
+    Empty,
+    /// A quotation mark is not closed.
+    #[error("this command line has a {0} without its partner")]
+    Unclosed(char),
+    /// It does not say where a file goes.
+    #[error(
+        "this command line does not say where the {what} file goes: \
+         write {{{what}}} there, as in `myplanner {{domain}} {{problem}}`"
+    )]
+    Missing {
+        /// `domain` or `problem`.
+        what: &'static str,
+    },
+    /// Braces with something else in them.
+    #[error(
+        "unknown placeholder `{{{0}}}`: there are {{domain}}, {{problem}}, {{plan}}, {{time}} and \
+         {{memory}}"
+    )]
+    Unknown(String),
+}
+
+/// What stands for the placeholders.
+#[derive(Clone, Debug)]
+pub(super) struct Filling {
+    pub(super) domain: PathBuf,
+    pub(super) problem: PathBuf,
+    pub(super) plan: PathBuf,
+    /// In seconds.
+    pub(super) time: u64,
+    /// In MB.
+    pub(super) memory: u64,
+}
+
+impl Command {
+    /// Takes a command line apart as a shell would: spaces separate, quotation marks keep
+    /// together, a backslash takes the next character as it is. No shell runs it.
+    ///
+    /// # Errors
+    /// When a quotation mark is not closed, or it does not say where domain and problem go.
+    pub fn parse(line: &str) -> Result<Self, CommandError> {
+        let mut words = words(line)?.into_iter();
+        let program = words.next().ok_or(CommandError::Empty)?;
+        let arguments: Vec<String> = words.collect();
+        for argument in &arguments {
+            check_placeholders(argument)?;
+        }
+        for (what, placeholder) in [("domain", "{domain}"), ("problem", "{problem}")] {
+            if !arguments.iter().any(|a| a.contains(placeholder)) {
+                return Err(CommandError::Missing { what });
+            }
+        }
+        Ok(Self {
+            program: PathBuf::from(program),
+            arguments,
+        })
+    }
+
+    /// The arguments with everything filled in. Other arguments that name a file by a relative
+    /// path get its absolute one, because the planner runs in a folder of its own.
+    pub(super) fn filled(&self, filling: &Filling) -> Vec<OsString> {
+        let fill = |argument: &String| {
+            if !argument.contains('{') {
+                let path = Path::new(argument);
+                let is_file = path.is_relative() && path.exists();
+                return match std::path::absolute(path) {
+                    Ok(absolute) if is_file => absolute.into_os_string(),
+                    _ => OsString::from(argument),
+                };
+            }
+            let text = argument
+                .replace("{domain}", &filling.domain.to_string_lossy())
+                .replace("{problem}", &filling.problem.to_string_lossy())
+                .replace("{plan}", &filling.plan.to_string_lossy())
+                .replace("{time}", &filling.time.to_string())
+                .replace("{memory}", &filling.memory.to_string());
+            OsString::from(text)
+        };
+        self.arguments.iter().map(fill).collect()
+    }
+}
+
+/// The file that would be started: the path itself, or the first of that name in `PATH`.
+pub(super) fn find_program(program: &Path) -> Option<PathBuf> {
+    let has_folder = program.components().count() > 1;
+    if has_folder {
+        let path = std::path::absolute(program).ok()?;
+        return is_executable(&path).then_some(path);
+    }
+    let folders = env::var_os("PATH")?;
+    env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| is_executable(path))
+        .and_then(|path| std::path::absolute(path).ok())
+}
+
+#[cfg(unix)]
+fn is_executable(path: &Path) -> bool {
+    use std::os::unix::fs::PermissionsExt;
+    path.metadata()
+        .is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
+}
+
+#[cfg(not(unix))]
+fn is_executable(path: &Path) -> bool {
+    path.is_file()
+}
+
+fn check_placeholders(argument: &str) -> Result<(), CommandError> {
+    const KNOWN: &[&str] = &["domain", "problem", "plan", "time", "memory"];
+    let mut rest = argument;
+    while let Some(open) = rest.find('{') {
+        rest = &rest[open + 1..];
+        let Some(close) = rest.find('}') else {
+            return Ok(());
+        };
+        let name = &rest[..close];
+        let is_word = name.chars().all(|c| c.is_ascii_alphabetic());
+        // Other braces (`{1,2}`, JSON) are the planner's business.
+        if is_word && !name.is_empty() && !KNOWN.contains(&name) {
+            return Err(CommandError::Unknown(name.to_owned()));
+        }
+        rest = &rest[close + 1..];
+    }
+    Ok(())
+}
+
+/// The words of a line.
+fn words(line: &str) -> Result<Vec<String>, CommandError> {
+    let mut words = Vec::new();
+    let mut word: Option<String> = None;
+    let mut quote: Option<char> = None;
+    let mut characters = line.chars();
+    while let Some(character) = characters.next() {
+        match (quote, character) {
+            (Some(open), character) if character == open => quote = None,
+            (None, '"' | '\'') => {
+                quote = Some(character);
+                word.get_or_insert_default();
+            }
+            (None | Some('"'), '\\') => {
+                let next = characters.next().ok_or(CommandError::Unclosed('\\'))?;
+                word.get_or_insert_default().push(next);
+            }
+            (None, character) if character.is_whitespace() => words.extend(word.take()),
+            (_, character) => word.get_or_insert_default().push(character),
+        }
+    }
+    if let Some(open) = quote {
+        return Err(CommandError::Unclosed(open));
+    }
+    words.extend(word);
+    Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arguments(line: &str) -> Vec<String> {
+        Command::parse(line).unwrap().arguments
+    }
+
+    #[test]
+    fn a_line_is_taken_apart_as_a_shell_would() {
+        let command = Command::parse("'my planner' -x \"a b\" c\\ d '' {domain} -f={problem}");
+        let command = command.unwrap();
+        assert_eq!(command.program, Path::new("my planner"));
+        assert_eq!(
+            command.arguments,
+            ["-x", "a b", "c d", "", "{domain}", "-f={problem}"]
+        );
+    }
+
+    #[test]
+    fn it_must_say_where_the_files_go() {
+        let mistake = |line| Command::parse(line).unwrap_err().to_string();
+        assert!(mistake("popf {domain}").contains("where the problem file goes"));
+        assert!(mistake("popf d.pddl p.pddl").contains("where the domain file goes"));
+        assert!(mistake(" ").contains("empty"));
+        assert!(mistake("popf {domain} {problem} {paln}").contains("{paln}"));
+        assert!(mistake("popf '{domain} {problem}").contains('\''));
+    }
+
+    #[test]
+    fn braces_that_are_no_placeholders_stay() {
+        let line = "p {domain} {problem} {\"a\":1} {1,2} {}";
+        assert_eq!(arguments(line)[2..], ["{a:1}", "{1,2}", "{}"]);
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_not_found() {
+        assert!(find_program(Path::new("sh")).is_some_and(|path| path.is_absolute()));
+        assert_eq!(find_program(Path::new("no-such-planner")), None);
+        assert_eq!(find_program(Path::new("./no-such-planner")), None);
+    }
+}

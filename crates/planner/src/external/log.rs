@@ -1,0 +1,273 @@
+//! What a planner prints, read as it comes.
+//!
+//! Nothing is known about the program at the other end: it may print without end, without line
+//! breaks, or bytes that are no text. All that is kept is bounded.
+
+use std::collections::VecDeque;
+
+use elbowroom_pddl::LineKind;
+
+use super::registry::Habits;
+
+/// Longer lines are cut.
+const LONGEST_LINE: usize = 64 << 10;
+/// Longer plans are cut, and then refused by the judge.
+const LONGEST_PLAN: usize = 16 << 20;
+/// How much of the end of the output is kept to be shown.
+const EXCERPT: usize = 2000;
+
+/// Takes one stream of output apart.
+#[derive(Debug)]
+pub(super) struct Log {
+    habits: Habits,
+    line: Vec<u8>,
+    /// The plan being read: timed actions so far, and lines that begin like one.
+    plan: String,
+    /// Whether there is an action among them.
+    is_plan: bool,
+    /// How much of it has been handed out.
+    handed: usize,
+    /// Actions without times: a plan, if no better one comes.
+    untimed: String,
+    has_timed: bool,
+    tail: VecDeque<u8>,
+    /// What it said.
+    pub(super) sayings: Sayings,
+    /// How many bytes came.
+    pub(super) bytes: u64,
+}
+
+/// The first line that says each thing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sayings {
+    pub(super) unsolvable: Option<String>,
+    pub(super) gave_up: Option<String>,
+    pub(super) unsupported: Option<String>,
+    pub(super) missing: Option<String>,
+    pub(super) out_of_memory: Option<String>,
+}
+
+/// What programs say when they get no more memory.
+const OUT_OF_MEMORY: &[&str] = &[
+    "bad_alloc",
+    "out of memory",
+    "outofmemoryerror",
+    "memoryerror",
+    "cannot allocate memory",
+    "memory allocation of",
+    "memory exhausted",
+];
+
+impl Log {
+    pub(super) fn new(habits: Habits) -> Self {
+        Self {
+            habits,
+            line: Vec::new(),
+            plan: String::new(),
+            is_plan: false,
+            handed: 0,
+            untimed: String::new(),
+            has_timed: false,
+            tail: VecDeque::new(),
+            sayings: Sayings::default(),
+            bytes: 0,
+        }
+    }
+
+    /// Reads on; `found` gets each plan when it is complete as far as can be told.
+    pub(super) fn feed(&mut self, bytes: &[u8], found: &mut impl FnMut(String)) {
+        self.bytes += bytes.len() as u64;
+        let kept = &bytes[bytes.len().saturating_sub(EXCERPT)..];
+        self.tail.extend(kept);
+        let excess = self.tail.len().saturating_sub(EXCERPT);
+        self.tail.drain(..excess);
+        for piece in bytes.split_inclusive(|&byte| byte == b'\n') {
+            let room = LONGEST_LINE.saturating_sub(self.line.len());
+            self.line.extend(&piece[..piece.len().min(room)]);
+            if piece.ends_with(b"\n") {
+                let line = std::mem::take(&mut self.line);
+                self.line(&String::from_utf8_lossy(&line), found);
+            }
+        }
+    }
+
+    /// No more comes. Only who ended `by_itself` can have meant actions without times as a plan.
+    pub(super) fn end(&mut self, by_itself: bool, found: &mut impl FnMut(String)) {
+        let line = std::mem::take(&mut self.line);
+        self.line(&String::from_utf8_lossy(&line), found);
+        self.hand_out(found);
+        if by_itself && !self.has_timed && !self.untimed.is_empty() {
+            found(std::mem::take(&mut self.untimed));
+        }
+    }
+
+    /// The end of the output, as text that can be shown.
+    pub(super) fn excerpt(&self) -> String {
+        let bytes: Vec<u8> = self.tail.iter().copied().collect();
+        let text = String::from_utf8_lossy(&bytes);
+        let shown = |c: char| match c {
+            '\n' | '\t' => c,
+            c if c.is_control() => '\u{fffd}',
+            c => c,
+        };
+        text.trim().chars().map(shown).collect()
+    }
+
+    fn line(&mut self, line: &str, found: &mut impl FnMut(String)) {
+        match LineKind::of(line) {
+            kind @ (LineKind::Timed | LineKind::Broken) => {
+                self.is_plan |= kind == LineKind::Timed;
+                self.has_timed |= self.is_plan;
+                if self.plan.len() + line.len() <= LONGEST_PLAN {
+                    self.plan.push_str(line.trim_end());
+                    self.plan.push('\n');
+                }
+            }
+            // It may go on after a blank line; then it is handed out again, longer.
+            LineKind::Blank => self.hand_out(found),
+            LineKind::Separator | LineKind::Noise => {
+                self.hand_out(found);
+                self.plan.clear();
+                self.is_plan = false;
+                self.handed = 0;
+                self.listen(line);
+            }
+            LineKind::Untimed => {
+                if self.untimed.len() + line.len() <= LONGEST_PLAN {
+                    self.untimed.push_str(line.trim_end());
+                    self.untimed.push('\n');
+                }
+            }
+        }
+        // What comments say is noise to a plan reader, but not to us.
+        if line.trim_start().starts_with(';') {
+            self.listen(line);
+        }
+    }
+
+    fn hand_out(&mut self, found: &mut impl FnMut(String)) {
+        if self.is_plan && self.plan.len() > self.handed {
+            self.handed = self.plan.len();
+            found(self.plan.clone());
+        }
+    }
+
+    fn listen(&mut self, line: &str) {
+        let text = line.to_lowercase();
+        let said = |phrases: &[&str]| phrases.iter().any(|phrase| text.contains(phrase));
+        let heard = [
+            (&mut self.sayings.unsolvable, self.habits.unsolvable),
+            (&mut self.sayings.gave_up, self.habits.gave_up),
+            (&mut self.sayings.unsupported, self.habits.unsupported),
+            (&mut self.sayings.missing, self.habits.missing),
+            (&mut self.sayings.out_of_memory, OUT_OF_MEMORY),
+        ];
+        for (saying, phrases) in heard {
+            if saying.is_none() && said(phrases) {
+                *saying = Some(shortened(line.trim()));
+            }
+        }
+    }
+}
+
+/// The line, or its beginning if it is long.
+fn shortened(line: &str) -> String {
+    const LONGEST: usize = 300;
+    match line.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HABITS: Habits = Habits {
+        unsolvable: &["problem unsolvable"],
+        gave_up: &["search limit"],
+        unsupported: &[],
+        missing: &[],
+    };
+
+    /// The plans in a text that comes in pieces of `size` bytes.
+    fn plans(text: &[u8], size: usize) -> (Vec<String>, Log) {
+        let mut log = Log::new(HABITS);
+        let mut plans = Vec::new();
+        for piece in text.chunks(size) {
+            log.feed(piece, &mut |plan| plans.push(plan));
+        }
+        log.end(true, &mut |plan| plans.push(plan));
+        (plans, log)
+    }
+
+    #[test]
+    fn each_plan_of_a_log_is_handed_out_whatever_the_pieces() {
+        let text = b"b (1.000 | 0.100)(G)
+; Plan found with metric 3.000
+; Time 0.01
+0.000: (a x)  [1.000]
+1.001: (b)  [2.000]
+
+ * All goal deadlines now no later than 3.000
+0.000: (c)  [1.000]
+;;;; Solution Found
+0.500: (c)  [0.500]";
+        for size in [1, 7, 4096] {
+            let (plans, log) = plans(text, size);
+            assert_eq!(
+                plans,
+                [
+                    "0.000: (a x)  [1.000]\n1.001: (b)  [2.000]\n",
+                    "0.000: (c)  [1.000]\n",
+                    "0.500: (c)  [0.500]\n"
+                ]
+            );
+            assert_eq!(log.bytes, text.len() as u64);
+        }
+    }
+
+    #[test]
+    fn a_broken_line_counts_only_among_actions() {
+        let (plans, _) = plans(b"0: (a\n1: (b)\nnoise\n2: (c\n", 100);
+        assert_eq!(plans, ["0: (a\n1: (b)\n"]);
+    }
+
+    #[test]
+    fn a_plan_without_times_counts_if_there_is_no_other() {
+        let (classical, _) = plans(b"step 1\n(a)\n(b)\n", 100);
+        assert_eq!(classical, ["(a)\n(b)\n"]);
+        let (timed, _) = plans(b"(goal reached)\n0: (a)\n", 100);
+        assert_eq!(timed, ["0: (a)\n"]);
+    }
+
+    #[test]
+    fn what_it_says_is_heard_in_comments_and_out_loud() {
+        let (_, log) = plans(b";; Problem UNSOLVABLE!\nSearch limit exceeded\n", 5);
+        let sayings = log.sayings;
+        assert_eq!(
+            sayings.unsolvable.as_deref(),
+            Some(";; Problem UNSOLVABLE!")
+        );
+        assert_eq!(sayings.gave_up.as_deref(), Some("Search limit exceeded"));
+        assert_eq!(sayings.unsupported, None);
+    }
+
+    #[test]
+    fn endless_output_is_kept_in_little_memory() {
+        let mut log = Log::new(HABITS);
+        let mut ignore = |_| {};
+        for _ in 0..1000 {
+            log.feed(&[b'x'; 10_000], &mut ignore);
+            log.feed(&[0xff; 10_000], &mut ignore);
+        }
+        assert!(log.line.capacity() <= 2 * LONGEST_LINE);
+        for _ in 0..30_000 {
+            log.feed(b"0: (a b c) [1]\n(a b c)\n", &mut ignore);
+            log.feed(b"0:", &mut ignore);
+        }
+        assert!(log.plan.len() <= LONGEST_PLAN && log.untimed.len() <= LONGEST_PLAN);
+        assert!(log.tail.len() <= EXCERPT);
+        assert!(log.excerpt().len() <= 3 * EXCERPT);
+    }
+}

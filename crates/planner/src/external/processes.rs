@@ -1,0 +1,175 @@
+//! All processes that belong to a run, found in `/proc`.
+//!
+//! A process belongs to a run if it is in the run's process group, descends from its first
+//! process, or carries the run's mark in its environment. The mark finds those that started a
+//! session of their own and whose parents have ended. Only who also wipes the environment gets
+//! away.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+
+/// The variable that carries the mark.
+pub(super) const MARK: &str = "ELBOWROOM_RUN";
+
+/// A process, told apart from later ones with its number by when it started.
+type Identity = (i32, u64);
+
+/// What `/proc/PID/stat` says.
+#[derive(Clone, Copy, Debug)]
+struct Status {
+    parent: i32,
+    group: i32,
+    start: u64,
+    /// Memory in use, in pages.
+    resident: u64,
+    is_dead: bool,
+}
+
+/// The processes of one run.
+#[derive(Debug)]
+pub(super) struct Processes {
+    leader: i32,
+    /// When the leader started; older processes are none of ours.
+    since: Option<u64>,
+    mark: String,
+    page: u64,
+    members: BTreeSet<Identity>,
+    strangers: BTreeSet<Identity>,
+}
+
+impl Processes {
+    /// Those of the run whose first process is `leader`, and whose environment has `mark`.
+    pub(super) fn of(leader: Pid, mark: &str) -> Self {
+        Self {
+            leader: leader.as_raw_nonzero().get(),
+            since: None,
+            mark: format!("{MARK}={mark}"),
+            page: rustix::param::page_size() as u64,
+            members: BTreeSet::new(),
+            strangers: BTreeSet::new(),
+        }
+    }
+
+    /// How much memory they have in use together, in bytes. Pages that they share count for each.
+    pub(super) fn resident(&mut self) -> u64 {
+        let pages: u64 = self.find().iter().map(|(_, status)| status.resident).sum();
+        pages.saturating_mul(self.page)
+    }
+
+    /// Kills all that are left, and says how many were found.
+    pub(super) fn kill(&mut self) -> usize {
+        let found = self.find();
+        for ((pid, start), _) in &found {
+            kill_exactly(*pid, *start);
+        }
+        found.len()
+    }
+
+    /// The living members.
+    fn find(&mut self) -> Vec<(Identity, Status)> {
+        let processes = all();
+        let since = *self
+            .since
+            .get_or_insert_with(|| processes.get(&self.leader).map_or(0, |leader| leader.start));
+        let mut found = Vec::new();
+        // Children have higher numbers than their parents, save when numbers wrap around; then
+        // the mark finds them.
+        for (&pid, &status) in &processes {
+            let identity = (pid, status.start);
+            if status.start < since || status.is_dead {
+                continue;
+            }
+            let parent = processes.get(&status.parent);
+            let is_child = parent.is_some_and(|p| self.members.contains(&(status.parent, p.start)));
+            let is_member = pid == self.leader
+                || status.group == self.leader
+                || is_child
+                || self.members.contains(&identity)
+                || (!self.strangers.contains(&identity) && self.is_marked(pid));
+            if is_member {
+                self.members.insert(identity);
+                found.push((identity, status));
+            } else {
+                self.strangers.insert(identity);
+            }
+        }
+        found
+    }
+
+    fn is_marked(&self, pid: i32) -> bool {
+        fs::read(format!("/proc/{pid}/environ")).is_ok_and(|environment| {
+            environment
+                .split(|&byte| byte == 0)
+                .any(|entry| entry == self.mark.as_bytes())
+        })
+    }
+}
+
+/// Kills the process if it is still the one that started then.
+fn kill_exactly(pid: i32, start: u64) {
+    let Some(pid) = Pid::from_raw(pid) else {
+        return;
+    };
+    // The descriptor keeps meaning the same process, whatever becomes of the number.
+    let Ok(handle) = pidfd_open(pid, PidfdFlags::empty()) else {
+        return;
+    };
+    let is_same = status(pid.as_raw_nonzero().get()).is_some_and(|s| s.start == start);
+    if is_same {
+        // It may have ended by itself.
+        let _ = pidfd_send_signal(&handle, Signal::KILL);
+    }
+}
+
+fn all() -> BTreeMap<i32, Status> {
+    let Ok(entries) = fs::read_dir("/proc") else {
+        return BTreeMap::new();
+    };
+    entries
+        .flatten()
+        .filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok())
+        .filter_map(|pid| Some((pid, status(pid)?)))
+        .collect()
+}
+
+fn status(pid: i32) -> Option<Status> {
+    let text = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    parse(&text)
+}
+
+/// Takes `/proc/PID/stat` apart: `pid (name) state parent group …`; the name may contain anything.
+fn parse(text: &str) -> Option<Status> {
+    let (_, rest) = text.rsplit_once(')')?;
+    let fields: Vec<&str> = rest.split_ascii_whitespace().collect();
+    // proc(5) counts from 1 and the name is field 2, so field n is at n - 3.
+    let field = |number: usize| fields.get(number - 3).copied();
+    Some(Status {
+        is_dead: matches!(field(3)?, "Z" | "X" | "x"),
+        parent: field(4)?.parse().ok()?,
+        group: field(5)?.parse().ok()?,
+        start: field(22)?.parse().ok()?,
+        resident: field(24)?.parse().ok()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_with_parentheses_and_spaces_does_not_confuse() {
+        let text = "7 (a) b (c) S 3 5 5 0 -1 4194304 1 0 0 0 0 0 0 0 20 0 1 0 987 1000 42 18446";
+        let status = parse(text).unwrap();
+        assert_eq!((status.parent, status.group), (3, 5));
+        assert_eq!((status.start, status.resident), (987, 42));
+        assert!(!status.is_dead);
+    }
+
+    #[test]
+    fn this_process_is_among_all() {
+        let own = i32::try_from(std::process::id()).unwrap();
+        assert!(all().contains_key(&own));
+    }
+}

@@ -1,0 +1,320 @@
+//! Process groups, signals and limits of Unix systems.
+
+use std::io::{self, Read};
+use std::os::fd::AsFd;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+
+use super::super::clock::Clock;
+use super::{Ended, Ending, Limits, Stream, Watcher};
+
+/// How often limits are looked at.
+const TICK: Duration = Duration::from_millis(20);
+/// How often memory is measured: reading `/proc` costs a few milliseconds.
+const MEASURE: Duration = Duration::from_millis(60);
+/// How often the end is looked at when nothing is printed any more.
+const NEAR_END: Duration = Duration::from_millis(2);
+/// How long killed processes are waited for.
+const LAST_WAIT: Duration = Duration::from_secs(2);
+/// How long children that go on having children are hunted.
+const HUNT: Duration = Duration::from_millis(500);
+#[cfg(target_os = "linux")]
+const MEGABYTE: u64 = 1 << 20;
+/// How much of the output that is left in the pipes at the end is read.
+const LEFT_OVER: usize = 4 << 20;
+
+pub(super) fn supervise(
+    mut command: Command,
+    limits: Limits,
+    stop: &AtomicBool,
+    watcher: &mut dyn Watcher,
+) -> io::Result<Ended> {
+    let clock = Clock::start();
+    let mark = mark();
+    #[cfg(target_os = "linux")]
+    command.env(super::super::processes::MARK, &mark);
+    let child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        // A signal to the group reaches its children too, and Ctrl-C on the terminal does not
+        // reach it: we end it ourselves, with what it found so far.
+        .process_group(0)
+        .spawn()?;
+    let mut run = Run::of(child, &mark, limits, clock);
+    run.restrict();
+    let ending = run.watch(stop, watcher);
+    run.end_all();
+    run.drain(watcher);
+    let ended = run.reap();
+    Ok(Ended {
+        ending: ending.unwrap_or(ended),
+        peak_memory: run.peak_memory,
+    })
+}
+
+/// A word that no other run has.
+fn mark() -> String {
+    use std::sync::atomic::AtomicU64;
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    format!("{}-{count}", std::process::id())
+}
+
+/// A running process.
+struct Run {
+    child: Child,
+    pid: Pid,
+    limits: Limits,
+    clock: Clock,
+    peak_memory: u64,
+    memory: u64,
+    measured: Option<Duration>,
+    #[cfg(target_os = "linux")]
+    processes: super::super::processes::Processes,
+    is_output_open: bool,
+    is_error_open: bool,
+}
+
+impl Run {
+    #[cfg_attr(
+        not(target_os = "linux"),
+        allow(unused_variables, reason = "only /proc shows the mark")
+    )]
+    fn of(child: Child, mark: &str, limits: Limits, clock: Clock) -> Self {
+        let pid = Pid::from_child(&child);
+        let run = Self {
+            pid,
+            limits,
+            clock,
+            peak_memory: 0,
+            memory: 0,
+            measured: None,
+            #[cfg(target_os = "linux")]
+            processes: super::super::processes::Processes::of(pid, mark),
+            is_output_open: child.stdout.is_some(),
+            is_error_open: child.stderr.is_some(),
+            child,
+        };
+        // Should this fail, reads may wait for more output; the limits still end them, because
+        // killing the process closes the pipes.
+        if let Some(output) = &run.child.stdout {
+            let _ = without_waiting(output);
+        }
+        if let Some(error) = &run.child.stderr {
+            let _ = without_waiting(error);
+        }
+        run
+    }
+
+    /// Limits that hold even if we should be killed ourselves, or are too slow. They stand well
+    /// above those that we watch.
+    fn restrict(&self) {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::process::{Resource, Rlimit, prlimit};
+            let set = |resource, limit: u64| {
+                let limit = Rlimit {
+                    current: Some(limit),
+                    maximum: Some(limit),
+                };
+                // It may have ended already; and these limits are a second line of defence.
+                let _ = prlimit(Some(self.pid), resource, limit);
+            };
+            set(Resource::Core, 0);
+            set(Resource::Fsize, 2048 * MEGABYTE);
+            if let Some(memory) = self.limits.memory {
+                let data = memory
+                    .saturating_add(memory / 2)
+                    .saturating_add(64 * MEGABYTE);
+                set(Resource::Data, data);
+            }
+            if let Some(time) = self.limits.time {
+                let cores = thread::available_parallelism().map_or(64, |n| n.get() as u64);
+                let seconds = (time.as_secs() + 1)
+                    .saturating_mul(cores)
+                    .saturating_add(10);
+                set(Resource::Cpu, seconds);
+            }
+        }
+    }
+
+    /// Reads its output and watches its limits. Says why it must be ended; `None` if it has ended
+    /// by itself.
+    fn watch(&mut self, stop: &AtomicBool, watcher: &mut dyn Watcher) -> Option<Ending> {
+        let mut buffer = vec![0; 64 << 10];
+        loop {
+            if self.has_exited() {
+                return None;
+            }
+            if stop.load(Ordering::SeqCst) {
+                return Some(Ending::Stopped);
+            }
+            let elapsed = self.clock.elapsed();
+            let left = self.limits.time.map(|limit| limit.saturating_sub(elapsed));
+            if left == Some(Duration::ZERO) {
+                return Some(Ending::TimeLimit);
+            }
+            self.measure(elapsed);
+            if self.limits.memory.is_some_and(|limit| self.memory > limit) {
+                return Some(Ending::MemoryLimit);
+            }
+            watcher.tick(self.memory);
+            let patience = left.map_or(TICK, |left| left.min(TICK));
+            self.wait_for_output(patience);
+            self.read(&mut buffer, watcher);
+        }
+    }
+
+    fn has_exited(&self) -> bool {
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        // Not reaped yet, so its number, which is that of the group, stays ours.
+        matches!(waitid(WaitId::Pid(self.pid), options), Ok(Some(_)))
+    }
+
+    #[cfg(target_os = "linux")]
+    fn measure(&mut self, elapsed: Duration) {
+        let is_due = |last: Duration| elapsed.saturating_sub(last) >= MEASURE;
+        // Programs that end at once are not worth it.
+        if elapsed >= TICK / 2 && self.measured.is_none_or(is_due) {
+            self.measured = Some(elapsed);
+            self.memory = self.processes.resident();
+            self.peak_memory = self.peak_memory.max(self.memory);
+        }
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn measure(&mut self, elapsed: Duration) {
+        self.measured = Some(elapsed);
+    }
+
+    fn wait_for_output(&self, patience: Duration) {
+        let mut watched = Vec::new();
+        if let (true, Some(output)) = (self.is_output_open, &self.child.stdout) {
+            watched.push(PollFd::new(output, PollFlags::IN));
+        }
+        if let (true, Some(error)) = (self.is_error_open, &self.child.stderr) {
+            watched.push(PollFd::new(error, PollFlags::IN));
+        }
+        if watched.is_empty() {
+            thread::sleep(patience.min(NEAR_END));
+            return;
+        }
+        let timeout = Timespec::try_from(patience).ok();
+        // Interrupted or not, the next round looks again.
+        let _ = poll(&mut watched, timeout.as_ref());
+    }
+
+    /// Reads what there is, but no more than a few buffers full, so that who prints without end
+    /// does not keep us from looking at the clock. Says whether there was anything.
+    fn read(&mut self, buffer: &mut [u8], watcher: &mut dyn Watcher) -> usize {
+        let mut total = 0;
+        for _ in 0..8 {
+            let mut round = 0;
+            if let (true, Some(output)) = (self.is_output_open, &mut self.child.stdout) {
+                self.is_output_open = read_some(output, buffer, &mut round, |bytes| {
+                    watcher.printed(Stream::Output, bytes);
+                });
+            }
+            if let (true, Some(error)) = (self.is_error_open, &mut self.child.stderr) {
+                self.is_error_open = read_some(error, buffer, &mut round, |bytes| {
+                    watcher.printed(Stream::Error, bytes);
+                });
+            }
+            if round == 0 {
+                break;
+            }
+            total += round;
+        }
+        total
+    }
+
+    /// Reads what the processes left behind.
+    fn drain(&mut self, watcher: &mut dyn Watcher) {
+        let mut buffer = vec![0; 64 << 10];
+        let mut total = 0;
+        while total < LEFT_OVER {
+            match self.read(&mut buffer, watcher) {
+                0 => return,
+                read => total += read,
+            }
+        }
+    }
+
+    /// Kills the group, and whoever else belongs to the run.
+    fn end_all(&mut self) {
+        // An error means that the group is gone, which is what we want.
+        let _ = kill_process_group(self.pid, Signal::KILL);
+        #[cfg(target_os = "linux")]
+        {
+            let hunt = Clock::start();
+            while self.processes.kill() > 0 && hunt.elapsed() < HUNT {
+                let _ = kill_process_group(self.pid, Signal::KILL);
+                thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    /// Removes the process from the system's table, and says how it ended.
+    fn reap(&mut self) -> Ending {
+        use std::os::unix::process::ExitStatusExt;
+        let clock = Clock::start();
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => {
+                    return match (status.code(), status.signal()) {
+                        (Some(code), _) => Ending::Exited(code),
+                        (None, signal) => Ending::Signalled(signal.unwrap_or(0)),
+                    };
+                }
+                Ok(None) if clock.elapsed() < LAST_WAIT => thread::sleep(NEAR_END / 4),
+                // The system holds on to it; there is nothing more to be done.
+                Ok(None) | Err(_) => return Ending::Signalled(Signal::KILL.as_raw()),
+            }
+        }
+    }
+}
+
+/// Should the watcher panic, nothing is left running all the same.
+impl Drop for Run {
+    fn drop(&mut self) {
+        if let Ok(None) = self.child.try_wait() {
+            self.end_all();
+            self.reap();
+        }
+    }
+}
+
+fn without_waiting(stream: impl AsFd) -> io::Result<()> {
+    let flags = fcntl_getfl(&stream)?;
+    fcntl_setfl(&stream, flags | OFlags::NONBLOCK)?;
+    Ok(())
+}
+
+/// Reads once. Says whether the stream is still open.
+fn read_some(
+    stream: &mut impl Read,
+    buffer: &mut [u8],
+    total: &mut usize,
+    mut use_bytes: impl FnMut(&[u8]),
+) -> bool {
+    match stream.read(buffer) {
+        Ok(0) => false,
+        Ok(count) => {
+            *total += count;
+            use_bytes(&buffer[..count]);
+            true
+        }
+        Err(error) => matches!(
+            error.kind(),
+            io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+        ),
+    }
+}

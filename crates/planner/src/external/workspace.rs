@@ -1,0 +1,139 @@
+//! The folder that a planner runs in.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use tempfile::TempDir;
+
+/// A larger plan file is none.
+const LARGEST_PLAN: u64 = 16 << 20;
+/// More files are not looked at.
+const MOST_FILES: usize = 1000;
+
+/// A fresh folder, removed with all that is in it when this is dropped.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    folder: TempDir,
+    /// The plan files met, with how they looked when last seen and whether they were read so.
+    files: BTreeMap<PathBuf, Seen>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Look {
+    size: u64,
+    modified: Option<SystemTime>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    look: Look,
+    is_read: bool,
+}
+
+impl Workspace {
+    /// A fresh folder in `parent`, or where the system keeps temporary files, with the two texts.
+    pub(super) fn new(parent: Option<&Path>, domain: &str, problem: &str) -> io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix("elbowroom-");
+        let folder = match parent {
+            Some(parent) => builder.tempdir_in(parent)?,
+            None => builder.tempdir()?,
+        };
+        let workspace = Self {
+            folder,
+            files: BTreeMap::new(),
+        };
+        fs::write(workspace.domain(), domain)?;
+        fs::write(workspace.problem(), problem)?;
+        Ok(workspace)
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    pub(super) fn domain(&self) -> PathBuf {
+        self.path().join("domain.pddl")
+    }
+
+    pub(super) fn problem(&self) -> PathBuf {
+        self.path().join("problem.pddl")
+    }
+
+    /// Where `{plan}` points. Not there yet.
+    pub(super) fn plan(&self) -> PathBuf {
+        self.path().join("plan")
+    }
+
+    /// The contents of plan files that are new since the last call, the oldest first. A file that
+    /// is still growing is left for later, unless this is the `last` call.
+    pub(super) fn new_plans(&mut self, last: bool) -> Vec<String> {
+        let Ok(entries) = fs::read_dir(self.path()) else {
+            return Vec::new();
+        };
+        let mut ready = Vec::new();
+        for entry in entries.flatten().take(MOST_FILES) {
+            let path = entry.path();
+            let is_plan = entry.file_name().to_string_lossy().starts_with("plan");
+            let Ok(metadata) = entry.metadata() else {
+                continue;
+            };
+            if !is_plan || !metadata.is_file() || metadata.len() == 0 {
+                continue;
+            }
+            let look = Look {
+                size: metadata.len(),
+                modified: metadata.modified().ok(),
+            };
+            let before = self.files.get(&path);
+            let is_settled = last || before.is_some_and(|seen| seen.look == look);
+            let is_old = before.is_some_and(|seen| seen.is_read && seen.look == look);
+            if is_settled && !is_old {
+                ready.push((look.modified, path.clone()));
+            }
+            let is_read = is_settled || is_old;
+            self.files.insert(path, Seen { look, is_read });
+        }
+        ready.sort();
+        let texts = ready.iter().filter_map(|(_, path)| text_of(path).ok());
+        texts.collect()
+    }
+}
+
+fn text_of(path: &Path) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)?
+        .take(LARGEST_PLAN)
+        .read_to_end(&mut bytes)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plan_files_are_read_once_they_have_settled_and_again_when_they_change() {
+        let mut workspace = Workspace::new(None, "d", "p").unwrap();
+        let plan = workspace.plan();
+        fs::write(&plan, "0: (a)").unwrap();
+        fs::write(plan.with_extension("1"), "").unwrap();
+        assert_eq!(workspace.new_plans(false), [""; 0]);
+        assert_eq!(workspace.new_plans(false), ["0: (a)"]);
+        assert_eq!(workspace.new_plans(true), [""; 0]);
+        fs::write(plan.with_extension("1"), "0: (bb)").unwrap();
+        assert_eq!(workspace.new_plans(true), ["0: (bb)"]);
+    }
+
+    #[test]
+    fn the_folder_goes_with_its_owner() {
+        let workspace = Workspace::new(None, "d", "p").unwrap();
+        let path = workspace.path().to_owned();
+        assert_eq!(fs::read_to_string(workspace.domain()).unwrap(), "d");
+        drop(workspace);
+        assert!(!path.exists());
+    }
+}
