@@ -30,6 +30,6 @@ mod unknowns;
 pub use decoupled::DecoupledEnvelope;
 pub use network::{Schedule, network_node};
 pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
-pub use partial_order::PartialOrderPlan;
+pub use partial_order::{Link, LinkKind, PartialOrderPlan};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 pub use suggestion::nearest;

@@ -11,6 +11,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
 use facts::{Facts, Outcome, Pending};
+pub(crate) use facts::Snapshot;
 pub(crate) use numbers::Number;
 use numbers::Numbers;
 
