@@ -178,13 +178,10 @@ impl OrderSearch {
         let Some(timing) = Timing::new(&self.separations, circumstances) else {
             return Ok(nothing(0));
         };
-        let mut nominal = Nominal::new(model, &circumstances.belief);
         let must_work = self.settings.candidates == Candidates::Working;
-        for running in &circumstances.running {
-            let start = self.separations.starts[running.instance.index()];
-            if must_work && !nominal.admit(model, &model.event(start).over_all) {
-                return Ok(nothing(0));
-            }
+        let (nominal, works) = Nominal::new(model, circumstances);
+        if must_work && !works {
+            return Ok(nothing(0));
         }
         let now = &circumstances.now;
         let next_timed = self.separations.timed.iter();

@@ -11,7 +11,7 @@
 //! and there is as much time left. For a fact on its own the minimum is over true and false; if
 //! nothing to come needs it false, more of it does no harm, and only `p_A / p_B` counts if below 1.
 
-use elbowroom_plan::InstanceId;
+use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
 
 use super::nominal::{Nominal, Truth};
@@ -35,6 +35,8 @@ struct Key {
     is_used: Vec<bool>,
     running: Vec<InstanceId>,
     next_timed: usize,
+    /// Such a sequence is no order as it stands, as the goal is read after an action.
+    is_timed_last: bool,
     truths: Vec<Truth>,
     numbers: Vec<Number>,
 }
@@ -130,11 +132,15 @@ impl Memo {
         let mut running = network.running().to_vec();
         running.sort_unstable();
         let numbers = (0..model.fluents.len()).map(|fluent| network.number(fluent).clone());
+        let last = network.sequence().last();
         let matters = |fact: &usize| need[*fact] != 0;
         let key = Key {
             is_used: is_used.to_vec(),
             running,
             next_timed,
+            is_timed_last: last.is_some_and(|node| {
+                matches!(model.plan().nodes[node.index()], Node::Timed(_))
+            }),
             truths: (0..need.len())
                 .filter(matters)
                 .map(|fact| nominal.truth(fact))

@@ -5,7 +5,7 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_model::problem::Comparison;
 use elbowroom_plan::InstanceId;
 
-use crate::belief::Belief;
+use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
 
 /// The truth of a fact if nothing goes wrong.
@@ -31,16 +31,30 @@ pub(crate) struct Nominal {
 }
 
 impl Nominal {
-    pub(crate) fn new(model: &Model, belief: &Belief) -> Self {
+    /// The state as it is believed, and whether the actions under way can go on in it.
+    pub(crate) fn new(model: &Model, circumstances: &Circumstances) -> (Self, bool) {
+        let belief = &circumstances.belief;
         let truth = |&fact: &FactId| match belief.probability(fact) {
             p if p <= 0.0 => Truth::False,
             p if p >= 1.0 => Truth::True,
             _ => Truth::Open,
         };
-        Self {
+        let mut nominal = Self {
             truths: model.facts.iter().map(truth).collect(),
             undo: Vec::new(),
+        };
+        let mut under_way = Vec::new();
+        for running in &circumstances.running {
+            under_way.push(running.instance);
+            // Guards of the start have been decided: the effects that are left will take place.
+            let start = model.event(model.start(running.instance));
+            let memories = start.effects.iter().filter(|effect| effect.is_certain);
+            for memory in memories {
+                nominal.set(memory.fact, true);
+            }
         }
+        let works = nominal.stays_possible(model, &under_way);
+        (nominal, works)
     }
 
     pub(crate) fn truth(&self, fact: usize) -> Truth {
@@ -84,10 +98,20 @@ impl Nominal {
                 self.set(fact, makes_true);
             }
         }
-        self.admit(model, &event.over_all)
-            && running
-                .iter()
-                .all(|&id| self.admit(model, &model.event(model.start(id)).over_all))
+        self.stays_possible(model, running)
+    }
+
+    /// Whether what is needed throughout these actions may hold now.
+    fn stays_possible(&mut self, model: &Model, running: &[InstanceId]) -> bool {
+        running.iter().all(|&id| {
+            let start = model.event(model.start(id));
+            for (memory, condition) in &start.watches {
+                if self.surely_not(model, condition) {
+                    self.set(*memory, false);
+                }
+            }
+            self.admit(model, &start.over_all)
+        })
     }
 
     /// Whether a requirement may hold; if so, what was open is decided as it says.

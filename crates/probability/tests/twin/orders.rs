@@ -1,7 +1,7 @@
 //! All orders, one after the other.
 
 use elbowroom_plan::{Node, NodeId};
-use elbowroom_probability::{OrderSearch, Semantics};
+use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
 
 use super::Worlds;
 use super::random::Case;
@@ -18,28 +18,40 @@ pub(crate) fn best(case: &Case, semantics: Semantics, search: &OrderSearch) -> O
     );
     let mut best = None;
     let mut sequence = Vec::new();
-    extend(case, search, worlds, &mut sequence, &mut best);
+    let certain = Likelihoods::certain();
+    // What happens if nothing goes wrong; every world of it counts where all orders do.
+    let nominal = Worlds::new(
+        &case.task,
+        &case.plan,
+        &certain,
+        Semantics::Paper,
+        &case.circumstances,
+    );
+    extend(case, search, (worlds, nominal), &mut sequence, &mut best);
     best
 }
 
 fn extend(
     case: &Case,
     search: &OrderSearch,
-    worlds: Worlds<'_>,
+    (worlds, nominal): (Worlds<'_>, Worlds<'_>),
     sequence: &mut Vec<NodeId>,
     best: &mut Option<f64>,
 ) {
     if search.windows(&case.circumstances, sequence).is_none() {
         return;
     }
+    let must_work = search.settings().candidates == Candidates::Working;
     let is_timed = |node: &NodeId| matches!(case.plan.nodes[node.index()], Node::Timed(_));
     if worlds.running().is_empty() && !sequence.last().is_some_and(is_timed) {
         let p = worlds.success_probability();
-        if p > 0.0 && best.is_none_or(|best| p > best) {
+        let counts = !must_work || nominal.success_probability() > 0.0;
+        if counts && p > 0.0 && best.is_none_or(|best| p > best) {
             *best = Some(p);
         }
     }
-    if worlds.actions_probability() == 0.0 {
+    let is_dead = must_work && nominal.actions_probability() == 0.0;
+    if is_dead || worlds.actions_probability() == 0.0 {
         return;
     }
     let next_timed = sequence.iter().filter(|node| is_timed(node)).count();
@@ -60,10 +72,11 @@ fn extend(
                 .interference()
                 .any(|link| link.from == node && sequence.contains(&link.to));
         if is_next && is_allowed {
-            let mut worlds = worlds.clone();
+            let (mut worlds, mut nominal) = (worlds.clone(), nominal.clone());
             worlds.push(node);
+            nominal.push(node);
             sequence.push(node);
-            extend(case, search, worlds, sequence, best);
+            extend(case, search, (worlds, nominal), sequence, best);
             sequence.pop();
         }
     }
