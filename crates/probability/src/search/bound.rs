@@ -30,6 +30,8 @@ pub(crate) struct Bounds {
     setters: Vec<Vec<Setter>>,
     /// What the end of an instance needs, and its middle.
     needs_at_end: Vec<Vec<(usize, bool)>>,
+    /// What its middle needs.
+    needs_throughout: Vec<Vec<(usize, bool)>>,
     /// What its start needs.
     needs_at_start: Vec<Vec<(usize, bool)>>,
     goal: Vec<(usize, bool)>,
@@ -79,6 +81,7 @@ impl Bounds {
         };
         let mut needs_at_start = Vec::new();
         let mut needs_at_end = Vec::new();
+        let mut needs_throughout = Vec::new();
         for (id, _) in model.plan().instances() {
             let (start, end) = (
                 separations.starts[id.index()],
@@ -86,6 +89,7 @@ impl Bounds {
             );
             note(model.event(start), Some(id), false);
             needs_at_start.push(model.event(start).condition.literals.clone());
+            needs_throughout.push(model.event(start).over_all.literals.clone());
             let mut needs = Vec::new();
             if start != end {
                 note(model.event(end), Some(id), true);
@@ -103,6 +107,7 @@ impl Bounds {
         Self {
             setters,
             needs_at_end,
+            needs_throughout,
             needs_at_start,
             goal,
         }
@@ -280,7 +285,7 @@ impl Run<'_, '_, '_> {
         let mut with = |before: usize, after: usize| -> f64 {
             let needs = needs.iter();
             let lasting: f64 = needs
-                .map(|&(fact, truth)| self.chance(fact, truth, before))
+                .map(|&literal| self.lasting(id, literal, before))
                 .product();
             let brings = brings.iter();
             let kept: f64 = brings.map(|(chain, p)| chain.best_after(*p, after)).product();
@@ -296,6 +301,31 @@ impl Run<'_, '_, '_> {
                 early.max(late)
             })
             .collect()
+    }
+
+    /// The best chance that what an end needs lasts until then, the end being `before` steps away
+    /// or more.
+    ///
+    /// What is needed throughout must never fail from the start on. A start is best just before
+    /// its end: until then, what has failed may still mend itself.
+    fn lasting(&mut self, id: InstanceId, (fact, truth): (usize, bool), before: usize) -> f64 {
+        let literal = (fact, truth);
+        let bounds = self.bounds;
+        let is_throughout = bounds.needs_throughout[id.index()].contains(&literal);
+        let chain = Chain::of(self.model.flips[fact], truth);
+        let mut to_come = bounds.setters[fact].iter();
+        if !is_throughout || !chain.is_steady() || to_come.any(|setter| self.is_to_come(setter)) {
+            return self.chance(fact, truth, before);
+        }
+        let steps = i32::try_from(before).unwrap_or(i32::MAX);
+        let stays = 1.0 - chain.0.becomes_false;
+        if self.network.running().contains(&id) {
+            return stays.powi(steps);
+        }
+        if before > 0 && bounds.needs_at_start[id.index()].contains(&literal) {
+            return self.chance(fact, truth, before - 1) * stays;
+        }
+        self.chance(fact, truth, before)
     }
 
     /// Whether the end of `id` is the only thing left that changes the fact, and the fact is not
@@ -371,6 +401,11 @@ impl Chain {
                 becomes_false: flip.becomes_true,
             }
         })
+    }
+
+    /// Whether chances move to one side only.
+    fn is_steady(self) -> bool {
+        self.0.becomes_true + self.0.becomes_false <= 1.0
     }
 
     /// The greatest chance after `steps` steps or more.
