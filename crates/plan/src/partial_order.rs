@@ -13,13 +13,14 @@
 //! provided it, so much the better. Bounds that timed initials put on the plan are not links
 //! either: timed initials are in the list of nodes, and take part in an order like actions.
 
-use elbowroom_model::ground::{Action, Body, Condition, Effect, FactId, SnapAction};
-use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
 use std::collections::BTreeSet;
 
+use elbowroom_model::ground::{Action, Body, Condition, Effect, FactId, SnapAction};
+use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
 use crate::deorder::{Settings, durations, labelled};
-use crate::stn_plan::{Bound, Instance, InstanceId, Node, NodeId, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 
 /// Actions, and the few orderings among their happenings that are kept whatever is skipped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,6 +59,34 @@ pub enum LinkKind {
 }
 
 impl PartialOrderPlan {
+    /// Actions in no order at all, with durations as the domain allows them where that does not
+    /// depend on the state: all that one could do.
+    pub fn unordered(task: &Task, actions: impl IntoIterator<Item = Action>) -> Self {
+        let steps = actions.into_iter().map(|action| Step {
+            start: Rational::ZERO,
+            duration: action.durative().map(|_| Rational::ZERO),
+            action,
+        });
+        let plan = TimeTriggeredPlan {
+            steps: steps.collect(),
+        };
+        let (stn_plan, times) = labelled(task, &plan);
+        let constraints = durations::constraints(task, &stn_plan, &times);
+        let is_known = |reason: &Reason| matches!(reason, Reason::Duration(_));
+        let links = constraints.into_iter().map(|mut constraint| {
+            if !is_known(&constraint.reason) {
+                // The number of the plan, which there is none of.
+                (constraint.lower, constraint.upper) = (Bound::Infinite, Bound::Infinite);
+            }
+            duration_link(constraint)
+        });
+        Self {
+            links: links.collect(),
+            instances: stn_plan.instances,
+            nodes: stn_plan.nodes,
+        }
+    }
+
     /// The instance of that id.
     pub fn instance(&self, id: InstanceId) -> &Instance {
         &self.instances[id.index()]
@@ -99,19 +128,7 @@ pub fn partial_order(
     let (stn_plan, times) = labelled(task, plan);
     let mut links: Vec<Link> = durations::constraints(task, &stn_plan, &times)
         .into_iter()
-        .map(|constraint| {
-            let number = |bound: Bound| match bound {
-                Bound::Finite(number) => Some(number),
-                Bound::Infinite | Bound::Parameter(_) => None,
-            };
-            Link {
-                from: constraint.from,
-                to: constraint.to,
-                lower: number(constraint.lower).unwrap_or_default(),
-                upper: number(constraint.upper),
-                kind: LinkKind::Duration,
-            }
-        })
+        .map(duration_link)
         .collect();
     let uses: Vec<Use> = stn_plan
         .nodes()
@@ -141,6 +158,20 @@ pub fn partial_order(
         instances: stn_plan.instances,
         nodes: stn_plan.nodes,
         links,
+    }
+}
+
+fn duration_link(constraint: Constraint) -> Link {
+    let number = |bound: Bound| match bound {
+        Bound::Finite(number) => Some(number),
+        Bound::Infinite | Bound::Parameter(_) => None,
+    };
+    Link {
+        from: constraint.from,
+        to: constraint.to,
+        lower: number(constraint.lower).unwrap_or_default(),
+        upper: number(constraint.upper),
+        kind: LinkKind::Duration,
     }
 }
 

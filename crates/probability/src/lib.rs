@@ -5,6 +5,7 @@ pub mod dispatch;
 pub mod likelihoods;
 mod model;
 mod network;
+pub mod optimum;
 pub mod search;
 mod total_order;
 
