@@ -198,6 +198,15 @@ impl Task {
         *function
     }
 
+    /// The predicate and the objects that make up the fact.
+    pub fn atom(&self, fact: FactId) -> (PredicateId, &[ObjectId]) {
+        let (predicate, arguments) = self
+            .facts
+            .get_index(fact.index())
+            .expect("a fact of this task");
+        (*predicate, arguments)
+    }
+
     /// The fluent in the table, if something has mentioned it.
     pub fn find_fluent(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<FluentId> {
         self.fluents

@@ -22,7 +22,7 @@
 //! Conditions on numbers that change continuously, or by amounts that depend on durations, can
 //! still fail in some schedules. [`pin_until_sound`] is for those.
 
-mod durations;
+pub(crate) mod durations;
 mod goal;
 mod implied;
 mod order;
@@ -130,7 +130,7 @@ pub fn deorder(
 }
 
 /// The plan without order, and the time that each of its nodes has in the original.
-fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> (StnPlan, Schedule) {
+pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> (StnPlan, Schedule) {
     let mut steps: Vec<_> = plan.steps.iter().collect();
     steps.sort_by(|a, b| a.start.cmp(&b.start));
     let instances = steps

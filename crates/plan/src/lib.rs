@@ -5,6 +5,7 @@
 //!
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
 //! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
+//! - [`PartialOrderPlan`]: the orderings without which an action would spoil another.
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
 //! - [`mod@format`]: STN plan files.
 
@@ -17,6 +18,7 @@ mod network;
 pub mod obligations;
 mod parameter;
 pub mod parametrize;
+pub mod partial_order;
 pub mod reduction;
 pub mod soundness;
 mod stn_plan;
@@ -28,4 +30,6 @@ mod unknowns;
 pub use decoupled::DecoupledEnvelope;
 pub use network::{Schedule, network_node};
 pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
+pub use partial_order::{Link, LinkKind, PartialOrderPlan};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
+pub use suggestion::nearest;

@@ -1,7 +1,7 @@
 //! Near names for misspelled ones.
 
 /// The candidate that `name` most probably was meant to be, if any comes close.
-pub(crate) fn nearest<'a>(
+pub fn nearest<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {

@@ -19,7 +19,7 @@ use crate::stn_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPl
 
 /// A constraint for the duration of each durative instance: the domain's bounds, or the original
 /// duration where these depend on the schedule.
-pub(super) fn constraints(task: &Task, plan: &StnPlan, times: &[Rational]) -> Vec<Constraint> {
+pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &[Rational]) -> Vec<Constraint> {
     let intervals = intervals(task, plan, times);
     let mut nodes = vec![(NodeId::ZERO, NodeId::ZERO); plan.instances.len()];
     for (node, what) in plan.nodes() {

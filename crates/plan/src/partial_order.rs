@@ -1,0 +1,276 @@
+//! Partially ordered plans whose actions may be skipped and repeated: [`partial_order`].
+//!
+//! What an executor that adapts starts from (Olisipo, TIME 2021, section 2.1; Lima et al. 2020).
+//! [`deorder`](crate::deorder::deorder) keeps every order that the plan as a whole needs in order
+//! to work in all schedules; here only two kinds are kept:
+//!
+//! - **duration**: how long an action takes;
+//! - **interference**: the later happening would spoil the earlier one, by undoing what that one
+//!   needs or does.
+//!
+//! *Causal* orders, in which the earlier happening provides what the later one needs, are dropped.
+//! Whoever chooses an order sees from the state whether a condition holds, and if someone else has
+//! provided it, so much the better. Bounds that timed initials put on the plan are not links
+//! either: timed initials are in the list of nodes, and take part in an order like actions.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::ground::{Action, Body, Condition, Effect, FactId, SnapAction};
+use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use crate::deorder::{Settings, durations, labelled};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
+
+/// Actions, and the few orderings among their happenings that are kept whatever is skipped.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartialOrderPlan {
+    /// The actions, labelled `n0`, `n1`, … in order of their start.
+    pub instances: Vec<Instance>,
+    /// [`Node::Zero`], then each instance's start and end, or instant, in order, then the timed
+    /// initials in order of time: the nodes of the [`StnPlan`] of the same instances.
+    pub nodes: Vec<Node>,
+    /// The orderings; a link means something only where both of its nodes are done.
+    pub links: Vec<Link>,
+}
+
+/// `lower <= to - from <= upper`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// The earlier happening.
+    pub from: NodeId,
+    /// The later happening.
+    pub to: NodeId,
+    /// Least difference, not negative.
+    pub lower: Rational,
+    /// Greatest difference; `None` if there is none.
+    pub upper: Option<Rational>,
+    /// Why the link is there.
+    pub kind: LinkKind,
+}
+
+/// Why a [`Link`] is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LinkKind {
+    /// `from` and `to` are start and end of one action.
+    Duration,
+    /// `to` undoes what `from` needs or does.
+    Interference,
+}
+
+impl PartialOrderPlan {
+    /// Actions in no order at all, with durations as the domain allows them where that does not
+    /// depend on the state: all that one could do.
+    pub fn unordered(task: &Task, actions: impl IntoIterator<Item = Action>) -> Self {
+        let steps = actions.into_iter().map(|action| Step {
+            start: Rational::ZERO,
+            duration: action.durative().map(|_| Rational::ZERO),
+            action,
+        });
+        let plan = TimeTriggeredPlan {
+            steps: steps.collect(),
+        };
+        let (stn_plan, times) = labelled(task, &plan);
+        let constraints = durations::constraints(task, &stn_plan, &times);
+        let is_known = |reason: &Reason| matches!(reason, Reason::Duration(_));
+        let links = constraints.into_iter().map(|mut constraint| {
+            if !is_known(&constraint.reason) {
+                // The number of the plan, which there is none of.
+                (constraint.lower, constraint.upper) = (Bound::Infinite, Bound::Infinite);
+            }
+            duration_link(constraint)
+        });
+        Self {
+            links: links.collect(),
+            instances: stn_plan.instances,
+            nodes: stn_plan.nodes,
+        }
+    }
+
+    /// The instance of that id.
+    pub fn instance(&self, id: InstanceId) -> &Instance {
+        &self.instances[id.index()]
+    }
+
+    /// All instances with their ids.
+    pub fn instances(&self) -> impl Iterator<Item = (InstanceId, &Instance)> + '_ {
+        let numbered = self.instances.iter().enumerate();
+        numbered.map(|(index, instance)| (InstanceId::from(index), instance))
+    }
+
+    /// The least and the greatest duration of an instance; `(0, 0)` for an instantaneous one.
+    pub fn duration(&self, id: InstanceId) -> (Rational, Option<Rational>) {
+        let is_it = |link: &&Link| {
+            link.kind == LinkKind::Duration && self.nodes[link.from.index()] == Node::Start(id)
+        };
+        match self.links.iter().find(is_it) {
+            Some(link) => (link.lower.clone(), link.upper.clone()),
+            None => (Rational::ZERO, Some(Rational::ZERO)),
+        }
+    }
+
+    /// The interference links as pairs of nodes.
+    pub fn interference(&self) -> impl Iterator<Item = &Link> + '_ {
+        let is_it = |link: &&Link| link.kind == LinkKind::Interference;
+        self.links.iter().filter(is_it)
+    }
+}
+
+/// The partial order of a valid plan with fixed times.
+///
+/// Durations get the domain's interval; the plan's own number where the domain's bounds depend on
+/// the schedule.
+pub fn partial_order(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    settings: &Settings,
+) -> PartialOrderPlan {
+    let (stn_plan, times) = labelled(task, plan);
+    let mut links: Vec<Link> = durations::constraints(task, &stn_plan, &times)
+        .into_iter()
+        .map(duration_link)
+        .collect();
+    let uses: Vec<Use> = stn_plan
+        .nodes()
+        .map(|(node, _)| Use::of(task, &stn_plan, node))
+        .collect();
+    let happenings: Vec<NodeId> = stn_plan
+        .nodes()
+        .filter(|(_, what)| !matches!(what, Node::Zero | Node::Timed(_)))
+        .map(|(node, _)| node)
+        .collect();
+    for &from in &happenings {
+        for &to in &happenings {
+            if times[from.index()] < times[to.index()]
+                && uses[to.index()].spoils(&uses[from.index()])
+            {
+                links.push(Link {
+                    from,
+                    to,
+                    lower: settings.epsilon.clone(),
+                    upper: None,
+                    kind: LinkKind::Interference,
+                });
+            }
+        }
+    }
+    PartialOrderPlan {
+        instances: stn_plan.instances,
+        nodes: stn_plan.nodes,
+        links,
+    }
+}
+
+fn duration_link(constraint: Constraint) -> Link {
+    let number = |bound: Bound| match bound {
+        Bound::Finite(number) => Some(number),
+        Bound::Infinite | Bound::Parameter(_) => None,
+    };
+    Link {
+        from: constraint.from,
+        to: constraint.to,
+        lower: number(constraint.lower).unwrap_or_default(),
+        upper: number(constraint.upper),
+        kind: LinkKind::Duration,
+    }
+}
+
+/// What a happening needs, and does.
+#[derive(Default)]
+struct Use {
+    /// Facts needed true; basic facts under a derived one are in both sets.
+    needs_true: BTreeSet<FactId>,
+    needs_false: BTreeSet<FactId>,
+    footprint: Footprint,
+    /// What is needed throughout counts with the end.
+    throughout: Footprint,
+}
+
+impl Use {
+    fn of(task: &Task, plan: &StnPlan, node: NodeId) -> Self {
+        let mut uses = Self {
+            footprint: plan.footprint(task, node),
+            ..Self::default()
+        };
+        let action = |id: InstanceId| -> &Action { &plan.instance(id).action };
+        match plan.nodes[node.index()] {
+            Node::Zero | Node::Timed(_) => {}
+            Node::Start(id) | Node::Instant(id) => match &action(id).body {
+                Body::Instantaneous(snap) => uses.include_snap(task, snap),
+                Body::Durative(body) => {
+                    uses.include_snap(task, &body.start);
+                    for effect in &body.end.effects {
+                        uses.include(task, &effect.guard.at_start);
+                    }
+                }
+            },
+            Node::End(id) => {
+                if let Body::Durative(body) = &action(id).body {
+                    uses.include_snap(task, &body.end);
+                    uses.include(task, &body.over_all);
+                    uses.throughout = Footprint::of_condition(task, &body.over_all);
+                    for effect in &body.end.effects {
+                        uses.include(task, &effect.guard.over_all);
+                    }
+                }
+            }
+        }
+        uses
+    }
+
+    fn include_snap(&mut self, task: &Task, snap: &SnapAction) {
+        self.include(task, &snap.condition);
+        for Effect { guard, .. } in &snap.effects {
+            self.include(task, &guard.now);
+            // An effect that would not have happened must not happen either.
+            self.include(task, &Condition::Not(Box::new(guard.now.clone())));
+        }
+    }
+
+    fn include(&mut self, task: &Task, condition: &Condition) {
+        self.include_signed(task, condition, true);
+    }
+
+    fn include_signed(&mut self, task: &Task, condition: &Condition, is_positive: bool) {
+        match condition {
+            Condition::Fact(fact) if task.is_derived(*fact) => {
+                task.visit_facts_of(condition, &mut |basic| {
+                    self.needs_true.insert(basic);
+                    self.needs_false.insert(basic);
+                });
+            }
+            Condition::Fact(fact) => {
+                let needs = if is_positive {
+                    &mut self.needs_true
+                } else {
+                    &mut self.needs_false
+                };
+                needs.insert(*fact);
+            }
+            Condition::Compare(..) => {}
+            Condition::Not(part) => self.include_signed(task, part, !is_positive),
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.include_signed(task, part, is_positive);
+                }
+            }
+        }
+    }
+
+    /// Whether this, done after `earlier` in the plan, would spoil it if it were done before.
+    fn spoils(&self, earlier: &Self) -> bool {
+        let meet = |a: &BTreeSet<_>, b: &BTreeSet<_>| !a.is_disjoint(b);
+        let (own, other) = (&self.footprint, &earlier.footprint);
+        let writes = |fluents: &BTreeSet<_>| {
+            !own.assigns.is_disjoint(fluents) || !own.shifts.is_disjoint(fluents)
+        };
+        meet(&own.deletes, &earlier.needs_true)
+            || meet(&own.adds, &earlier.needs_false)
+            || meet(&own.deletes, &other.adds)
+            || meet(&own.adds, &other.deletes)
+            || writes(&other.reads_fluents)
+            || writes(&earlier.throughout.reads_fluents)
+            || writes(&other.assigns)
+            || !own.assigns.is_disjoint(&other.shifts)
+    }
+}

@@ -1,0 +1,49 @@
+//! What is believed of the world: [`Belief`].
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::State;
+use elbowroom_model::ground::FactId;
+
+/// For each fact, how likely it is to hold; facts are believed independently of each other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Belief {
+    /// Facts not listed are false for certain.
+    probabilities: BTreeMap<FactId, f64>,
+}
+
+impl Belief {
+    /// Everything is known.
+    pub fn certain(state: &State) -> Self {
+        Self {
+            probabilities: state.facts.iter().map(|&fact| (fact, 1.0)).collect(),
+        }
+    }
+
+    /// How likely the fact is to hold.
+    pub fn probability(&self, fact: FactId) -> f64 {
+        self.probabilities.get(&fact).copied().unwrap_or(0.0)
+    }
+
+    /// Sets how likely the fact is to hold, a number in [0, 1]; what is outside is brought in.
+    pub fn set(&mut self, fact: FactId, probability: f64) {
+        let probability = if probability.is_nan() { 0.0 } else { probability };
+        let probability = probability.clamp(0.0, 1.0);
+        if probability > 0.0 {
+            self.probabilities.insert(fact, probability);
+        } else {
+            self.probabilities.remove(&fact);
+        }
+    }
+
+    /// The facts that may hold, with their probabilities.
+    pub fn iter(&self) -> impl Iterator<Item = (FactId, f64)> + '_ {
+        self.probabilities.iter().map(|(&fact, &p)| (fact, p))
+    }
+}
+
+impl From<&State> for Belief {
+    fn from(state: &State) -> Self {
+        Self::certain(state)
+    }
+}

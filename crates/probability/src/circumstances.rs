@@ -1,0 +1,55 @@
+//! Where a plan stands: [`Circumstances`].
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::FluentId;
+use elbowroom_model::{State, Task};
+use elbowroom_num::Rational;
+use elbowroom_plan::InstanceId;
+
+use crate::belief::Belief;
+
+/// What is known at the moment at which an order is looked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Circumstances {
+    /// Now, by the clock of the task's timed initials. Those up to and including now have
+    /// happened, and are in the belief.
+    pub now: Rational,
+    /// Layer 0.
+    pub belief: Belief,
+    /// The fluents' values.
+    pub values: BTreeMap<FluentId, Rational>,
+    /// The plan's actions that have started and not ended, in order of their start.
+    pub running: Vec<Running>,
+}
+
+/// An action of a plan under way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Running {
+    /// Which one.
+    pub instance: InstanceId,
+    /// When it started; not after [`Circumstances::now`].
+    pub start: Rational,
+}
+
+impl Circumstances {
+    /// The beginning: time 0, nothing running, everything known.
+    pub fn initial(task: &Task) -> Self {
+        Self::observed(Rational::ZERO, task.initial())
+    }
+
+    /// Everything is known, and nothing is running.
+    pub fn observed(now: Rational, state: &State) -> Self {
+        Self {
+            now,
+            belief: Belief::certain(state),
+            values: state.values.clone(),
+            running: Vec::new(),
+        }
+    }
+
+    /// Whether the instance is under way.
+    pub fn is_running(&self, instance: InstanceId) -> bool {
+        self.running.iter().any(|running| running.instance == instance)
+    }
+}

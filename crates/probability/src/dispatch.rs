@@ -1,0 +1,173 @@
+//! PExec: which happening of an order is next, as things stand.
+//!
+//! Paper 2, Algorithm 1: of all layers of the order that fit what is believed, the lattermost says
+//! what is next. That skips what has become superfluous, and repeats what did not work. Where
+//! Algorithm 1 and its explanation differ, this follows the explanation: line 5 is meant to return
+//! the last layer when *nothing* is under way; what is under way ends before the goal is declared.
+//!
+//! A layer fits only where exactly those actions are under way that the order has under way there.
+//! (The paper asks for less: that the start of an end is. But then an order could be taken up
+//! behind the end of an action that is still running, which would never be ended.)
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::NodeId;
+
+use crate::circumstances::Circumstances;
+use crate::network::TooCoupled;
+use crate::search::{OrderSearch, Progress, Slot};
+use crate::total_order::TotalOrderPlan;
+
+/// What to do next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Choice {
+    /// The goal holds and nothing is under way.
+    GoalReached,
+    /// This happening.
+    Next(NextHappening),
+    /// No order of the plan leads to the goal from here.
+    Replan,
+}
+
+/// The next happening of the current order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextHappening {
+    /// Which one; a node of the plan. A start or an instant is for the executor to do, the end of
+    /// an action and a timed initial are to be waited for.
+    pub node: NodeId,
+    /// Its position in the order.
+    pub position: usize,
+    /// When it may be.
+    pub slot: Slot,
+    /// Whether the order is new.
+    pub is_new_order: bool,
+}
+
+/// When to look for a new order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reconsider {
+    /// When no layer of the present one fits, as in the paper.
+    #[default]
+    WhenNoLayerFits,
+    /// Before each happening. The order is then always the one most likely to succeed from here.
+    Always,
+}
+
+/// Chooses happenings of one plan, one after the other.
+#[doc(alias = "PExec")]
+#[derive(Clone, Debug)]
+pub struct LayerDispatch {
+    search: OrderSearch,
+    reconsider: Reconsider,
+    order: Option<TotalOrderPlan>,
+}
+
+impl LayerDispatch {
+    /// With no order yet.
+    pub fn new(search: OrderSearch, reconsider: Reconsider) -> Self {
+        Self {
+            search,
+            reconsider,
+            order: None,
+        }
+    }
+
+    /// The present order.
+    pub fn order(&self) -> Option<&TotalOrderPlan> {
+        self.order.as_ref()
+    }
+
+    /// The search behind it.
+    pub fn search(&self) -> &OrderSearch {
+        &self.search
+    }
+
+    /// Forgets the order, but not what searches have found.
+    pub fn reset(&mut self) {
+        self.order = None;
+    }
+
+    /// What to do next. `watch` can cut a search short, as in [`OrderSearch::best_order`].
+    ///
+    /// # Errors
+    /// When a condition couples too many uncertain facts.
+    pub fn choose(
+        &mut self,
+        circumstances: &Circumstances,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Choice, TooCoupled> {
+        if circumstances.running.is_empty() && self.holds_goal(circumstances) {
+            return Ok(Choice::GoalReached);
+        }
+        if self.reconsider == Reconsider::WhenNoLayerFits
+            && let Some(order) = &self.order
+            && let Some((position, slot)) = lattermost_layer(&self.search, order, circumstances)
+        {
+            return Ok(next(order, position, slot, false));
+        }
+        let found = self.search.best_order(circumstances, watch)?;
+        self.order = found.order;
+        let Some(order) = &self.order else {
+            return Ok(Choice::Replan);
+        };
+        match order.slots.first() {
+            Some(slot) => Ok(next(order, 0, slot.clone(), true)),
+            // Nothing to do is best, though the goal is not believed: no action of this plan helps.
+            None => Ok(Choice::Replan),
+        }
+    }
+
+    fn holds_goal(&self, circumstances: &Circumstances) -> bool {
+        goal_holds(self.search.model(), circumstances)
+    }
+}
+
+/// Whether the goal holds of what is more likely than not.
+pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
+    let truth = |fact| circumstances.belief.probability(fact) >= 0.5;
+    let value = |leaf: &elbowroom_model::ground::Expression| match leaf {
+        elbowroom_model::ground::Expression::Fluent(fluent) => {
+            circumstances.values.get(fluent).cloned()
+        }
+        _ => None,
+    };
+    let task = model.task();
+    crate::model::evaluate(task, task.goal(), &truth, &value).unwrap_or(false)
+}
+
+/// The position of the happening after the lattermost layer that fits, and when it may be.
+///
+/// A layer after which there is no time for the rest of the order does not fit.
+pub fn lattermost_layer(
+    search: &OrderSearch,
+    order: &TotalOrderPlan,
+    circumstances: &Circumstances,
+) -> Option<(usize, Slot)> {
+    (0..order.sequence.len()).rev().find_map(|position| {
+        if !order.layers[position].fits(search.model(), circumstances) {
+            return None;
+        }
+        let slots = search.windows(circumstances, &order.sequence[position..])?;
+        slots.into_iter().next().map(|slot| (position, slot))
+    })
+}
+
+fn next(order: &TotalOrderPlan, position: usize, slot: Slot, is_new_order: bool) -> Choice {
+    Choice::Next(NextHappening {
+        node: order.sequence[position],
+        position,
+        slot,
+        is_new_order,
+    })
+}
+
+/// Lets every search run to its end.
+pub fn patient(_: &Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+/// How long until the slot begins, from `now`; 0 if it has.
+pub fn wait(slot: &Slot, now: &Rational) -> Rational {
+    (&slot.earliest - now).max(Rational::ZERO)
+}

@@ -1,0 +1,252 @@
+//! How likely things are to go otherwise than planned: [`Likelihoods`].
+
+mod authors;
+mod file;
+mod mistakes;
+mod names;
+mod write;
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, FactId};
+use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
+
+use crate::belief::Belief;
+
+pub use authors::read as read_authors;
+pub use file::read;
+pub use mistakes::{LikelihoodError, LikelihoodErrors};
+pub use write::write;
+
+/// How a fact changes by itself while one snap action is done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flip {
+    /// The probability that it becomes true, if it is false.
+    pub becomes_true: f64,
+    /// The probability that it becomes false, if it is true.
+    pub becomes_false: f64,
+}
+
+impl Flip {
+    /// A fact that never changes by itself.
+    pub const NEVER: Self = Self {
+        becomes_true: 0.0,
+        becomes_false: 0.0,
+    };
+
+    /// The probability of being true one step later, `p` being the probability now.
+    pub fn after(self, p: f64) -> f64 {
+        p * (1.0 - self.becomes_false) + (1.0 - p) * self.becomes_true
+    }
+}
+
+/// How likely an action is to do what it should.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Success {
+    /// The probability that an attempt to start it succeeds, its conditions being true.
+    pub start: Option<f64>,
+    /// For each predicate, the probability that an effect on it takes place.
+    pub effects: BTreeMap<PredicateId, f64>,
+    /// The same for effects that make facts false, where it differs.
+    pub deletions: BTreeMap<PredicateId, f64>,
+}
+
+/// What applies where nothing more specific is said.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Defaults {
+    /// For facts that are false.
+    pub becomes_true: Option<f64>,
+    /// For facts that are true.
+    pub becomes_false: Option<f64>,
+    /// For starts of actions.
+    pub start: Option<f64>,
+    /// For effects.
+    pub effect: Option<f64>,
+}
+
+/// The part of a [`Flip`] that an entry states.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PartialFlip {
+    /// See [`Flip::becomes_true`].
+    pub becomes_true: Option<f64>,
+    /// See [`Flip::becomes_false`].
+    pub becomes_false: Option<f64>,
+}
+
+/// How likely facts are to change by themselves, and actions and effects to succeed.
+///
+/// What is said of one ground fact or action goes before what is said of its predicate or schema,
+/// and that before the defaults.
+///
+/// Invariant: all probabilities are in [0, 1]; whoever fills the fields sees to it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Likelihoods {
+    /// What applies where nothing else is said.
+    pub defaults: Defaults,
+    /// By predicate.
+    pub predicates: BTreeMap<PredicateId, PartialFlip>,
+    /// By ground fact.
+    pub facts: BTreeMap<(PredicateId, Vec<ObjectId>), PartialFlip>,
+    /// By schema.
+    pub schemas: BTreeMap<SchemaId, Success>,
+    /// By ground action.
+    pub actions: BTreeMap<(SchemaId, Vec<ObjectId>), Success>,
+    /// How likely facts are to hold at the beginning, where that is not certain.
+    pub beliefs: BTreeMap<(PredicateId, Vec<ObjectId>), f64>,
+}
+
+/// Something of the problem has no likelihood.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the likelihoods say nothing of {what}; add an entry, or a default")]
+pub struct Missing {
+    /// A fact, an action, or an effect of an action.
+    pub what: String,
+}
+
+impl Likelihoods {
+    /// A world in which nothing goes wrong.
+    pub fn certain() -> Self {
+        Self {
+            defaults: Defaults {
+                becomes_true: Some(0.0),
+                becomes_false: Some(0.0),
+                start: Some(1.0),
+                effect: Some(1.0),
+            },
+            ..Self::default()
+        }
+    }
+
+    /// How a fact changes by itself.
+    ///
+    /// # Errors
+    /// When nothing is said of it.
+    pub fn flip(&self, task: &Task, fact: FactId) -> Result<Flip, Missing> {
+        let (predicate, arguments) = task.atom(fact);
+        self.flip_of(predicate, arguments).ok_or_else(|| Missing {
+            what: task.fact_name(fact),
+        })
+    }
+
+    pub(crate) fn flip_of(&self, predicate: PredicateId, arguments: &[ObjectId]) -> Option<Flip> {
+        let own = self.facts.get(&(predicate, arguments.to_vec())).copied();
+        let own = own.unwrap_or_default();
+        let all = self.predicates.get(&predicate).copied().unwrap_or_default();
+        let becomes_true = own.becomes_true.or(all.becomes_true);
+        let becomes_false = own.becomes_false.or(all.becomes_false);
+        Some(Flip {
+            becomes_true: becomes_true.or(self.defaults.becomes_true)?,
+            becomes_false: becomes_false.or(self.defaults.becomes_false)?,
+        })
+    }
+
+    /// How likely an attempt to start an action is to succeed.
+    ///
+    /// # Errors
+    /// When nothing is said of it.
+    pub fn start(&self, action: &Action) -> Result<f64, Missing> {
+        self.start_of(action.schema, &action.arguments)
+            .ok_or_else(|| Missing {
+                what: action.name.clone(),
+            })
+    }
+
+    pub(crate) fn start_of(&self, schema: SchemaId, arguments: &[ObjectId]) -> Option<f64> {
+        let own = self.success_of(schema, arguments);
+        let all = self.schemas.get(&schema);
+        own.and_then(|success| success.start)
+            .or_else(|| all.and_then(|success| success.start))
+            .or(self.defaults.start)
+    }
+
+    /// How likely an effect of an action on a fact is to take place.
+    ///
+    /// # Errors
+    /// When nothing is said of it.
+    pub fn effect(
+        &self,
+        task: &Task,
+        action: &Action,
+        fact: FactId,
+        makes_true: bool,
+    ) -> Result<f64, Missing> {
+        let (predicate, _) = task.atom(fact);
+        self.effect_of(action.schema, &action.arguments, predicate, makes_true)
+            .ok_or_else(|| Missing {
+                what: format!(
+                    "the effect of {} on {}",
+                    action.name,
+                    task.fact_name(fact)
+                ),
+            })
+    }
+
+    pub(crate) fn effect_of(
+        &self,
+        schema: SchemaId,
+        arguments: &[ObjectId],
+        predicate: PredicateId,
+        makes_true: bool,
+    ) -> Option<f64> {
+        let own = self.success_of(schema, arguments);
+        let all = self.schemas.get(&schema);
+        let stated = |success: &Success| {
+            let deletion = success.deletions.get(&predicate).filter(|_| !makes_true);
+            deletion.or(success.effects.get(&predicate)).copied()
+        };
+        own.and_then(stated)
+            .or_else(|| all.and_then(stated))
+            .or(self.defaults.effect)
+    }
+
+    /// Whether nothing is left open for any instance of a schema with these effects.
+    fn says_enough_of(&self, schema: SchemaId, affected: &[(PredicateId, bool)]) -> bool {
+        let none = Success::default();
+        let all = self.schemas.get(&schema).unwrap_or(&none);
+        let is_stated = |predicate: &PredicateId, makes_true: bool| {
+            self.defaults.effect.is_some()
+                || all.effects.contains_key(predicate)
+                || (!makes_true && all.deletions.contains_key(predicate))
+        };
+        all.start.or(self.defaults.start).is_some()
+            && affected.iter().all(|(predicate, makes_true)| is_stated(predicate, *makes_true))
+    }
+
+    fn success_of(&self, schema: SchemaId, arguments: &[ObjectId]) -> Option<&Success> {
+        self.actions.get(&(schema, arguments.to_vec()))
+    }
+
+    /// What is known of the beginning: the task's initial state, where the likelihoods do not say
+    /// that it is uncertain.
+    pub fn initial_belief(&self, task: &Task) -> Belief {
+        let mut belief = Belief::certain(task.initial());
+        for ((predicate, arguments), probability) in &self.beliefs {
+            // What nothing has mentioned cannot matter.
+            if let Some(fact) = task.find_fact(*predicate, arguments) {
+                belief.set(fact, *probability);
+            }
+        }
+        belief
+    }
+}
+
+/// Whether actions or timed initials can change facts of the predicate.
+pub(crate) fn is_changed(problem: &Problem, predicate: PredicateId) -> bool {
+    use elbowroom_model::problem::{Body, Change, Effect, TimedChange};
+    let touches = |effect: &Effect| match &effect.change {
+        Change::Add(atom) | Change::Delete(atom) => atom.predicate == predicate,
+        Change::Update { .. } => false,
+    };
+    problem.schemas.iter().any(|schema| match &schema.body {
+        Body::Instantaneous { effects, .. } => effects.iter().any(touches),
+        Body::Durative {
+            start_effects,
+            end_effects,
+            ..
+        } => start_effects.iter().chain(end_effects).any(touches),
+    }) || problem.timed.iter().any(|timed| match &timed.change {
+        TimedChange::Add(changed, _) | TimedChange::Delete(changed, _) => *changed == predicate,
+        TimedChange::Assign(..) => false,
+    })
+}

@@ -1,0 +1,423 @@
+//! Our own likelihood files, TOML: [`read()`]. The format is in `docs/formats/likelihoods.md`.
+
+use std::ops::Range;
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::mistakes::{LikelihoodErrors, Mistakes};
+use super::{Likelihoods, PartialFlip, Success, is_changed, names};
+
+/// What `format` says in our files.
+pub(super) const FORMAT: &str = "elbowroom-likelihoods";
+/// What `version` says.
+pub(super) const VERSION: &str = "1";
+
+/// Reads a likelihood file of our own format.
+///
+/// # Errors
+/// All mistakes found: of syntax, of names, of numbers, and what is missing.
+pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => {
+            let lossy = String::from_utf8_lossy(bytes);
+            let mut mistakes = Mistakes::default();
+            let at = error.valid_up_to();
+            mistakes.add(at..at, "this is not text in UTF-8", None);
+            return mistakes.none_or(Likelihoods::default(), &lossy);
+        }
+    };
+    let (document, errors) = DeTable::parse_recoverable(text);
+    let mut reader = Reader {
+        problem: task.problem(),
+        likelihoods: Likelihoods::default(),
+        mistakes: Mistakes::default(),
+    };
+    for error in &errors {
+        let span = error.span().unwrap_or(0..0);
+        reader.mistakes.add(span, error.message(), None);
+    }
+    if errors.is_empty() {
+        reader.document(document.get_ref());
+    }
+    reader.mistakes.none_or(reader.likelihoods, text)
+}
+
+type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
+type Value<'a> = Spanned<DeValue<'a>>;
+
+struct Reader<'a> {
+    problem: &'a Problem,
+    likelihoods: Likelihoods,
+    mistakes: Mistakes,
+}
+
+impl Reader<'_> {
+    fn object(&mut self, span: Range<usize>, (message, expected): names::Objection) {
+        self.mistakes.add(span, message, expected);
+    }
+
+    fn document(&mut self, document: &DeTable<'_>) {
+        const SECTIONS: [&str; 6] = ["format", "version", "defaults", "facts", "actions", "beliefs"];
+        self.header(document);
+        for (key, value) in document {
+            match key.get_ref().as_ref() {
+                "format" | "version" => {}
+                "defaults" => self.defaults(key, value),
+                "facts" => self.each(key, value, &mut Self::fact),
+                "actions" => self.each(key, value, &mut Self::action),
+                "beliefs" => self.each(key, value, &mut Self::belief),
+                _ => self.unknown(key, &SECTIONS),
+            }
+        }
+        if self.mistakes.count() == 0 {
+            self.check_complete(document);
+        }
+    }
+
+    fn header(&mut self, document: &DeTable<'_>) {
+        match document.get("format") {
+            Some(value) if value.get_ref().as_str() == Some(FORMAT) => {}
+            Some(value) => self.mistakes.add(
+                value.span(),
+                "this is another kind of file",
+                format!("format = \"{FORMAT}\""),
+            ),
+            None => self.mistakes.add(
+                0..0,
+                "the file does not say what it is",
+                format!("format = \"{FORMAT}\""),
+            ),
+        }
+        match document.get("version") {
+            Some(value) => match value.get_ref() {
+                DeValue::Integer(number) if number.as_str() == VERSION => {}
+                _ => self.mistakes.add(
+                    value.span(),
+                    "this version is not known",
+                    format!("version = {VERSION}"),
+                ),
+            },
+            None => self.mistakes.add(
+                0..0,
+                "the version of the format is missing",
+                format!("version = {VERSION}"),
+            ),
+        }
+    }
+
+    fn unknown(&mut self, key: &Key<'_>, known: &[&str]) {
+        let name = key.get_ref().as_ref();
+        let expected = match elbowroom_plan::nearest(name, known.iter().copied()) {
+            Some(name) => format!("did you mean `{name}`?"),
+            None => format!("one of {}", known.join(", ")),
+        };
+        let message = format!("unknown entry `{name}`");
+        self.mistakes.add(key.span(), message, expected);
+    }
+
+    /// Calls `entry` for each entry of a table.
+    fn each(
+        &mut self,
+        key: &Key<'_>,
+        value: &Value<'_>,
+        entry: &mut impl FnMut(&mut Self, &Key<'_>, &Value<'_>),
+    ) {
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                for (key, value) in table {
+                    entry(self, key, value);
+                }
+            }
+            other => {
+                let message = format!("`{}` is {}", key.get_ref(), described(other));
+                let expected = format!("a table: [{}]", key.get_ref());
+                self.mistakes.add(value.span(), message, expected);
+            }
+        }
+    }
+
+    fn defaults(&mut self, key: &Key<'_>, value: &Value<'_>) {
+        self.each(key, value, &mut |reader, key, value| {
+            let name = key.get_ref().as_ref();
+            let known = ["becomes_true", "becomes_false", "start", "effect"];
+            if !known.contains(&name) {
+                return reader.unknown(key, &known);
+            }
+            let probability = reader.probability(value);
+            let defaults = &mut reader.likelihoods.defaults;
+            match name {
+                "becomes_true" => defaults.becomes_true = probability,
+                "becomes_false" => defaults.becomes_false = probability,
+                "start" => defaults.start = probability,
+                _ => defaults.effect = probability,
+            }
+        });
+    }
+
+    fn fact(&mut self, key: &Key<'_>, value: &Value<'_>) {
+        let Some((predicate, arguments)) = self.fact_named(key) else {
+            return;
+        };
+        let mut flip = PartialFlip::default();
+        self.each(key, value, &mut |reader, key, value| {
+            match key.get_ref().as_ref() {
+                "becomes_true" => flip.becomes_true = reader.probability(value),
+                "becomes_false" => flip.becomes_false = reader.probability(value),
+                _ => reader.unknown(key, &["becomes_true", "becomes_false"]),
+            }
+        });
+        let is_new = match arguments {
+            Some(arguments) => {
+                let key = (predicate, arguments);
+                self.likelihoods.facts.insert(key, flip).is_none()
+            }
+            None => self.likelihoods.predicates.insert(predicate, flip).is_none(),
+        };
+        self.check_new(is_new, key);
+    }
+
+    fn action(&mut self, key: &Key<'_>, value: &Value<'_>) {
+        let mut words = key.get_ref().split_whitespace();
+        let name = words.next().unwrap_or_default();
+        let schema = match names::schema(self.problem, name) {
+            Ok(schema) => schema,
+            Err(objection) => return self.object(key.span(), objection),
+        };
+        let parameters = &self.problem.schemas[schema.index()].parameters;
+        let Some(arguments) = self.arguments(key, name, parameters, words) else {
+            return;
+        };
+        let mut success = Success::default();
+        self.each(key, value, &mut |reader, key, value| {
+            match key.get_ref().as_ref() {
+                "start" => success.start = reader.probability(value),
+                "effects" => reader.each(key, value, &mut |reader, key, value| {
+                    reader.effect(schema, key, value, &mut success);
+                }),
+                _ => reader.unknown(key, &["start", "effects"]),
+            }
+        });
+        let is_new = match arguments {
+            Some(arguments) => {
+                let key = (schema, arguments);
+                self.likelihoods.actions.insert(key, success).is_none()
+            }
+            None => self.likelihoods.schemas.insert(schema, success).is_none(),
+        };
+        self.check_new(is_new, key);
+    }
+
+    fn effect(
+        &mut self,
+        schema: SchemaId,
+        key: &Key<'_>,
+        value: &Value<'_>,
+        success: &mut Success,
+    ) {
+        let words: Vec<&str> = key.get_ref().split_whitespace().collect();
+        let (name, is_deletion) = match words.as_slice() {
+            [name] => (*name, false),
+            [not, name] if not.eq_ignore_ascii_case("not") => (*name, true),
+            _ => {
+                let message = format!("`{}` is not an effect", key.get_ref());
+                let expected = "a predicate, or `not` and a predicate".to_owned();
+                return self.mistakes.add(key.span(), message, expected);
+            }
+        };
+        let predicate = match names::predicate(self.problem, name) {
+            Ok(predicate) => predicate,
+            Err(objection) => return self.object(key.span(), objection),
+        };
+        let (adds, deletes) = names::effects_on(self.problem, schema, predicate);
+        if !deletes && (is_deletion || !adds) {
+            let objection = names::no_such_effect(self.problem, schema, key.get_ref());
+            return self.object(key.span(), objection);
+        }
+        if let Some(probability) = self.probability(value) {
+            let stated = if is_deletion {
+                &mut success.deletions
+            } else {
+                &mut success.effects
+            };
+            let is_new = stated.insert(predicate, probability).is_none();
+            self.check_new(is_new, key);
+        }
+    }
+
+    fn belief(&mut self, key: &Key<'_>, value: &Value<'_>) {
+        let Some((predicate, arguments)) = self.fact_named(key) else {
+            return;
+        };
+        let Some(arguments) = arguments else {
+            let message = format!("`{}` is a predicate, not a fact", key.get_ref());
+            let expected = "a predicate with its objects".to_owned();
+            return self.mistakes.add(key.span(), message, expected);
+        };
+        if let Some(probability) = self.probability(value) {
+            let key_of = (predicate, arguments);
+            let beliefs = &mut self.likelihoods.beliefs;
+            let is_new = beliefs.insert(key_of, probability).is_none();
+            self.check_new(is_new, key);
+        }
+    }
+
+    /// The predicate that a key names, with its arguments unless all its facts are meant.
+    fn fact_named(&mut self, key: &Key<'_>) -> Option<(PredicateId, Option<Vec<ObjectId>>)> {
+        let mut words = key.get_ref().split_whitespace();
+        let name = words.next().unwrap_or_default();
+        match names::predicate(self.problem, name) {
+            Ok(predicate) => {
+                let parameters = &self.problem.predicates[predicate.index()].parameters;
+                let arguments = self.arguments(key, name, parameters, words)?;
+                Some((predicate, arguments))
+            }
+            Err(objection) => {
+                self.object(key.span(), objection);
+                None
+            }
+        }
+    }
+
+    /// The objects in a key; inside, `None` if there are none where there could be some.
+    fn arguments<'k>(
+        &mut self,
+        key: &Key<'_>,
+        of: &str,
+        parameters: &[elbowroom_model::problem::Variable],
+        words: impl Iterator<Item = &'k str>,
+    ) -> Option<Option<Vec<ObjectId>>> {
+        let mut words = words.peekable();
+        if words.peek().is_none() && !parameters.is_empty() {
+            return Some(None);
+        }
+        match names::arguments(self.problem, of, parameters, words) {
+            Ok(objects) => Some(Some(objects)),
+            Err(objection) => {
+                self.object(key.span(), objection);
+                None
+            }
+        }
+    }
+
+    /// TOML itself refuses equal keys, but names compare without case and spaces.
+    fn check_new(&mut self, is_new: bool, key: &Key<'_>) {
+        if !is_new {
+            let message = format!("`{}` is there twice", key.get_ref());
+            self.mistakes.add(key.span(), message, None);
+        }
+    }
+
+    fn probability(&mut self, value: &Value<'_>) -> Option<f64> {
+        let read = match value.get_ref() {
+            DeValue::Float(number) => names::probability(number.as_str()),
+            DeValue::Integer(number) => names::probability(number.as_str()),
+            other => Err((
+                described(other).to_owned() + " stands here",
+                Some("a probability, from 0 to 1".to_owned()),
+            )),
+        };
+        read.map_err(|objection| self.object(value.span(), objection))
+            .ok()
+    }
+
+    /// Something is said of each fact and each action.
+    fn check_complete(&mut self, document: &DeTable<'_>) {
+        let section = |name: &str| {
+            let entry = document.iter().find(|(key, _)| key.get_ref() == name);
+            entry.map_or(0..0, |(key, _)| key.span())
+        };
+        for (index, predicate) in self.problem.predicates.iter().enumerate() {
+            let id = PredicateId::from(index);
+            let is_mentioned = self.likelihoods.predicates.contains_key(&id)
+                || self.likelihoods.facts.keys().any(|(p, _)| *p == id);
+            if predicate.is_derived {
+                continue;
+            }
+            if !is_mentioned && !is_changed(self.problem, id) {
+                // What never changes, and is not mentioned, stays as it is.
+                let never = PartialFlip {
+                    becomes_true: Some(0.0),
+                    becomes_false: Some(0.0),
+                };
+                self.likelihoods.predicates.insert(id, never);
+                continue;
+            }
+            let all = self.likelihoods.predicates.get(&id).copied();
+            let all = all.unwrap_or_default();
+            let defaults = &self.likelihoods.defaults;
+            if all.becomes_true.or(defaults.becomes_true).is_some()
+                && all.becomes_false.or(defaults.becomes_false).is_some()
+            {
+                continue;
+            }
+            let mut missing = None;
+            // Stops at the first that is not listed, so it takes no longer than the list is.
+            names::for_each_tuple(self.problem, &predicate.parameters, &mut |tuple| {
+                if self.likelihoods.flip_of(id, tuple).is_none() {
+                    missing = Some(self.problem.apply_name(&predicate.name, tuple));
+                }
+                missing.is_none()
+            });
+            if let Some(fact) = missing {
+                self.mistakes.add(
+                    section("facts"),
+                    format!("the file does not say how {fact} changes by itself"),
+                    format!("[facts.{}], or [defaults]", predicate.name),
+                );
+            }
+        }
+        for (index, schema) in self.problem.schemas.iter().enumerate() {
+            self.check_action(SchemaId::from(index), schema, &section("actions"));
+        }
+    }
+
+    fn check_action(
+        &mut self,
+        id: SchemaId,
+        schema: &elbowroom_model::problem::Schema,
+        section: &Range<usize>,
+    ) {
+        let affected = names::affected(self.problem, id);
+        if self.likelihoods.says_enough_of(id, &affected) {
+            return;
+        }
+        let mut missing = None;
+        names::for_each_tuple(self.problem, &schema.parameters, &mut |tuple| {
+            if self.likelihoods.start_of(id, tuple).is_none() {
+                let name = self.problem.apply_name(&schema.name, tuple);
+                missing = Some(format!("how likely {name} is to start"));
+            }
+            for &(predicate, makes_true) in &affected {
+                let effect = self.likelihoods.effect_of(id, tuple, predicate, makes_true);
+                if effect.is_none() {
+                    let name = self.problem.apply_name(&schema.name, tuple);
+                    let predicate = &self.problem.predicates[predicate.index()].name;
+                    missing = Some(format!("how likely the effect of {name} on {predicate} is"));
+                }
+            }
+            missing.is_none()
+        });
+        if let Some(missing) = missing {
+            self.mistakes.add(
+                section.clone(),
+                format!("the file does not say {missing}"),
+                format!("[actions.{}], or [defaults]", schema.name),
+            );
+        }
+    }
+}
+
+fn described(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) | DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "a truth value",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}

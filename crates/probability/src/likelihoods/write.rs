@@ -1,0 +1,100 @@
+//! Writes likelihoods as TOML: [`write()`].
+
+use std::fmt::Write;
+
+use elbowroom_model::problem::{ObjectId, Problem};
+
+use super::file::{FORMAT, VERSION};
+use super::{Likelihoods, PartialFlip, Success};
+
+/// The likelihoods in our own format; [`read`](super::read) gives the same ones back.
+pub fn write(problem: &Problem, likelihoods: &Likelihoods) -> String {
+    let mut text = format!("format = \"{FORMAT}\"\nversion = {VERSION}\n");
+    let defaults = &likelihoods.defaults;
+    let entries = [
+        ("becomes_true", defaults.becomes_true),
+        ("becomes_false", defaults.becomes_false),
+        ("start", defaults.start),
+        ("effect", defaults.effect),
+    ];
+    if entries.iter().any(|(_, value)| value.is_some()) {
+        text.push_str("\n[defaults]\n");
+        numbers(&mut text, &entries);
+    }
+    for (predicate, flip) in &likelihoods.predicates {
+        let name = &problem.predicates[predicate.index()].name;
+        fact(&mut text, &key(problem, name, &[]), flip);
+    }
+    for ((predicate, arguments), flip) in &likelihoods.facts {
+        let name = &problem.predicates[predicate.index()].name;
+        fact(&mut text, &key(problem, name, arguments), flip);
+    }
+    for (schema, success) in &likelihoods.schemas {
+        let name = &problem.schemas[schema.index()].name;
+        action(&mut text, problem, &key(problem, name, &[]), success);
+    }
+    for ((schema, arguments), success) in &likelihoods.actions {
+        let name = &problem.schemas[schema.index()].name;
+        action(&mut text, problem, &key(problem, name, arguments), success);
+    }
+    if !likelihoods.beliefs.is_empty() {
+        text.push_str("\n[beliefs]\n");
+    }
+    for ((predicate, arguments), probability) in &likelihoods.beliefs {
+        let name = &problem.predicates[predicate.index()].name;
+        number(&mut text, &key(problem, name, arguments), *probability);
+    }
+    text
+}
+
+/// `"name object …"`, in quotes, as names may contain anything but spaces.
+fn key(problem: &Problem, name: &str, arguments: &[ObjectId]) -> String {
+    let mut key = format!("\"{name}");
+    for argument in arguments {
+        key.push(' ');
+        key.push_str(&problem.objects[argument.index()].name);
+    }
+    key.push('"');
+    key
+}
+
+fn fact(text: &mut String, key: &str, flip: &PartialFlip) {
+    header(text, "facts", key);
+    numbers(
+        text,
+        &[
+            ("becomes_true", flip.becomes_true),
+            ("becomes_false", flip.becomes_false),
+        ],
+    );
+}
+
+fn action(text: &mut String, problem: &Problem, key: &str, success: &Success) {
+    header(text, "actions", key);
+    numbers(text, &[("start", success.start)]);
+    for (stated, prefix) in [(&success.effects, ""), (&success.deletions, "not ")] {
+        for (predicate, probability) in stated {
+            let name = &problem.predicates[predicate.index()].name;
+            let key = format!("effects.\"{prefix}{name}\"");
+            number(text, &key, *probability);
+        }
+    }
+}
+
+fn header(text: &mut String, section: &str, key: &str) {
+    // Writing into a string cannot fail.
+    let _ = writeln!(text, "\n[{section}.{key}]");
+}
+
+fn numbers(text: &mut String, entries: &[(&str, Option<f64>)]) {
+    for (key, value) in entries {
+        if let Some(value) = value {
+            number(text, key, *value);
+        }
+    }
+}
+
+/// `{:?}` writes the shortest decimal that reads back as the same number, with a decimal point.
+fn number(text: &mut String, key: &str, value: f64) {
+    let _ = writeln!(text, "{key} = {value:?}");
+}

@@ -1,0 +1,174 @@
+//! A plan's happenings as steps of a stochastic process: [`Model`].
+//!
+//! The process is stated in `docs/probability.md`. Facts and changing fluents are numbered
+//! densely here, conditions are cut into parts, and each effect has its probability; what happens
+//! to probabilities is the business of [`PrunedNetwork`](crate::PrunedNetwork).
+
+mod compile;
+mod requirement;
+
+use std::sync::Arc;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
+use elbowroom_model::problem::UpdateOperator;
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
+
+use crate::likelihoods::{Flip, Likelihoods, Missing};
+
+pub(crate) use requirement::{Requirement, evaluate, visit_facts};
+
+/// What an effect that may fail leaves behind, and when facts change by themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Semantics {
+    /// Paper 2's network: an effect that fails leaves the opposite behind, and a fact on which
+    /// an action has an effect does not also change by itself in that step.
+    #[default]
+    Paper,
+    /// The perturbed worlds of `sim`: an effect that fails leaves the fact as it was, and every
+    /// fact may change by itself after each step.
+    World,
+}
+
+/// The happenings of a partially ordered plan, with the likelihoods of all that matters to them.
+#[derive(Clone, Debug)]
+pub struct Model {
+    task: Arc<Task>,
+    plan: PartialOrderPlan,
+    semantics: Semantics,
+    /// The facts that matter, sorted; then one memory for each guard that is read before it
+    /// counts, with ids that no fact has.
+    pub(crate) facts: Vec<FactId>,
+    pub(crate) flips: Vec<Flip>,
+    /// The fluents that some happening changes, sorted.
+    pub(crate) fluents: Vec<FluentId>,
+    /// By node of the plan.
+    pub(crate) events: Vec<Event>,
+    pub(crate) goal: Requirement,
+}
+
+/// A happening, compiled.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Event {
+    /// Needed on arrival.
+    pub(crate) condition: Requirement,
+    /// P(it succeeds | its condition); 1 for ends and timed initials.
+    pub(crate) success: f64,
+    /// Whether it is a snap action, after which facts change by themselves.
+    pub(crate) is_step: bool,
+    /// What is needed from right after this start to the end of its action.
+    pub(crate) over_all: Requirement,
+    /// Memories that become false when their condition does, from this start to the end.
+    pub(crate) watches: Vec<(usize, Condition)>,
+    /// Sorted by fact.
+    pub(crate) effects: Vec<FactEffect>,
+    pub(crate) updates: Vec<Update>,
+    /// Continuous change that begins here, or stops, with its rate.
+    pub(crate) continuous: Vec<(usize, Expression)>,
+    /// The action's duration, if only one is possible.
+    pub(crate) duration: Option<Rational>,
+}
+
+/// An effect on a fact.
+#[derive(Clone, Debug)]
+pub(crate) struct FactEffect {
+    pub(crate) fact: usize,
+    pub(crate) makes_true: bool,
+    pub(crate) probability: f64,
+    /// Read on arrival.
+    pub(crate) guard: Option<Condition>,
+    /// The fact's truth is set without a chance to fail or change (memories, timed initials).
+    pub(crate) is_certain: bool,
+}
+
+/// An effect on a number.
+#[derive(Clone, Debug)]
+pub(crate) struct Update {
+    pub(crate) fluent: usize,
+    pub(crate) operator: UpdateOperator,
+    pub(crate) value: Expression,
+    pub(crate) guard: Option<Condition>,
+}
+
+impl Model {
+    /// The model of a plan.
+    ///
+    /// # Errors
+    /// When the likelihoods say nothing of a fact or an action of the plan.
+    pub fn new(
+        task: impl Into<Arc<Task>>,
+        plan: PartialOrderPlan,
+        likelihoods: &Likelihoods,
+        semantics: Semantics,
+    ) -> Result<Self, Missing> {
+        compile::model(task.into(), plan, likelihoods, semantics)
+    }
+
+    /// The task.
+    pub fn task(&self) -> &Arc<Task> {
+        &self.task
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &PartialOrderPlan {
+        &self.plan
+    }
+
+    /// How effects and spontaneous changes go together.
+    pub fn semantics(&self) -> Semantics {
+        self.semantics
+    }
+
+    /// The facts that matter to the plan.
+    pub fn facts(&self) -> impl Iterator<Item = FactId> + '_ {
+        self.facts.iter().copied().take_while(|&fact| self.is_fact(fact))
+    }
+
+    pub(crate) fn event(&self, node: NodeId) -> &Event {
+        &self.events[node.index()]
+    }
+
+    /// The position of a fact, or of a memory.
+    pub(crate) fn position(&self, fact: FactId) -> Option<usize> {
+        self.facts.binary_search(&fact).ok()
+    }
+
+    pub(crate) fn fluent_position(&self, fluent: FluentId) -> Option<usize> {
+        self.fluents.binary_search(&fluent).ok()
+    }
+
+    /// Whether this is a fact of the task, not a memory.
+    pub(crate) fn is_fact(&self, fact: FactId) -> bool {
+        fact.index() < self.task.fact_count()
+    }
+
+    /// The start node of an instance, or its only node.
+    pub(crate) fn start(&self, id: InstanceId) -> NodeId {
+        self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))
+    }
+
+    /// The end node of an instance, or its only node.
+    pub(crate) fn end(&self, id: InstanceId) -> NodeId {
+        self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
+    }
+
+    fn node_where(&self, is_it: impl Fn(Node) -> bool) -> NodeId {
+        let index = self.plan.nodes.iter().position(|&node| is_it(node));
+        NodeId::from(index.expect("every instance has its nodes"))
+    }
+
+    /// The happening in words.
+    pub fn node_words(&self, node: NodeId) -> String {
+        match self.plan.nodes[node.index()] {
+            Node::Zero => "the beginning of the plan".to_owned(),
+            Node::Start(id) => format!("start of {}", self.plan.instance(id).action.name),
+            Node::End(id) => format!("end of {}", self.plan.instance(id).action.name),
+            Node::Instant(id) => self.plan.instance(id).action.name.clone(),
+            Node::Timed(index) => {
+                let time = self.task.timed()[index].time.to_decimal(3);
+                format!("timed initials at {time}")
+            }
+        }
+    }
+}

@@ -1,0 +1,317 @@
+//! From ground actions and likelihoods to a [`Model`].
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, DurativeBody, Effect, FactId, FluentId, SnapAction,
+};
+use elbowroom_plan::{Node, PartialOrderPlan};
+
+use super::requirement::{Requirement, is_derived, visit_facts};
+use super::{Event, FactEffect, Model, Semantics, Update};
+use crate::likelihoods::{Flip, Likelihoods, Missing};
+
+pub(super) fn model(
+    task: Arc<Task>,
+    plan: PartialOrderPlan,
+    likelihoods: &Likelihoods,
+    semantics: Semantics,
+) -> Result<Model, Missing> {
+    let mut facts = BTreeSet::new();
+    let mut fluents = BTreeSet::new();
+    for (_, instance) in plan.instances() {
+        collect(&task, &instance.action, &mut facts, &mut fluents);
+    }
+    visit_facts(&task, task.goal(), &mut |fact| {
+        facts.insert(fact);
+    });
+    for timed in task.timed() {
+        for change in &timed.changes {
+            match change {
+                Change::Add(fact) | Change::Delete(fact) => {
+                    facts.insert(*fact);
+                }
+                Change::Update { fluent, .. } => {
+                    fluents.insert(*fluent);
+                }
+            }
+        }
+    }
+    // A derived fact without rules is false; nothing can be said of it.
+    facts.retain(|fact| !is_derived(&task, *fact));
+    let flips = facts.iter().map(|&fact| likelihoods.flip(&task, fact));
+    let flips = flips.collect::<Result<_, _>>()?;
+    let mut compiler = Compiler {
+        task: &task,
+        likelihoods,
+        facts: facts.into_iter().collect(),
+        flips,
+        fluents: fluents.into_iter().collect(),
+    };
+    let mut events = vec![Event::default(); plan.nodes.len()];
+    for (id, instance) in plan.instances() {
+        let node = |is_it: &dyn Fn(Node) -> bool| plan.nodes.iter().position(|&node| is_it(node));
+        let start = node(&|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id));
+        let end = node(&|node| matches!(node, Node::End(i) if i == id));
+        match (&instance.action.body, start, end) {
+            (Body::Durative(body), Some(start), Some(end)) => {
+                let (mut first, mut second) = compiler.durative(&instance.action, body)?;
+                let (least, greatest) = plan.duration(id);
+                if greatest.as_ref() == Some(&least) {
+                    first.duration = Some(least.clone());
+                    second.duration = Some(least);
+                }
+                events[start] = first;
+                events[end] = second;
+            }
+            (Body::Instantaneous(snap), Some(at), _) => {
+                events[at] = compiler.snap(&instance.action, snap)?;
+                events[at].success = likelihoods.start(&instance.action)?;
+            }
+            _ => {}
+        }
+    }
+    for (at, node) in plan.nodes.iter().enumerate() {
+        if let Node::Timed(index) = node {
+            events[at] = compiler.timed(&task.timed()[*index].changes);
+        }
+    }
+    let goal = compiler.requirement(task.goal());
+    let Compiler {
+        facts,
+        flips,
+        fluents,
+        ..
+    } = compiler;
+    Ok(Model {
+        task,
+        plan,
+        semantics,
+        facts,
+        flips,
+        fluents,
+        events,
+        goal,
+    })
+}
+
+/// Gathers what an action reads and writes.
+fn collect(
+    task: &Task,
+    action: &Action,
+    facts: &mut BTreeSet<FactId>,
+    fluents: &mut BTreeSet<FluentId>,
+) {
+    let read = |condition: &Condition, facts: &mut BTreeSet<FactId>| {
+        visit_facts(task, condition, &mut |fact| {
+            facts.insert(fact);
+        });
+    };
+    let mut snap = |snap: &SnapAction, facts: &mut BTreeSet<FactId>| {
+        read(&snap.condition, facts);
+        for effect in &snap.effects {
+            read(&effect.guard.at_start, facts);
+            read(&effect.guard.over_all, facts);
+            read(&effect.guard.now, facts);
+            match &effect.change {
+                Change::Add(fact) | Change::Delete(fact) => {
+                    facts.insert(*fact);
+                }
+                Change::Update { fluent, .. } => {
+                    fluents.insert(*fluent);
+                }
+            }
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(only) => snap(only, facts),
+        Body::Durative(body) => {
+            snap(&body.start, facts);
+            snap(&body.end, facts);
+            visit_facts(task, &body.over_all, &mut |fact| {
+                facts.insert(fact);
+            });
+            for effect in &body.continuous {
+                fluents.insert(effect.fluent);
+            }
+        }
+    }
+}
+
+struct Compiler<'a> {
+    task: &'a Task,
+    likelihoods: &'a Likelihoods,
+    facts: Vec<FactId>,
+    flips: Vec<Flip>,
+    fluents: Vec<FluentId>,
+}
+
+impl Compiler<'_> {
+    fn position(&self, fact: FactId) -> usize {
+        let found = self.facts.binary_search(&fact);
+        found.expect("every fact of the plan was collected")
+    }
+
+    fn requirement(&self, condition: &Condition) -> Requirement {
+        Requirement::of(self.task, condition, &|fact| self.position(fact))
+    }
+
+    /// A fact of our own that remembers whether a guard held.
+    fn memory(&mut self) -> FactId {
+        let last = self.facts.last().map_or(0, |fact| fact.0 + 1);
+        let own = u32::try_from(self.task.fact_count()).expect("fewer than 2^32 facts");
+        let memory = FactId(last.max(own));
+        self.facts.push(memory);
+        self.flips.push(Flip::NEVER);
+        memory
+    }
+
+    fn snap(&mut self, action: &Action, snap: &SnapAction) -> Result<Event, Missing> {
+        let mut event = Event {
+            condition: self.requirement(&snap.condition),
+            success: 1.0,
+            is_step: true,
+            ..Event::default()
+        };
+        for effect in &snap.effects {
+            self.effect(action, effect, &mut event)?;
+        }
+        event.effects.sort_by_key(|effect| effect.fact);
+        Ok(event)
+    }
+
+    fn durative(
+        &mut self,
+        action: &Action,
+        body: &DurativeBody,
+    ) -> Result<(Event, Event), Missing> {
+        let mut start = self.snap(action, &body.start)?;
+        start.success = self.likelihoods.start(action)?;
+        start.over_all = self.requirement(&body.over_all);
+        let mut ending = body.end.clone();
+        for effect in &mut ending.effects {
+            self.remember_guard(effect, &mut start);
+        }
+        start.effects.sort_by_key(|effect| effect.fact);
+        let mut end = self.snap(action, &ending)?;
+        for effect in &body.continuous {
+            let Some(fluent) = self.fluents.binary_search(&effect.fluent).ok() else {
+                continue;
+            };
+            // Whether a conditional one takes place is not followed up: then the number is open.
+            let rate = if effect.guard.is_trivial() {
+                effect.rate.clone()
+            } else {
+                elbowroom_model::ground::Expression::TotalTime
+            };
+            start.continuous.push((fluent, rate.clone()));
+            end.continuous.push((fluent, rate));
+        }
+        Ok((start, end))
+    }
+
+    /// Replaces what a guard says of start and interval by a memory that the start sets.
+    fn remember_guard(&mut self, effect: &mut Effect, start: &mut Event) {
+        let guard = &mut effect.guard;
+        if guard.at_start.is_trivial() && guard.over_all.is_trivial() {
+            return;
+        }
+        let memory = self.memory();
+        let fact = self.position(memory);
+        let at_start = std::mem::replace(&mut guard.at_start, Condition::TRUE);
+        let over_all = std::mem::replace(&mut guard.over_all, Condition::TRUE);
+        start.effects.push(FactEffect {
+            fact,
+            makes_true: true,
+            probability: 1.0,
+            guard: Some(at_start).filter(|guard| !guard.is_trivial()),
+            is_certain: true,
+        });
+        if !over_all.is_trivial() {
+            start.watches.push((fact, over_all));
+        }
+        let now = std::mem::replace(&mut guard.now, Condition::TRUE);
+        guard.now = Condition::And(vec![Condition::Fact(memory), now]);
+    }
+
+    fn effect(
+        &self,
+        action: &Action,
+        effect: &Effect,
+        event: &mut Event,
+    ) -> Result<(), Missing> {
+        let guard = Some(effect.guard.now.clone()).filter(|guard| !guard.is_trivial());
+        let (fact, makes_true) = match &effect.change {
+            Change::Add(fact) => (*fact, true),
+            Change::Delete(fact) => (*fact, false),
+            Change::Update {
+                operator,
+                fluent,
+                value,
+            } => {
+                if let Ok(fluent) = self.fluents.binary_search(fluent) {
+                    event.updates.push(Update {
+                        fluent,
+                        operator: *operator,
+                        value: value.clone(),
+                        guard,
+                    });
+                }
+                return Ok(());
+            }
+        };
+        let compiled = FactEffect {
+            fact: self.position(fact),
+            makes_true,
+            probability: self.likelihoods.effect(self.task, action, fact, makes_true)?,
+            guard,
+            is_certain: false,
+        };
+        // Stated twice, an effect still happens once.
+        let is_same = |other: &FactEffect| {
+            other.fact == compiled.fact
+                && other.makes_true == makes_true
+                && other.guard == compiled.guard
+        };
+        if !event.effects.iter().any(is_same) {
+            event.effects.push(compiled);
+        }
+        Ok(())
+    }
+
+    fn timed(&self, changes: &[Change]) -> Event {
+        let mut event = Event {
+            success: 1.0,
+            ..Event::default()
+        };
+        for change in changes {
+            match change {
+                Change::Add(fact) | Change::Delete(fact) => event.effects.push(FactEffect {
+                    fact: self.position(*fact),
+                    makes_true: matches!(change, Change::Add(_)),
+                    probability: 1.0,
+                    guard: None,
+                    is_certain: true,
+                }),
+                Change::Update {
+                    operator,
+                    fluent,
+                    value,
+                } => {
+                    if let Ok(fluent) = self.fluents.binary_search(fluent) {
+                        event.updates.push(Update {
+                            fluent,
+                            operator: *operator,
+                            value: value.clone(),
+                            guard: None,
+                        });
+                    }
+                }
+            }
+        }
+        event.effects.sort_by_key(|effect| effect.fact);
+        event
+    }
+}

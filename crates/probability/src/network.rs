@@ -1,0 +1,458 @@
+//! The success probability of an order, step by step: [`PrunedNetwork`].
+
+mod cluster;
+mod facts;
+mod numbers;
+
+use elbowroom_model::ground::{Condition, Expression};
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use crate::circumstances::Circumstances;
+use crate::model::{Event, Model, Requirement};
+use facts::{Facts, Outcome, Pending};
+pub(crate) use facts::Snapshot;
+pub(crate) use numbers::Number;
+use numbers::Numbers;
+
+/// A condition couples more facts than can be tracked exactly.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the success of {happening} depends on {count} uncertain facts at once, which is beyond exact \
+     calculation; at most {most} can be tracked together"
+)]
+pub struct TooCoupled {
+    /// The happening whose condition or effect it is.
+    pub happening: String,
+    /// How many facts it would take.
+    pub count: usize,
+    /// How many are possible.
+    pub most: usize,
+}
+
+/// Paper 2's dynamic Bayesian network, pruned, for the order pushed so far.
+///
+/// [`PrunedNetwork::push`] adds a happening and [`PrunedNetwork::pop`] takes the last one back;
+/// both take time in proportion to what the happening reads and writes, not to the length of the
+/// order. See `docs/probability.md` for what is calculated, and why it is exact.
+#[derive(Clone, Debug)]
+pub struct PrunedNetwork<'m> {
+    model: &'m Model,
+    facts: Facts,
+    numbers: Numbers,
+    /// What is left of the durations of actions that were running at the beginning.
+    remaining: Vec<(InstanceId, Option<Rational>)>,
+    /// The actions under way, in order of their start.
+    running: Vec<InstanceId>,
+    /// P(A), and what is required throughout the actions under way.
+    probability: f64,
+    /// Numeric conditions taken for granted, as their numbers depend on time.
+    assumed: usize,
+    sequence: Vec<NodeId>,
+    marks: Vec<Mark>,
+    undo: Vec<Undo>,
+}
+
+/// What [`PrunedNetwork::pop`] goes back to.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    facts: facts::Checkpoint,
+    undo: usize,
+    probability: f64,
+    assumed: usize,
+}
+
+#[derive(Clone, Debug)]
+enum Undo {
+    Number(usize, Number),
+    Started,
+    Ended(usize, InstanceId),
+}
+
+impl<'m> PrunedNetwork<'m> {
+    /// The network without a happening.
+    ///
+    /// # Errors
+    /// When what is required of actions under way couples too many facts.
+    pub fn new(model: &'m Model, circumstances: &Circumstances) -> Result<Self, TooCoupled> {
+        let mut network = Self {
+            model,
+            facts: Facts::new(model, &circumstances.belief),
+            numbers: Numbers::new(model, &circumstances.values),
+            remaining: Vec::new(),
+            running: Vec::new(),
+            probability: 1.0,
+            assumed: 0,
+            sequence: Vec::new(),
+            marks: Vec::new(),
+            undo: Vec::new(),
+        };
+        for running in &circumstances.running {
+            let event = model.event(model.start(running.instance));
+            let elapsed = &circumstances.now - &running.start;
+            let remaining = event.duration.as_ref().map(|duration| duration - &elapsed);
+            network.remaining.push((running.instance, remaining));
+            network.running.push(running.instance);
+            for (fluent, _) in &event.continuous {
+                let number = &mut network.numbers.changing[*fluent];
+                *number = Numbers::begun(number);
+            }
+            // What a guard said of the start has been decided: effects that will not take place
+            // are not in the action, and the others will.
+            for (memory, _) in &event.watches {
+                network.facts.set_certain(*memory, true);
+            }
+            for effect in event.effects.iter().filter(|effect| effect.is_certain) {
+                network.facts.set_certain(effect.fact, true);
+            }
+        }
+        network.require_throughout(NodeId::ZERO)?;
+        Ok(network)
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'m Model {
+        self.model
+    }
+
+    /// The order so far.
+    pub fn sequence(&self) -> &[NodeId] {
+        &self.sequence
+    }
+
+    /// The actions that have started and not ended, in order of their start.
+    pub fn running(&self) -> &[InstanceId] {
+        &self.running
+    }
+
+    /// P(A): that all happenings so far succeed.
+    ///
+    /// While actions are under way, what is required throughout them counts, so far, with the
+    /// rest: no order can do without their ends. Once none is under way, this is the paper's P(A).
+    #[doc(alias = "P(A)")]
+    pub fn actions_probability(&self) -> f64 {
+        self.probability
+    }
+
+    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    ///
+    /// # Errors
+    /// When the goal couples too many facts.
+    #[doc(alias = "P(A and G)")]
+    pub fn success_probability(&mut self) -> Result<f64, TooCoupled> {
+        let before = self.mark();
+        let model = self.model;
+        let required = self.require(&model.goal, NodeId::ZERO);
+        let probability = self.probability;
+        self.go_back_to(before);
+        required.map(|()| probability)
+    }
+
+    /// How many numeric conditions were taken for granted, because they read numbers that depend
+    /// on when things happen and not only on their order.
+    pub fn assumed_conditions(&self) -> usize {
+        self.assumed
+    }
+
+    /// How likely a fact is to hold now, given that all went well so far.
+    pub fn marginal(&mut self, fact: elbowroom_model::ground::FactId) -> Option<f64> {
+        let position = self.model.position(fact)?;
+        Some(self.marginal_at(position))
+    }
+
+    pub(crate) fn marginal_at(&mut self, position: usize) -> f64 {
+        self.facts.marginal(self.model, position)
+    }
+
+    /// The facts' distribution now, for comparison with another.
+    pub(crate) fn snapshot(&mut self, is_relevant: &dyn Fn(usize) -> bool) -> facts::Snapshot {
+        self.facts.snapshot(self.model, is_relevant)
+    }
+
+    pub(crate) fn number(&self, fluent: usize) -> &Number {
+        &self.numbers.changing[fluent]
+    }
+
+    /// Adds a happening; returns [`PrunedNetwork::actions_probability`].
+    ///
+    /// The happening must be possible: an end needs its action to be under way, a start must not.
+    ///
+    /// # Errors
+    /// When it couples too many facts; then nothing is added.
+    pub fn push(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+        let before = self.mark();
+        if let Err(error) = self.try_push(node) {
+            self.go_back_to(before);
+            return Err(error);
+        }
+        self.marks.push(before);
+        self.sequence.push(node);
+        Ok(self.probability)
+    }
+
+    /// Takes the last happening back.
+    pub fn pop(&mut self) {
+        if let Some(mark) = self.marks.pop() {
+            self.sequence.pop();
+            self.go_back_to(mark);
+        }
+    }
+
+    fn try_push(&mut self, node: NodeId) -> Result<(), TooCoupled> {
+        let model = self.model;
+        let event = model.event(node);
+        self.require(&event.condition, node)?;
+        self.probability *= event.success;
+        let updates = self.updates(node, event);
+        self.facts_change(node, event)?;
+        for (fluent, number) in updates {
+            self.set_number(fluent, number);
+        }
+        match model.plan().nodes[node.index()] {
+            Node::Start(id) => {
+                self.running.push(id);
+                self.undo.push(Undo::Started);
+            }
+            Node::End(id) => {
+                if let Some(place) = self.running.iter().position(|&running| running == id) {
+                    self.running.remove(place);
+                    self.undo.push(Undo::Ended(place, id));
+                }
+            }
+            Node::Zero | Node::Instant(_) | Node::Timed(_) => {}
+        }
+        self.require_throughout(node)
+    }
+
+    /// What is required throughout the actions under way, in the present layer.
+    fn require_throughout(&mut self, node: NodeId) -> Result<(), TooCoupled> {
+        let model = self.model;
+        for place in 0..self.running.len() {
+            let start = model.event(model.start(self.running[place]));
+            self.require(&start.over_all, node)?;
+            for (memory, condition) in &start.watches {
+                let forget = Outcome {
+                    fact: *memory,
+                    makes_true: false,
+                    probability: 1.0,
+                    is_certain: true,
+                };
+                let unless = Condition::Not(Box::new(condition.clone()));
+                match self.truth(&unless) {
+                    Some(false) => {}
+                    Some(true) => self.facts.set_certain_later(*memory, false),
+                    None => {
+                        let guarded = [(Some(unless), forget)];
+                        self.facts_transform(node, &guarded, false)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Conditions on a requirement in the present layer.
+    fn require(&mut self, requirement: &Requirement, node: NodeId) -> Result<(), TooCoupled> {
+        let model = self.model;
+        for &(fact, truth) in &requirement.literals {
+            self.probability *= self.facts.require(model, fact, truth);
+        }
+        for condition in &requirement.numeric {
+            match self.truth(condition) {
+                Some(true) => {}
+                Some(false) => self.probability = 0.0,
+                None => self.assumed += 1,
+            }
+        }
+        for coupled in &requirement.coupled {
+            let numbers = &self.numbers;
+            let value = |leaf: &Expression| numbers.value(model, leaf, None);
+            let required =
+                self.facts
+                    .require_coupled(model, &coupled.condition, &coupled.facts, &value);
+            match required {
+                Ok((mass, rests_on_time)) => {
+                    self.probability *= mass;
+                    self.assumed += usize::from(rests_on_time);
+                }
+                Err(count) => return Err(self.too_coupled(node, count)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a condition certainly holds, or certainly does not; `None` if either is possible.
+    fn truth(&mut self, condition: &Condition) -> Option<bool> {
+        let (model, numbers) = (self.model, &self.numbers);
+        let value = |leaf: &Expression| numbers.value(model, leaf, None);
+        self.facts.truth(model, condition, &value)
+    }
+
+    /// The numbers after a happening.
+    fn updates(&mut self, node: NodeId, event: &Event) -> Vec<(usize, Number)> {
+        let model = self.model;
+        if event.updates.is_empty() && event.continuous.is_empty() {
+            return Vec::new();
+        }
+        let mut after: Vec<(usize, Number)> = Vec::new();
+        let duration = event.duration.as_ref();
+        for update in &event.updates {
+            let certain = match &update.guard {
+                None => Some(true),
+                Some(guard) => self.truth(guard),
+            };
+            let leaf = &mut |leaf: &Expression| self.numbers.value(model, leaf, duration);
+            let amount = update.value.evaluate(leaf);
+            let present = present(&after, &self.numbers, update.fluent);
+            let next = match certain {
+                Some(false) => continue,
+                Some(true) => Numbers::updated(&present, update.operator, amount),
+                None => Numbers::updated(&present, UNKNOWN, None),
+            };
+            put(&mut after, update.fluent, next);
+        }
+        let end_of = match model.plan().nodes[node.index()] {
+            Node::End(id) => Some(id),
+            _ => None,
+        };
+        for (fluent, rate) in &event.continuous {
+            let present = present(&after, &self.numbers, *fluent);
+            let next = match end_of {
+                None => Numbers::begun(&present),
+                Some(id) => {
+                    let lasted = self.lasts(id).or(event.duration.clone());
+                    let leaf = &mut |leaf: &Expression| self.numbers.value(model, leaf, duration);
+                    let amount = match (rate.evaluate(leaf), lasted) {
+                        (Some(rate), Some(lasted)) => Some(rate * lasted),
+                        _ => None,
+                    };
+                    Numbers::stopped(&present, amount)
+                }
+            };
+            put(&mut after, *fluent, next);
+        }
+        after
+    }
+
+    /// How long an action that was running at the beginning will have run from there to its end.
+    fn lasts(&self, id: InstanceId) -> Option<Rational> {
+        let is_first_end = |node: &NodeId| self.model.plan().nodes[node.index()] == Node::End(id);
+        if self.sequence.iter().any(is_first_end) {
+            return None;
+        }
+        let known = self.remaining.iter().find(|(running, _)| *running == id)?;
+        known.1.clone()
+    }
+
+    fn set_number(&mut self, fluent: usize, number: Number) {
+        let old = std::mem::replace(&mut self.numbers.changing[fluent], number);
+        self.undo.push(Undo::Number(fluent, old));
+    }
+
+    /// The effects of a happening on facts, and the changes that come by themselves.
+    fn facts_change(&mut self, node: NodeId, event: &Event) -> Result<(), TooCoupled> {
+        let model = self.model;
+        let mut uncertain = Vec::new();
+        let mut certain = Vec::new();
+        for effect in &event.effects {
+            let outcome = Outcome::from(effect);
+            let Some(guard) = &effect.guard else {
+                certain.push(outcome);
+                continue;
+            };
+            match self.truth(guard) {
+                Some(true) => certain.push(outcome),
+                Some(false) => {}
+                None => uncertain.push((Some(guard.clone()), outcome)),
+            }
+        }
+        if uncertain.is_empty() {
+            self.facts.apply(model, &certain, event.is_step);
+            return Ok(());
+        }
+        // Effects on one fact go together, whether or not they are certain.
+        let is_open = |fact: usize| uncertain.iter().any(|(_, outcome)| outcome.fact == fact);
+        let (joint, apart): (Vec<_>, Vec<_>) =
+            certain.into_iter().partition(|outcome| is_open(outcome.fact));
+        uncertain.extend(joint.into_iter().map(|outcome| (None, outcome)));
+        let pending = Pending {
+            apart,
+            is_step: event.is_step,
+        };
+        self.facts_transform_with(node, &uncertain, pending)
+    }
+
+    fn facts_transform(
+        &mut self,
+        node: NodeId,
+        guarded: &[(Option<Condition>, Outcome)],
+        is_step: bool,
+    ) -> Result<(), TooCoupled> {
+        let pending = Pending {
+            apart: Vec::new(),
+            is_step,
+        };
+        self.facts_transform_with(node, guarded, pending)
+    }
+
+    fn facts_transform_with(
+        &mut self,
+        node: NodeId,
+        guarded: &[(Option<Condition>, Outcome)],
+        pending: Pending,
+    ) -> Result<(), TooCoupled> {
+        let (model, numbers) = (self.model, &self.numbers);
+        let value = |leaf: &Expression| numbers.value(model, leaf, None);
+        let changed = self.facts.apply_guarded(model, guarded, &pending, &value);
+        changed.map_err(|count| self.too_coupled(node, count))
+    }
+
+    fn too_coupled(&self, node: NodeId, count: usize) -> TooCoupled {
+        TooCoupled {
+            happening: self.model.node_words(node),
+            count,
+            most: facts::MOST_COUPLED,
+        }
+    }
+
+    fn mark(&self) -> Mark {
+        Mark {
+            facts: self.facts.checkpoint(),
+            undo: self.undo.len(),
+            probability: self.probability,
+            assumed: self.assumed,
+        }
+    }
+
+    fn go_back_to(&mut self, mark: Mark) {
+        while self.undo.len() > mark.undo {
+            match self.undo.pop() {
+                Some(Undo::Number(fluent, number)) => self.numbers.changing[fluent] = number,
+                Some(Undo::Started) => {
+                    self.running.pop();
+                }
+                Some(Undo::Ended(place, id)) => self.running.insert(place, id),
+                None => {}
+            }
+        }
+        self.facts.undo_to(mark.facts);
+        self.probability = mark.probability;
+        self.assumed = mark.assumed;
+    }
+}
+
+/// An update after which a number is not known.
+const UNKNOWN: elbowroom_model::problem::UpdateOperator =
+    elbowroom_model::problem::UpdateOperator::Assign;
+
+fn present(after: &[(usize, Number)], numbers: &Numbers, fluent: usize) -> Number {
+    let found = after.iter().find(|(other, _)| *other == fluent);
+    found.map_or_else(|| numbers.changing[fluent].clone(), |(_, number)| number.clone())
+}
+
+fn put(after: &mut Vec<(usize, Number)>, fluent: usize, number: Number) {
+    match after.iter_mut().find(|(other, _)| *other == fluent) {
+        Some((_, old)) => *old = number,
+        None => after.push((fluent, number)),
+    }
+}

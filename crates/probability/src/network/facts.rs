@@ -1,0 +1,637 @@
+//! The facts' joint distribution, given that all went well so far.
+//!
+//! Facts are independent of each other until a condition couples them; so the distribution is a
+//! product: one number for each fact on its own, one [`Cluster`] for each group of coupled ones.
+//! Facts change by themselves with every layer. That is made up for when they are next looked at.
+
+use elbowroom_model::ground::{Condition, Expression, FactId};
+use elbowroom_num::Rational;
+
+use super::cluster::{Cluster, Kernel};
+use crate::belief::Belief;
+use crate::likelihoods::Flip;
+use crate::model::{FactEffect, Model, Semantics, evaluate, visit_facts};
+
+/// How many facts a cluster can have: 2^16 numbers.
+pub(super) const MOST_COUPLED: usize = 16;
+
+/// What is known of a fact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Record {
+    /// The layer at which `p` is right; for a coupled fact, its cluster knows.
+    layer: u32,
+    /// P(true), for a fact on its own.
+    p: f64,
+    /// The fact's cluster, if it is coupled.
+    cluster: Option<u32>,
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(super) struct Facts {
+    layer: u32,
+    records: Vec<Record>,
+    clusters: Vec<Option<Cluster>>,
+    undo: Vec<Undo>,
+}
+
+#[derive(Clone, Debug)]
+enum Undo {
+    Record(usize, Record),
+    Cluster(usize, Option<Cluster>),
+}
+
+/// A moment to come back to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Checkpoint {
+    layer: u32,
+    undo: usize,
+    clusters: usize,
+}
+
+/// An effect that takes place, with its chance to fail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Outcome {
+    pub(super) fact: usize,
+    pub(super) makes_true: bool,
+    pub(super) probability: f64,
+    pub(super) is_certain: bool,
+}
+
+impl From<&FactEffect> for Outcome {
+    fn from(effect: &FactEffect) -> Self {
+        Self {
+            fact: effect.fact,
+            makes_true: effect.makes_true,
+            probability: effect.probability,
+            is_certain: effect.is_certain,
+        }
+    }
+}
+
+/// What happens besides guarded effects.
+pub(super) struct Pending {
+    /// Unconditional effects on other facts.
+    pub(super) apart: Vec<Outcome>,
+    /// Whether facts change by themselves afterwards.
+    pub(super) is_step: bool,
+}
+
+/// The distribution of some facts at one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Snapshot {
+    /// P(true) of facts on their own.
+    pub(crate) single: Vec<(usize, f64)>,
+    /// Coupled facts, sorted, with the weights of their assignments.
+    pub(crate) coupled: Vec<(Vec<usize>, Vec<f64>)>,
+}
+
+impl Facts {
+    pub(super) fn new(model: &Model, belief: &Belief) -> Self {
+        let record = |&fact: &FactId| Record {
+            layer: 0,
+            p: belief.probability(fact),
+            cluster: None,
+        };
+        Self {
+            layer: 0,
+            records: model.facts.iter().map(record).collect(),
+            clusters: Vec::new(),
+            undo: Vec::new(),
+        }
+    }
+
+    pub(super) fn checkpoint(&self) -> Checkpoint {
+        Checkpoint {
+            layer: self.layer,
+            undo: self.undo.len(),
+            clusters: self.clusters.len(),
+        }
+    }
+
+    pub(super) fn undo_to(&mut self, checkpoint: Checkpoint) {
+        while self.undo.len() > checkpoint.undo {
+            match self.undo.pop() {
+                Some(Undo::Record(fact, record)) => self.records[fact] = record,
+                Some(Undo::Cluster(slot, cluster)) => self.clusters[slot] = cluster,
+                None => {}
+            }
+        }
+        self.clusters.truncate(checkpoint.clusters);
+        self.layer = checkpoint.layer;
+    }
+
+    /// Makes a fact certain before anything has happened.
+    pub(super) fn set_certain(&mut self, fact: usize, truth: bool) {
+        self.records[fact].p = f64::from(u8::from(truth));
+    }
+
+    /// Makes a fact certain in the present layer.
+    pub(super) fn set_certain_later(&mut self, fact: usize, truth: bool) {
+        self.split_off(fact, f64::from(u8::from(truth)));
+    }
+
+    /// P(true) in the present layer.
+    pub(super) fn marginal(&mut self, model: &Model, fact: usize) -> f64 {
+        match self.records[fact].cluster {
+            None => self.single(model, fact),
+            Some(slot) => {
+                let cluster = self.cluster(model, slot);
+                cluster.marginal(cluster.place(fact))
+            }
+        }
+    }
+
+    /// Conditions on the fact's truth; how likely that was.
+    pub(super) fn require(&mut self, model: &Model, fact: usize, truth: bool) -> f64 {
+        if let Some(slot) = self.records[fact].cluster {
+            return self.require_in_cluster(model, slot, fact, truth);
+        }
+        let p = self.single(model, fact);
+        let mass = if truth { p } else { 1.0 - p };
+        self.set_record(fact, f64::from(u8::from(truth)));
+        mass
+    }
+
+    fn require_in_cluster(
+        &mut self,
+        model: &Model,
+        slot: u32,
+        fact: usize,
+        truth: bool,
+    ) -> f64 {
+        let mut cluster = self.cluster(model, slot).clone();
+        let bit = 1 << cluster.place(fact);
+        let mass = cluster.condition(|index| (index & bit != 0) == truth);
+        self.set_cluster(slot, Some(cluster));
+        self.release_certain(slot);
+        mass
+    }
+
+    /// Conditions on a condition that reads several facts; how likely it was, and whether some of
+    /// it had to be taken for granted. `Err`: how many facts that would couple.
+    pub(super) fn require_coupled(
+        &mut self,
+        model: &Model,
+        condition: &Condition,
+        facts: &[usize],
+        value: &dyn Fn(&Expression) -> Option<Rational>,
+    ) -> Result<(f64, bool), usize> {
+        let mut rests_on_time = false;
+        let open = self.open(model, facts);
+        if open.is_empty() {
+            let truth = |fact| self.is_true(model, fact, &[], 0);
+            let holds = evaluate(model.task(), condition, &truth, value);
+            return Ok(match holds {
+                Ok(holds) => (f64::from(u8::from(holds)), false),
+                Err(_) => (1.0, true),
+            });
+        }
+        let slot = self.couple(model, &open)?;
+        let mut cluster = self.cluster(model, slot).clone();
+        let coupled = cluster.facts.clone();
+        let mass = cluster.condition(|index| {
+            let truth = |fact| self.is_true(model, fact, &coupled, index);
+            evaluate(model.task(), condition, &truth, value).unwrap_or_else(|_| {
+                rests_on_time = true;
+                true
+            })
+        });
+        self.set_cluster(slot, Some(cluster));
+        self.release_certain(slot);
+        Ok((mass, rests_on_time))
+    }
+
+    /// Whether a condition holds in all possible cases, or in none.
+    pub(super) fn truth(
+        &mut self,
+        model: &Model,
+        condition: &Condition,
+        value: &dyn Fn(&Expression) -> Option<Rational>,
+    ) -> Option<bool> {
+        let facts = read(model, condition);
+        if self.open(model, &facts).is_empty() {
+            let truth = |fact| self.is_true(model, fact, &[], 0);
+            evaluate(model.task(), condition, &truth, value).ok()
+        } else {
+            None
+        }
+    }
+
+    /// Unconditional effects, sorted by fact, and the changes that come by themselves.
+    pub(super) fn apply(&mut self, model: &Model, outcomes: &[Outcome], is_step: bool) {
+        let next = self.layer + u32::from(is_step);
+        // What remains coupled, by cluster, as all facts of a cluster change at once.
+        let mut coupled: Vec<(u32, Vec<(usize, Kernel)>)> = Vec::new();
+        for of_one in outcomes.chunk_by(|a, b| a.fact == b.fact) {
+            let fact = of_one[0].fact;
+            let kernel = kernel(model, fact, of_one.iter(), is_step);
+            let forgets = (kernel.if_true - kernel.if_false).abs() == 0.0;
+            match self.records[fact].cluster {
+                Some(slot) if !forgets => {
+                    match coupled.iter_mut().find(|(other, _)| *other == slot) {
+                        Some((_, kernels)) => kernels.push((fact, kernel)),
+                        None => coupled.push((slot, vec![(fact, kernel)])),
+                    }
+                }
+                Some(_) => self.forget(model, fact, kernel.if_true, next),
+                None => {
+                    let p = kernel.apply(self.single(model, fact));
+                    self.set_record_at(fact, p, next);
+                }
+            }
+        }
+        for (slot, kernels) in coupled {
+            let mut cluster = self.cluster(model, slot).clone();
+            for (place, &fact) in cluster.facts.clone().iter().enumerate() {
+                match kernels.iter().find(|(changed, _)| *changed == fact) {
+                    Some((_, kernel)) => cluster.transform(place, *kernel),
+                    None if is_step => cluster.transform(place, by_itself(model.flips[fact])),
+                    None => {}
+                }
+            }
+            cluster.layer = next;
+            self.set_cluster(slot, Some(cluster));
+        }
+        self.layer = next;
+    }
+
+    /// Guarded effects with uncertain guards, together with everything else that happens.
+    /// `Err`: how many facts that would couple.
+    pub(super) fn apply_guarded(
+        &mut self,
+        model: &Model,
+        guarded: &[(Option<Condition>, Outcome)],
+        pending: &Pending,
+        value: &dyn Fn(&Expression) -> Option<Rational>,
+    ) -> Result<(), usize> {
+        let mut involved: Vec<usize> = Vec::new();
+        for (guard, outcome) in guarded {
+            if let Some(guard) = guard {
+                let facts = read(model, guard);
+                involved.extend(self.open(model, &facts));
+            }
+            involved.push(outcome.fact);
+        }
+        // Certain facts that are changed are part of it, even if they are alone.
+        involved.sort_unstable();
+        involved.dedup();
+        let slot = self.couple(model, &involved)?;
+        let mut cluster = self.cluster(model, slot).clone();
+        let coupled = cluster.facts.clone();
+        let mut places: Vec<usize> = Vec::new();
+        let all = guarded.iter().map(|(_, outcome)| outcome);
+        for outcome in all.chain(&pending.apart) {
+            if let Some(place) = coupled.iter().position(|&fact| fact == outcome.fact)
+                && !places.contains(&place)
+            {
+                places.push(place);
+            }
+        }
+        cluster.transform_jointly(&places, |before| {
+            let truth = |fact| self.is_true(model, fact, &coupled, before);
+            let takes_place = |guard: &Option<Condition>| match guard {
+                None => true,
+                Some(guard) => evaluate(model.task(), guard, &truth, value).unwrap_or(false),
+            };
+            let happening: Vec<Outcome> = guarded
+                .iter()
+                .filter(|(guard, _)| takes_place(guard))
+                .map(|(_, outcome)| *outcome)
+                .chain(pending.apart.iter().copied())
+                .collect();
+            let of = |&place: &usize| {
+                let fact = coupled[place];
+                let own = happening.iter().filter(move |outcome| outcome.fact == fact);
+                kernel(model, fact, own, pending.is_step)
+            };
+            places.iter().map(of).collect()
+        });
+        if pending.is_step {
+            for (place, &fact) in coupled.iter().enumerate() {
+                if !places.contains(&place) {
+                    cluster.transform(place, by_itself(model.flips[fact]));
+                }
+            }
+            cluster.layer += 1;
+        }
+        self.set_cluster(slot, Some(cluster));
+        let apart: Vec<Outcome> = pending
+            .apart
+            .iter()
+            .filter(|outcome| !coupled.contains(&outcome.fact))
+            .copied()
+            .collect();
+        self.apply(model, &apart, pending.is_step);
+        self.release_certain(slot);
+        Ok(())
+    }
+
+    /// The facts among these that are not certain in the present layer.
+    fn open(&mut self, model: &Model, facts: &[usize]) -> Vec<usize> {
+        let mut open = Vec::new();
+        for &fact in facts {
+            let is_open = match self.records[fact].cluster {
+                Some(_) => true,
+                None => {
+                    let p = self.single(model, fact);
+                    p > 0.0 && p < 1.0
+                }
+            };
+            if is_open {
+                open.push(fact);
+            }
+        }
+        open
+    }
+
+    /// The truth of a basic fact, those of a cluster being as the bits of `index` say.
+    ///
+    /// Facts on their own are certain where this is asked.
+    fn is_true(&self, model: &Model, fact: FactId, coupled: &[usize], index: usize) -> bool {
+        let Some(position) = model.position(fact) else {
+            return false;
+        };
+        match coupled.iter().position(|&own| own == position) {
+            Some(place) => index & (1 << place) != 0,
+            None => self.records[position].p > 0.5,
+        }
+    }
+
+    /// Puts facts into one cluster, with all that they are already coupled to.
+    fn couple(&mut self, model: &Model, facts: &[usize]) -> Result<u32, usize> {
+        let mut slots: Vec<u32> = Vec::new();
+        let mut singles: Vec<usize> = Vec::new();
+        for &fact in facts {
+            match self.records[fact].cluster {
+                Some(slot) if !slots.contains(&slot) => slots.push(slot),
+                Some(_) => {}
+                None => singles.push(fact),
+            }
+        }
+        let in_clusters = slots.iter().map(|&slot| self.cluster(model, slot).facts.len());
+        let count = in_clusters.sum::<usize>() + singles.len();
+        if count > MOST_COUPLED {
+            return Err(count);
+        }
+        if let ([slot], []) = (slots.as_slice(), singles.as_slice()) {
+            return Ok(*slot);
+        }
+        let mut merged = Cluster::unit(self.layer);
+        for slot in slots {
+            self.cluster(model, slot);
+            if let Some(part) = self.clusters[slot as usize].clone() {
+                merged.extend(&part.facts, &part.weights);
+            }
+            self.set_cluster(slot, None);
+        }
+        for fact in singles {
+            let p = self.single(model, fact);
+            merged.extend(&[fact], &[1.0 - p, p]);
+        }
+        let slot = u32::try_from(self.clusters.len()).expect("few clusters");
+        for &fact in &merged.facts {
+            self.put_record(
+                fact,
+                Record {
+                    layer: self.layer,
+                    p: f64::NAN,
+                    cluster: Some(slot),
+                },
+            );
+        }
+        self.clusters.push(Some(merged));
+        Ok(slot)
+    }
+
+    /// Lets facts that have become certain go their own way.
+    fn release_certain(&mut self, slot: u32) {
+        let Some(mut cluster) = self.clusters[slot as usize].clone() else {
+            return;
+        };
+        let mut is_changed = false;
+        for &fact in &cluster.facts.clone() {
+            let place = cluster.place(fact);
+            let p = cluster.marginal(place);
+            let bit = 1 << place;
+            let is_false = cluster.mass(|index| index & bit != 0) == 0.0;
+            let is_true = cluster.mass(|index| index & bit == 0) == 0.0;
+            if is_false || is_true || cluster.facts.len() == 1 {
+                cluster.remove(place);
+                let p = if is_false { 0.0 } else if is_true { 1.0 } else { p };
+                let record = Record {
+                    layer: cluster.layer,
+                    p,
+                    cluster: None,
+                };
+                self.put_record(fact, record);
+                is_changed = true;
+            }
+        }
+        if is_changed {
+            let rest = (!cluster.facts.is_empty()).then_some(cluster);
+            self.set_cluster(slot, rest);
+        }
+    }
+
+    /// Takes a fact out of its cluster, if it is in one; from the present layer it has `p`.
+    fn split_off(&mut self, fact: usize, p: f64) {
+        let record = Record {
+            layer: self.layer,
+            p,
+            cluster: None,
+        };
+        if let Some(slot) = self.records[fact].cluster
+            && let Some(mut cluster) = self.clusters[slot as usize].clone()
+        {
+            cluster.remove(cluster.place(fact));
+            let rest = (!cluster.facts.is_empty()).then_some(cluster);
+            self.set_cluster(slot, rest);
+        }
+        self.put_record(fact, record);
+    }
+
+    /// The same, for a fact that forgets its past and has `p` from the layer `next`.
+    fn forget(&mut self, model: &Model, fact: usize, p: f64, next: u32) {
+        if let Some(slot) = self.records[fact].cluster {
+            self.cluster(model, slot);
+        }
+        self.split_off(fact, p);
+        self.set_record_at(fact, p, next);
+    }
+
+    /// P(true) of a fact on its own, brought up to the present layer.
+    fn single(&mut self, model: &Model, fact: usize) -> f64 {
+        let record = self.records[fact];
+        if record.layer >= self.layer {
+            return record.p;
+        }
+        let flip = model.flips[fact];
+        let mut p = record.p;
+        for _ in record.layer..self.layer {
+            p = flip.after(p);
+        }
+        self.set_record(fact, p);
+        p
+    }
+
+    /// A cluster, brought up to the present layer.
+    fn cluster(&mut self, model: &Model, slot: u32) -> &Cluster {
+        let layer = self.layer;
+        let is_behind = |cluster: &Cluster| cluster.layer < layer;
+        if let Some(mut cluster) = self.clusters[slot as usize].clone().filter(is_behind) {
+            for _ in cluster.layer..layer {
+                for place in 0..cluster.facts.len() {
+                    let flip = model.flips[cluster.facts[place]];
+                    cluster.transform(place, by_itself(flip));
+                }
+            }
+            cluster.layer = layer;
+            self.set_cluster(slot, Some(cluster));
+        }
+        let cluster = self.clusters[slot as usize].as_ref();
+        cluster.expect("facts refer to clusters that are there")
+    }
+
+    fn set_record(&mut self, fact: usize, p: f64) {
+        self.set_record_at(fact, p, self.layer);
+    }
+
+    fn set_record_at(&mut self, fact: usize, p: f64, layer: u32) {
+        let record = Record {
+            layer,
+            p,
+            cluster: None,
+        };
+        self.put_record(fact, record);
+    }
+
+    fn put_record(&mut self, fact: usize, record: Record) {
+        let old = std::mem::replace(&mut self.records[fact], record);
+        self.undo.push(Undo::Record(fact, old));
+    }
+
+    fn set_cluster(&mut self, slot: u32, cluster: Option<Cluster>) {
+        let old = std::mem::replace(&mut self.clusters[slot as usize], cluster);
+        self.undo.push(Undo::Cluster(slot as usize, old));
+    }
+
+    /// The distribution of the facts that matter; a cluster matters as a whole.
+    pub(super) fn snapshot(
+        &mut self,
+        model: &Model,
+        is_relevant: &dyn Fn(usize) -> bool,
+    ) -> Snapshot {
+        let mut snapshot = Snapshot {
+            single: Vec::new(),
+            coupled: Vec::new(),
+        };
+        let mut slots: Vec<u32> = Vec::new();
+        for fact in 0..self.records.len() {
+            if !is_relevant(fact) {
+                continue;
+            }
+            match self.records[fact].cluster {
+                None => {
+                    let p = self.single(model, fact);
+                    snapshot.single.push((fact, p));
+                }
+                Some(slot) if !slots.contains(&slot) => slots.push(slot),
+                Some(_) => {}
+            }
+        }
+        for slot in slots {
+            let cluster = self.cluster(model, slot).clone();
+            let mut order: Vec<usize> = (0..cluster.facts.len()).collect();
+            order.sort_by_key(|&place| cluster.facts[place]);
+            let weights = (0..cluster.weights.len())
+                .map(|index| {
+                    let bits = order.iter().enumerate();
+                    let old: usize = bits.map(|(new, &old)| ((index >> new) & 1) << old).sum();
+                    cluster.weights[old]
+                })
+                .collect();
+            let facts = order.iter().map(|&place| cluster.facts[place]).collect();
+            snapshot.coupled.push((facts, weights));
+        }
+        snapshot
+    }
+}
+
+/// The basic facts and memories that a condition reads.
+fn read(model: &Model, condition: &Condition) -> Vec<usize> {
+    let mut facts = Vec::new();
+    visit_facts(model.task(), condition, &mut |fact| {
+        facts.extend(model.position(fact));
+    });
+    facts.sort_unstable();
+    facts.dedup();
+    facts
+}
+
+/// A fact changing by itself.
+fn by_itself(flip: Flip) -> Kernel {
+    Kernel {
+        if_true: 1.0 - flip.becomes_false,
+        if_false: flip.becomes_true,
+    }
+}
+
+/// What the effects that take place do to their fact; deletions come before additions.
+fn kernel<'a>(
+    model: &Model,
+    fact: usize,
+    outcomes: impl Iterator<Item = &'a Outcome>,
+    is_step: bool,
+) -> Kernel {
+    let (mut stays, mut comes_not) = (1.0, 1.0);
+    let (mut adds, mut deletes, mut is_certain) = (false, false, false);
+    for outcome in outcomes {
+        is_certain |= outcome.is_certain;
+        if outcome.makes_true {
+            adds = true;
+            comes_not *= 1.0 - outcome.probability;
+        } else {
+            deletes = true;
+            stays *= 1.0 - outcome.probability;
+        }
+    }
+    let flip = model.flips[fact];
+    if !adds && !deletes {
+        return if is_step {
+            by_itself(flip)
+        } else {
+            Kernel {
+                if_true: 1.0,
+                if_false: 0.0,
+            }
+        };
+    }
+    let comes = 1.0 - comes_not;
+    match model.semantics() {
+        // A deletion that fails leaves the fact true, an addition that fails leaves it false.
+        Semantics::Paper => {
+            let rest = if deletes { stays } else { 0.0 };
+            let p = comes + comes_not * rest;
+            Kernel {
+                if_true: p,
+                if_false: p,
+            }
+        }
+        Semantics::World => {
+            let after = Kernel {
+                if_true: stays + (1.0 - stays) * comes,
+                if_false: comes,
+            };
+            if is_step && !is_certain {
+                let flipped = by_itself(flip);
+                Kernel {
+                    if_true: flipped.apply(after.if_true),
+                    if_false: flipped.apply(after.if_false),
+                }
+            } else {
+                after
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! The yardstick: how likely the best of all executors is to reach the goal in a small world.
+//!
+//! [`Perturbed`] is a Markov decision process. A state is the truth of all facts and the set of
+//! actions under way. What the agent can do, and what then happens:
+//!
+//! - *Try to start* an action that is not under way and whose condition holds. With the action's
+//!   success probability it is then under way and its start effects take place, each with its own
+//!   probability, deletions first; else nothing happens.
+//! - *End* an action under way whose end condition holds: its end effects take place likewise.
+//!   Instantaneous actions are tried like starts and leave nothing under way.
+//! - *Abandon* an action under way: its end effects will not take place. That takes no step.
+//!
+//! After each try and each end, successful or not, every fact may change by itself, once and
+//! independently of the others ([`Semantics::World`](crate::Semantics)). Then the agent sees the
+//! state as it is. It stops, with success, when it sees the goal hold with nothing under way.
+//!
+//! There is no time in this world: durations, deadlines and waiting do not exist, as in the
+//! authors' simulation. What is required throughout an action is, as there, not looked at
+//! ([`Settings::enforces_over_all`] changes that).
+//!
+//! The number that limits a run is that of its steps ([`Horizon`]). The experiments limit planning
+//! rounds instead: a run is over when no plan is found ten times, and as nothing changes without a
+//! step, that means: when there is no plan. [`Settings::needs_plan`] says so; then steps need no
+//! limit.
+
+mod process;
+
+use elbowroom_plan::{InstanceId, NodeId};
+
+use crate::circumstances::Circumstances;
+
+pub use process::Perturbed;
+
+/// How many steps a run may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Horizon {
+    /// At most so many.
+    Steps(usize),
+    /// As many as it takes.
+    Unlimited,
+}
+
+/// The rules of the world.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// How long a run may be.
+    pub horizon: Horizon,
+    /// How many actions can be under way at once.
+    pub most_running: usize,
+    /// Whether a run is lost in a state from which the goal could not be reached even if nothing
+    /// went wrong any more: who plans does not find a plan there.
+    pub needs_plan: bool,
+    /// Whether an action whose over-all condition fails is abandoned at once.
+    pub enforces_over_all: bool,
+}
+
+impl Default for Settings {
+    /// The rules of the experiments, without a limit on what is under way.
+    fn default() -> Self {
+        Self {
+            horizon: Horizon::Unlimited,
+            most_running: usize::MAX,
+            needs_plan: true,
+            enforces_over_all: false,
+        }
+    }
+}
+
+/// The world is not one that can be tabulated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotSmall {
+    /// Too many states.
+    #[error("{facts} facts and {actions} actions make more states than can be tabulated")]
+    TooManyStates {
+        /// How many facts matter.
+        facts: usize,
+        /// How many actions there are.
+        actions: usize,
+    },
+    /// Numbers, or effects that depend on what held throughout an action.
+    #[error("{what}, and worlds in which that happens are not tabulated")]
+    Unsupported {
+        /// What there is.
+        what: String,
+    },
+    /// The likelihoods are those of another reading.
+    #[error("the model must be one of a world, not of the paper's network")]
+    PaperSemantics,
+}
+
+/// What an agent does in a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Move {
+    /// Tries a start or an instantaneous action, or ends an action: a node of the plan.
+    Do(NodeId),
+    /// Lets an action go.
+    Abandon(InstanceId),
+    /// Does nothing any more.
+    Stop,
+}
+
+/// The value of each state for the best of all agents, and what it does there.
+#[derive(Clone, Debug)]
+pub struct Optimum {
+    pub(crate) values: Vec<Vec<f64>>,
+    pub(crate) moves: Vec<Vec<Move>>,
+    /// How many sweeps it took.
+    pub sweeps: usize,
+}
+
+impl Optimum {
+    /// The greatest probability of success from here, in [0, 1].
+    ///
+    /// With [`Horizon::Unlimited`] it is approached from below; the sweeps stop when none of them
+    /// adds more than 1e-12 to any state.
+    pub fn value(&self, process: &Perturbed<'_>, circumstances: &Circumstances) -> f64 {
+        process
+            .weights(circumstances)
+            .into_iter()
+            .map(|(set, state, weight)| weight * self.values[set][state])
+            .sum()
+    }
+
+    /// What to do, with all steps of the horizon still to come.
+    ///
+    /// Of an uncertain belief, the most likely state counts.
+    pub fn choose(&self, process: &Perturbed<'_>, circumstances: &Circumstances) -> Move {
+        let mut weights = process.weights(circumstances);
+        weights.sort_by(|(.., a), (.., b)| b.total_cmp(a));
+        let likeliest = weights.first();
+        likeliest.map_or(Move::Stop, |(set, state, _)| self.moves[*set][*state])
+    }
+}

@@ -1,0 +1,431 @@
+//! How likely an order can still become: a bound that no way to go on exceeds.
+//!
+//! The paper bounds P(A ∩ G) by P(A) (Proposition 3). That is a bound, but a weak one: it forgets
+//! that the actions still needed may fail, that their conditions decay while others are done, and
+//! that what has been reached must last to the end. Counted here, besides P(A):
+//!
+//! - *Needed instances*: those under way, and those without which a goal or a needed instance has
+//!   no support if nothing goes wrong (only where orders must work nominally). Each costs its
+//!   start's success.
+//! - *Facts*: each fact that is needed costs at least once that it may be false. Its chance is at
+//!   most the best of what its chain gives, and what the remaining effects on it leave behind.
+//! - *Queueing*: needed instances end one after another, and before each end its start. The j-th
+//!   end comes after `j - 1` ends and at least `j - running` starts. What an end needs decays until
+//!   then, and what it brings decays from then on while the others end. The best assignment of
+//!   ends to ranks bounds the product.
+
+use elbowroom_plan::InstanceId;
+
+use super::assignment;
+use super::nominal::{Nominal, Truth};
+use super::timing::Separations;
+use crate::likelihoods::Flip;
+use crate::model::{Event, Model, Requirement, Semantics};
+use crate::network::PrunedNetwork;
+
+/// What the bound needs to know of a model, once for all searches.
+#[derive(Clone, Debug)]
+pub(crate) struct Bounds {
+    /// For each fact, the instances that change it: `None` for timed initials.
+    setters: Vec<Vec<Setter>>,
+    /// What the end of an instance needs, and its middle.
+    needs_at_end: Vec<Vec<(usize, bool)>>,
+    /// What its middle needs.
+    needs_throughout: Vec<Vec<(usize, bool)>>,
+    /// What its start needs.
+    needs_at_start: Vec<Vec<(usize, bool)>>,
+    goal: Vec<(usize, bool)>,
+}
+
+/// Something that changes a fact.
+#[derive(Clone, Copy, Debug)]
+struct Setter {
+    by: Option<InstanceId>,
+    at_end: bool,
+    makes_true: bool,
+    /// P(true) afterwards, or `None` if that depends on what was before.
+    leaves: Option<f64>,
+    /// Whether it is sure to be tried when its happening is done.
+    is_unconditional: bool,
+}
+
+/// The search's state that the bound reads.
+pub(crate) struct Outlook<'a> {
+    pub(crate) nominal: &'a Nominal,
+    /// Whether the order must work if nothing goes wrong.
+    pub(crate) must_work: bool,
+    pub(crate) is_free: &'a dyn Fn(InstanceId) -> bool,
+    /// Whether timed initials are to come.
+    pub(crate) has_timed: bool,
+}
+
+impl Bounds {
+    pub(crate) fn of(model: &Model, separations: &Separations) -> Self {
+        let mut setters = vec![Vec::new(); model.facts.len()];
+        let mut note = |event: &Event, by: Option<InstanceId>, at_end: bool| {
+            for effect in &event.effects {
+                let p = effect.probability;
+                let leaves = match model.semantics() {
+                    Semantics::Paper if effect.makes_true => Some(p),
+                    Semantics::Paper => Some(1.0 - p),
+                    Semantics::World => None,
+                };
+                setters[effect.fact].push(Setter {
+                    by,
+                    at_end,
+                    makes_true: effect.makes_true,
+                    leaves: leaves.filter(|_| effect.guard.is_none() && !effect.is_certain),
+                    is_unconditional: effect.guard.is_none(),
+                });
+            }
+        };
+        let mut needs_at_start = Vec::new();
+        let mut needs_at_end = Vec::new();
+        let mut needs_throughout = Vec::new();
+        for (id, _) in model.plan().instances() {
+            let (start, end) = (
+                separations.starts[id.index()],
+                separations.ends[id.index()],
+            );
+            note(model.event(start), Some(id), false);
+            needs_at_start.push(model.event(start).condition.literals.clone());
+            needs_throughout.push(model.event(start).over_all.literals.clone());
+            let mut needs = Vec::new();
+            if start != end {
+                note(model.event(end), Some(id), true);
+                needs.extend(&model.event(end).condition.literals);
+                needs.extend(&model.event(start).over_all.literals);
+                needs.sort_unstable();
+                needs.dedup();
+            }
+            needs_at_end.push(needs);
+        }
+        for (node, _) in &separations.timed {
+            note(model.event(*node), None, false);
+        }
+        let Requirement { literals: goal, .. } = model.goal.clone();
+        Self {
+            setters,
+            needs_at_end,
+            needs_throughout,
+            needs_at_start,
+            goal,
+        }
+    }
+
+    /// An upper bound of P(A ∩ G) for all ways to go on, including not to.
+    pub(crate) fn bound(
+        &self,
+        model: &Model,
+        network: &mut PrunedNetwork<'_>,
+        outlook: &Outlook<'_>,
+        separations: &Separations,
+    ) -> f64 {
+        let probability = network.actions_probability();
+        if probability <= 0.0 {
+            return 0.0;
+        }
+        let Some(needed) = self.needed(network, outlook) else {
+            return 0.0;
+        };
+        let mut run = Run {
+            bounds: self,
+            model,
+            network,
+            outlook,
+            is_counted: vec![false; model.facts.len()],
+            bound: probability,
+        };
+        run.count(&needed, separations);
+        // Products of the same numbers in another order may differ in the last digits.
+        run.bound * (1.0 + 1e-12)
+    }
+
+    /// The instances that every way to go on that works does or ends; `None` if there is no way.
+    fn needed(
+        &self,
+        network: &PrunedNetwork<'_>,
+        outlook: &Outlook<'_>,
+    ) -> Option<Vec<InstanceId>> {
+        let mut needed: Vec<InstanceId> = network.running().to_vec();
+        if !outlook.must_work {
+            return Some(needed);
+        }
+        let mut open: Vec<(usize, bool)> = self.goal.clone();
+        for id in network.running() {
+            open.extend(&self.needs_at_end[id.index()]);
+        }
+        let mut seen: Vec<(usize, bool)> = Vec::new();
+        while let Some(literal) = open.pop() {
+            if seen.contains(&literal) {
+                continue;
+            }
+            seen.push(literal);
+            let (fact, truth) = literal;
+            if !matches!(
+                (outlook.nominal.truth(fact), truth),
+                (Truth::False, true) | (Truth::True, false)
+            ) {
+                continue;
+            }
+            let mut only: Option<InstanceId> = None;
+            let mut is_open = false;
+            let mut has_any = false;
+            for setter in self.setters[fact].iter().filter(|s| s.makes_true == truth) {
+                match setter.by {
+                    None => {
+                        is_open |= outlook.has_timed;
+                        has_any |= outlook.has_timed;
+                    }
+                    Some(id) if network.running().contains(&id) => {
+                        is_open |= setter.at_end;
+                        has_any |= setter.at_end;
+                    }
+                    Some(id) if (outlook.is_free)(id) => {
+                        has_any = true;
+                        is_open |= only.is_some_and(|other| other != id);
+                        only = Some(id);
+                    }
+                    Some(_) => {}
+                }
+            }
+            if !has_any {
+                return None;
+            }
+            if let Some(id) = only.filter(|id| !is_open && !needed.contains(id)) {
+                needed.push(id);
+                open.extend(&self.needs_at_start[id.index()]);
+                open.extend(&self.needs_at_end[id.index()]);
+            }
+        }
+        Some(needed)
+    }
+}
+
+/// How many ends are needed, and how many of them belong to actions under way.
+#[derive(Clone, Copy)]
+struct Queue {
+    running: usize,
+    ends: usize,
+}
+
+struct Run<'a, 'm, 'n> {
+    bounds: &'a Bounds,
+    model: &'a Model,
+    network: &'n mut PrunedNetwork<'m>,
+    outlook: &'a Outlook<'a>,
+    is_counted: Vec<bool>,
+    bound: f64,
+}
+
+impl Run<'_, '_, '_> {
+    fn count(&mut self, needed: &[InstanceId], separations: &Separations) {
+        let running = self.network.running().len();
+        // How many happenings are needed at least.
+        let mut steps = 0;
+        let mut ends: Vec<InstanceId> = Vec::new();
+        for (place, &id) in needed.iter().enumerate() {
+            let (start, end) = (
+                separations.starts[id.index()],
+                separations.ends[id.index()],
+            );
+            if place >= running {
+                self.bound *= self.model.event(start).success;
+                steps += 1;
+            }
+            if start != end {
+                steps += 1;
+                ends.push(id);
+            }
+        }
+        let queue = Queue {
+            running,
+            ends: ends.len(),
+        };
+        let shares: Vec<Vec<f64>> = ends.iter().map(|&id| self.share(id, queue)).collect();
+        self.bound *= assignment::best_product(&shares);
+        for &id in needed.iter().skip(running) {
+            for &(fact, truth) in &self.bounds.needs_at_start[id.index()] {
+                self.count_fact(fact, truth, 0);
+            }
+        }
+        for &(fact, truth) in &self.bounds.goal {
+            self.count_fact(fact, truth, steps);
+        }
+    }
+
+    /// What one end contributes, at each rank among the ends: the chance of what it needs to last
+    /// until then, and of what it brings to last from then on.
+    ///
+    /// Whether more starts come before this end or after it is open. As chances decay, each factor
+    /// is log-convex in their number, so that one of the extremes is best.
+    fn share(&mut self, id: InstanceId, queue: Queue) -> Vec<f64> {
+        let is_new = |literal: &&(usize, bool), is_counted: &mut Vec<bool>| {
+            !std::mem::replace(&mut is_counted[literal.0], true)
+        };
+        let bounds = self.bounds;
+        let needs = bounds.needs_at_end[id.index()].iter();
+        let needs: Vec<(usize, bool)> = needs
+            .filter(|literal| is_new(literal, &mut self.is_counted))
+            .copied()
+            .collect();
+        let mut brings: Vec<(Chain, f64)> = Vec::new();
+        for &(fact, truth) in &bounds.goal {
+            if self.is_counted[fact] || !self.is_last_to_set(id, fact, truth) {
+                continue;
+            }
+            self.is_counted[fact] = true;
+            let own = bounds.setters[fact].iter();
+            let own = own.filter(|setter| setter.by == Some(id) && setter.makes_true == truth);
+            let chance = |p: f64| if truth { p } else { 1.0 - p };
+            let own = own.filter_map(|setter| setter.leaves.map(chance));
+            let chain = Chain::of(self.model.flips[fact], truth);
+            brings.push((chain, own.fold(0.0, f64::max)));
+        }
+        let mut with = |before: usize, after: usize| -> f64 {
+            let needs = needs.iter();
+            let lasting: f64 = needs
+                .map(|&literal| self.lasting(id, literal, before))
+                .product();
+            let brings = brings.iter();
+            let kept: f64 = brings.map(|(chain, p)| chain.best_after(*p, after)).product();
+            lasting * kept
+        };
+        (0..queue.ends)
+            .map(|rank| {
+                let unstarted = queue.ends - queue.running.min(queue.ends);
+                let ends_after = queue.ends - 1 - rank;
+                let fewest = (rank + 1).saturating_sub(queue.running);
+                let early = with(rank + fewest, ends_after + unstarted - fewest);
+                let late = with(rank + unstarted, ends_after);
+                early.max(late)
+            })
+            .collect()
+    }
+
+    /// The best chance that what an end needs lasts until then, the end being `before` steps away
+    /// or more.
+    ///
+    /// What is needed throughout must never fail from the start on. A start is best just before
+    /// its end: until then, what has failed may still mend itself.
+    fn lasting(&mut self, id: InstanceId, (fact, truth): (usize, bool), before: usize) -> f64 {
+        let literal = (fact, truth);
+        let bounds = self.bounds;
+        let is_throughout = bounds.needs_throughout[id.index()].contains(&literal);
+        let chain = Chain::of(self.model.flips[fact], truth);
+        let mut to_come = bounds.setters[fact].iter();
+        if !is_throughout || !chain.is_steady() || to_come.any(|setter| self.is_to_come(setter)) {
+            return self.chance(fact, truth, before);
+        }
+        let steps = i32::try_from(before).unwrap_or(i32::MAX);
+        let stays = 1.0 - chain.0.becomes_false;
+        if self.network.running().contains(&id) {
+            return stays.powi(steps);
+        }
+        if before > 0 && bounds.needs_at_start[id.index()].contains(&literal) {
+            return self.chance(fact, truth, before - 1) * stays;
+        }
+        self.chance(fact, truth, before)
+    }
+
+    /// Whether the end of `id` is the only thing left that changes the fact, and the fact is not
+    /// yet as it should be.
+    fn is_last_to_set(&self, id: InstanceId, fact: usize, truth: bool) -> bool {
+        let nominal = self.outlook.nominal.truth(fact);
+        if !self.outlook.must_work || nominal != Truth::from(!truth) {
+            return false;
+        }
+        let mut is_set = false;
+        for setter in &self.bounds.setters[fact] {
+            if !self.is_to_come(setter) {
+                continue;
+            }
+            if setter.by != Some(id) || !setter.at_end || setter.leaves.is_none() {
+                return false;
+            }
+            is_set |= setter.makes_true == truth && setter.is_unconditional;
+        }
+        is_set
+    }
+
+    fn is_to_come(&self, setter: &Setter) -> bool {
+        match setter.by {
+            None => self.outlook.has_timed,
+            Some(id) if self.network.running().contains(&id) => setter.at_end,
+            Some(id) => (self.outlook.is_free)(id),
+        }
+    }
+
+    /// Counts a needed fact once.
+    fn count_fact(&mut self, fact: usize, truth: bool, steps: usize) {
+        if !std::mem::replace(&mut self.is_counted[fact], true) {
+            self.bound *= self.chance(fact, truth, steps);
+        }
+    }
+
+    /// The best chance that a fact has some truth after `steps` or more.
+    fn chance(&mut self, fact: usize, truth: bool, steps: usize) -> f64 {
+        let chain = Chain::of(self.model.flips[fact], truth);
+        let of = |p: f64| if truth { p } else { 1.0 - p };
+        // If it must be brought about, what it is now does not count.
+        let must_be_set = self.outlook.must_work
+            && self.outlook.nominal.truth(fact) == Truth::from(!truth);
+        let mut best: f64 = 0.0;
+        if !must_be_set {
+            best = chain.best_after(of(self.network.marginal_at(fact)), steps);
+        }
+        for setter in &self.bounds.setters[fact] {
+            if !self.is_to_come(setter) || (must_be_set && setter.makes_true != truth) {
+                continue;
+            }
+            match setter.leaves {
+                None => return 1.0,
+                Some(p) => best = best.max(chain.best_after(of(p), 0)),
+            }
+        }
+        best
+    }
+}
+
+/// A fact changing by itself, seen from the truth that is wanted.
+#[derive(Clone, Copy)]
+struct Chain(Flip);
+
+impl Chain {
+    fn of(flip: Flip, truth: bool) -> Self {
+        Self(if truth {
+            flip
+        } else {
+            Flip {
+                becomes_true: flip.becomes_false,
+                becomes_false: flip.becomes_true,
+            }
+        })
+    }
+
+    /// Whether chances move to one side only.
+    fn is_steady(self) -> bool {
+        self.0.becomes_true + self.0.becomes_false <= 1.0
+    }
+
+    /// The greatest chance after `steps` steps or more.
+    ///
+    /// Chances move towards `becomes_true / (becomes_true + becomes_false)` from one side, unless
+    /// the two sum up to more than 1; then they jump from side to side.
+    fn best_after(self, p: f64, steps: usize) -> f64 {
+        let Flip {
+            becomes_true,
+            becomes_false,
+        } = self.0;
+        let sum = becomes_true + becomes_false;
+        if sum > 1.0 {
+            return 1.0;
+        }
+        if sum <= 0.0 {
+            return p;
+        }
+        let rest = becomes_true / sum;
+        let decayed = rest + (p - rest) * (1.0 - sum).powi(i32::try_from(steps).unwrap_or(i32::MAX));
+        decayed.max(rest)
+    }
+}

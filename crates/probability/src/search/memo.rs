@@ -1,0 +1,269 @@
+//! Sequences that have done the same, and which of them stand best.
+//!
+//! Two sequences have *done the same* if they have used the same instances, have the same ones
+//! under way, have passed the same timed initials, and would be in the same nominal state with the
+//! same numbers, as far as that can still matter. Then the same happenings can follow, apart from
+//! time, and whatever follows has a probability that is linear in the distribution of each
+//! independent group of facts. So sequence A *stands at least as well* as B if
+//!
+//! `P_A(A) · Π over groups min over assignments x of p_A(x) / p_B(x)  >=  P_B(A)`
+//!
+//! and there is as much time left. For a fact on its own the minimum is over true and false; if
+//! nothing to come needs it false, more of it does no harm, and only `p_A / p_B` counts if below 1.
+
+use elbowroom_plan::{InstanceId, Node};
+use indexmap::IndexMap;
+
+use super::nominal::{Nominal, Truth};
+use super::timing::{Room, Separations};
+use crate::model::{Model, Requirement, visit_facts};
+use crate::network::{Number, PrunedNetwork, Snapshot};
+
+/// How many sequences that have done the same are remembered.
+const MOST: usize = 64;
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(super) struct Memo {
+    entries: IndexMap<Key, Vec<Entry>>,
+    needs: Needs,
+    marks: Vec<usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Key {
+    is_used: Vec<bool>,
+    running: Vec<InstanceId>,
+    next_timed: usize,
+    /// Such a sequence is no order as it stands, as the goal is read after an action.
+    is_timed_last: bool,
+    truths: Vec<Truth>,
+    numbers: Vec<Number>,
+}
+
+#[derive(Clone, Debug)]
+struct Entry {
+    probability: f64,
+    facts: Snapshot,
+    room: Option<Room>,
+}
+
+/// Which truth of which facts matters to what.
+#[derive(Clone, Debug)]
+struct Needs {
+    /// By instance: its start and middle; its middle and end.
+    whole: Vec<Need>,
+    rest: Vec<Need>,
+    goal: Need,
+    /// Facts of which more may be worse although nothing needs them false.
+    is_turbulent: Vec<bool>,
+}
+
+/// By fact: bit 0, needed true; bit 1, needed false.
+type Need = Vec<u8>;
+
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BOTH: u8 = 3;
+
+impl Memo {
+    pub(super) fn new(model: &Model, separations: &Separations) -> Self {
+        let count = model.facts.len();
+        let mut whole = Vec::new();
+        let mut rest = Vec::new();
+        for (id, _) in model.plan().instances() {
+            let start = model.event(separations.starts[id.index()]);
+            let end = model.event(separations.ends[id.index()]);
+            let mut need = vec![0; count];
+            for event in [start, end] {
+                include(&mut need, &event.over_all);
+                for (memory, condition) in &event.watches {
+                    need[*memory] = BOTH;
+                    include_condition(model, &mut need, condition);
+                }
+                if std::ptr::eq(event, start) && !std::ptr::eq(start, end) {
+                    continue;
+                }
+                include(&mut need, &event.condition);
+                include_guards(model, &mut need, event);
+            }
+            rest.push(need.clone());
+            include(&mut need, &start.condition);
+            include_guards(model, &mut need, start);
+            whole.push(need);
+        }
+        let mut goal = vec![0; count];
+        include(&mut goal, &model.goal);
+        let is_turbulent = model.flips.iter();
+        let is_turbulent = is_turbulent.map(|flip| flip.becomes_true + flip.becomes_false > 1.0);
+        Self {
+            entries: IndexMap::new(),
+            needs: Needs {
+                whole,
+                rest,
+                goal,
+                is_turbulent: is_turbulent.collect(),
+            },
+            marks: Vec::new(),
+        }
+    }
+
+    /// Remembers a position in the nominal state's history.
+    pub(super) fn mark(&mut self, checkpoint: usize) {
+        self.marks.push(checkpoint);
+    }
+
+    /// The last one remembered.
+    pub(super) fn unmark(&mut self) -> usize {
+        self.marks.pop().unwrap_or(0)
+    }
+
+    /// Whether a remembered sequence stands at least as well; if not, remembers this one.
+    pub(super) fn is_dominated(
+        &mut self,
+        model: &Model,
+        nominal: &Nominal,
+        network: &mut PrunedNetwork<'_>,
+        is_used: &[bool],
+        next_timed: usize,
+        room: Option<Room>,
+    ) -> bool {
+        let need = self.needs.of(is_used, network.running());
+        let mut running = network.running().to_vec();
+        running.sort_unstable();
+        let numbers = (0..model.fluents.len()).map(|fluent| network.number(fluent).clone());
+        let last = network.sequence().last();
+        let matters = |fact: &usize| need[*fact] != 0;
+        let key = Key {
+            is_used: is_used.to_vec(),
+            running,
+            next_timed,
+            is_timed_last: last.is_some_and(|node| {
+                matches!(model.plan().nodes[node.index()], Node::Timed(_))
+            }),
+            truths: (0..need.len())
+                .filter(matters)
+                .map(|fact| nominal.truth(fact))
+                .collect(),
+            numbers: numbers.collect(),
+        };
+        let entry = Entry {
+            probability: network.actions_probability(),
+            facts: network.snapshot(&|fact| need[fact] != 0),
+            room,
+        };
+        let known = self.entries.entry(key).or_default();
+        if known.iter().any(|other| other.dominates(&entry, &need)) {
+            return true;
+        }
+        known.retain(|other| !entry.dominates(other, &need));
+        if known.len() < MOST {
+            known.push(entry);
+        }
+        false
+    }
+}
+
+impl Entry {
+    fn dominates(&self, other: &Self, need: &Need) -> bool {
+        let has_room = match (&self.room, &other.room) {
+            (None, None) => true,
+            (Some(own), Some(its)) => own.contains(its),
+            _ => false,
+        };
+        let ratio = ratio(&self.facts, &other.facts, need);
+        // A ratio of products of the same factors in another order may be off in the last digits.
+        self.probability * ratio >= other.probability * (1.0 - 1e-12) && has_room
+    }
+}
+
+/// By how much at least whatever follows is more likely from the one than from the other.
+fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
+    if from.coupled.len() != than.coupled.len() {
+        return 0.0;
+    }
+    let mut ratio = 1.0;
+    for ((own_facts, own), (facts, weights)) in from.coupled.iter().zip(&than.coupled) {
+        if own_facts != facts {
+            return 0.0;
+        }
+        let pairs = own.iter().zip(weights);
+        ratio *= pairs.map(|(&own, &its)| part(own, its)).fold(f64::INFINITY, f64::min);
+    }
+    if from.single.len() != than.single.len() {
+        return 0.0;
+    }
+    for (&(fact, own), &(its_fact, its)) in from.single.iter().zip(&than.single) {
+        if fact != its_fact {
+            return 0.0;
+        }
+        let if_true = part(own, its);
+        let if_false = part(1.0 - own, 1.0 - its);
+        ratio *= match need[fact] {
+            TRUE => if_true.min(1.0),
+            FALSE => if_false.min(1.0),
+            _ => if_true.min(if_false),
+        };
+    }
+    ratio
+}
+
+/// `own / its`, where nothing is as good as something that cannot be.
+fn part(own: f64, its: f64) -> f64 {
+    if its > 0.0 { own / its } else { f64::INFINITY }
+}
+
+impl Needs {
+    fn of(&self, is_used: &[bool], running: &[InstanceId]) -> Need {
+        let mut need = self.goal.clone();
+        let mut add = |part: &Need| {
+            for (all, one) in need.iter_mut().zip(part) {
+                *all |= one;
+            }
+        };
+        for (whole, _) in self.whole.iter().zip(is_used).filter(|(_, used)| !**used) {
+            add(whole);
+        }
+        for id in running {
+            add(&self.rest[id.index()]);
+        }
+        for (need, _) in need.iter_mut().zip(&self.is_turbulent).filter(|(_, is)| **is) {
+            if *need != 0 {
+                *need = BOTH;
+            }
+        }
+        need
+    }
+}
+
+fn include(need: &mut Need, requirement: &Requirement) {
+    for &(fact, truth) in &requirement.literals {
+        need[fact] |= if truth { TRUE } else { FALSE };
+    }
+    for coupled in &requirement.coupled {
+        for &fact in &coupled.facts {
+            need[fact] = BOTH;
+        }
+    }
+}
+
+fn include_condition(
+    model: &Model,
+    need: &mut Need,
+    condition: &elbowroom_model::ground::Condition,
+) {
+    visit_facts(model.task(), condition, &mut |fact| {
+        if let Some(fact) = model.position(fact) {
+            need[fact] = BOTH;
+        }
+    });
+}
+
+fn include_guards(model: &Model, need: &mut Need, event: &crate::model::Event) {
+    for guard in event.effects.iter().filter_map(|effect| effect.guard.as_ref()) {
+        include_condition(model, need, guard);
+    }
+    for guard in event.updates.iter().filter_map(|update| update.guard.as_ref()) {
+        include_condition(model, need, guard);
+    }
+}

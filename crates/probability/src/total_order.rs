@@ -1,0 +1,122 @@
+//! An order of a plan's happenings, with what must hold between them: [`TotalOrderPlan`].
+
+mod regress;
+
+use elbowroom_model::ground::{Condition, Expression, FactId};
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use crate::circumstances::Circumstances;
+use crate::model::{Model, evaluate};
+use crate::network::PrunedNetwork;
+use crate::search::Slot;
+
+/// Happenings in a row, and the layers of the pruned network between them.
+#[doc(alias = "Γ")]
+#[derive(Clone, Debug, PartialEq)]
+pub struct TotalOrderPlan {
+    /// The happenings: nodes of the partially ordered plan.
+    pub sequence: Vec<NodeId>,
+    /// One more than happenings: layer `i` is what must hold before `sequence[i]` for the rest to
+    /// work if nothing more goes wrong; the last is the goal.
+    pub layers: Vec<Layer>,
+    /// When each happening may be, if the order begins when it was found.
+    pub slots: Vec<Slot>,
+    /// P(A): that all happenings succeed.
+    pub actions_probability: f64,
+    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    pub probability: f64,
+    /// How many numeric conditions were taken for granted, because the numbers they read depend on
+    /// when things happen and not only on their order.
+    pub assumed_conditions: usize,
+}
+
+/// What must hold between two happenings.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layer {
+    /// Facts with the truth they must have, sorted.
+    pub literals: Vec<(FactId, bool)>,
+    /// Conditions on numbers, or on several facts at once.
+    pub conditions: Vec<Condition>,
+    /// The actions under way there, sorted.
+    pub running: Vec<InstanceId>,
+}
+
+impl TotalOrderPlan {
+    /// The order that a network has, begun in these circumstances.
+    pub(crate) fn new(
+        model: &Model,
+        circumstances: &Circumstances,
+        network: &PrunedNetwork<'_>,
+        probability: f64,
+        slots: Vec<Slot>,
+    ) -> Self {
+        let sequence = network.sequence().to_vec();
+        let mut running = circumstances.running.iter().map(|r| r.instance).collect();
+        let mut under_way = vec![sorted(&running)];
+        for &node in &sequence {
+            step(model, &mut running, node);
+            under_way.push(sorted(&running));
+        }
+        Self {
+            layers: regress::layers(model, &sequence, under_way),
+            sequence,
+            slots,
+            actions_probability: network.actions_probability(),
+            probability,
+            assumed_conditions: network.assumed_conditions(),
+        }
+    }
+
+    /// The same order, begun so much later.
+    #[must_use]
+    pub(crate) fn delayed(&self, delay: &Rational) -> Self {
+        let mut order = self.clone();
+        if !delay.is_zero() {
+            for slot in &mut order.slots {
+                slot.earliest = &slot.earliest + delay;
+                slot.latest = slot.latest.as_ref().map(|latest| latest + delay);
+            }
+        }
+        order
+    }
+}
+
+fn sorted(running: &Vec<InstanceId>) -> Vec<InstanceId> {
+    let mut running = running.clone();
+    running.sort_unstable();
+    running
+}
+
+fn step(model: &Model, running: &mut Vec<InstanceId>, node: NodeId) {
+    match model.plan().nodes[node.index()] {
+        Node::Start(id) => running.push(id),
+        Node::End(id) => running.retain(|other| *other != id),
+        Node::Zero | Node::Instant(_) | Node::Timed(_) => {}
+    }
+}
+
+impl Layer {
+    /// Whether what is believed fits: whether each fact is more likely to be as required than not,
+    /// all conditions hold of what is more likely, and the same actions are under way.
+    pub fn fits(&self, model: &Model, circumstances: &Circumstances) -> bool {
+        let mut running: Vec<InstanceId> = circumstances.running.iter().map(|r| r.instance).collect();
+        running.sort_unstable();
+        running == self.running && self.holds(model, circumstances)
+    }
+
+    /// The same, whatever is under way.
+    pub fn holds(&self, model: &Model, circumstances: &Circumstances) -> bool {
+        let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
+        let value = |leaf: &Expression| match leaf {
+            Expression::Fluent(fluent) => circumstances.values.get(fluent).cloned(),
+            _ => None,
+        };
+        let task = model.task();
+        self.literals.iter().all(|&(fact, truth)| is_likely(fact) == truth)
+            && self.conditions.iter().all(|condition| {
+                // A number that is not known now cannot speak against it.
+                evaluate(task, condition, &is_likely, &value).unwrap_or(true)
+            })
+    }
+}

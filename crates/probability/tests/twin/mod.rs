@@ -1,0 +1,313 @@
+//! Plainly right counterparts: the process of `docs/probability.md` with every world spelt out,
+//! and all orders tried one after the other.
+#![allow(dead_code, reason = "each test uses some of it")]
+
+pub(crate) mod orders;
+pub(crate) mod random;
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{
+    Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
+};
+use elbowroom_model::problem::UpdateOperator;
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
+use elbowroom_probability::{Circumstances, Flip, Likelihoods, Semantics};
+
+/// A world: which facts hold, and which end effects of running actions will take place.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct World {
+    facts: Vec<bool>,
+    memories: BTreeMap<(InstanceId, usize), bool>,
+}
+
+/// All worlds that are possible after an order, with how likely they are.
+#[derive(Clone, Debug)]
+pub(crate) struct Worlds<'a> {
+    task: &'a Task,
+    plan: &'a PartialOrderPlan,
+    likelihoods: &'a Likelihoods,
+    semantics: Semantics,
+    values: BTreeMap<FluentId, Rational>,
+    running: Vec<InstanceId>,
+    worlds: Vec<(World, f64)>,
+}
+
+impl<'a> Worlds<'a> {
+    pub(crate) fn new(
+        task: &'a Task,
+        plan: &'a PartialOrderPlan,
+        likelihoods: &'a Likelihoods,
+        semantics: Semantics,
+        circumstances: &Circumstances,
+    ) -> Self {
+        let mut memories = BTreeMap::new();
+        for running in &circumstances.running {
+            for (place, effect) in end_effects(plan, running.instance).iter().enumerate() {
+                if has_memory(effect) {
+                    memories.insert((running.instance, place), true);
+                }
+            }
+        }
+        let mut worlds = vec![(Vec::new(), 1.0)];
+        for index in 0..task.fact_count() {
+            let fact = FactId(u32::try_from(index).unwrap());
+            let p = circumstances.belief.probability(fact);
+            worlds = worlds
+                .into_iter()
+                .flat_map(|(facts, weight)| {
+                    [(true, p), (false, 1.0 - p)].map(|(truth, p)| {
+                        let mut facts = facts.clone();
+                        facts.push(truth);
+                        (facts, weight * p)
+                    })
+                })
+                .filter(|(_, weight)| *weight > 0.0)
+                .collect();
+        }
+        let world = |(facts, weight)| {
+            let memories = memories.clone();
+            (World { facts, memories }, weight)
+        };
+        let mut all = Self {
+            task,
+            plan,
+            likelihoods,
+            semantics,
+            values: circumstances.values.clone(),
+            running: circumstances.running.iter().map(|r| r.instance).collect(),
+            worlds: worlds.into_iter().map(world).collect(),
+        };
+        all.look_throughout();
+        all
+    }
+
+    /// P(A) so far.
+    pub(crate) fn actions_probability(&self) -> f64 {
+        self.worlds.iter().map(|(_, weight)| weight).sum()
+    }
+
+    /// P(A ∩ G) so far.
+    pub(crate) fn success_probability(&self) -> f64 {
+        let goal = self.task.goal();
+        let worlds = self.worlds.iter();
+        worlds
+            .filter(|(world, _)| self.holds(goal, world))
+            .map(|(_, weight)| weight)
+            .sum()
+    }
+
+    pub(crate) fn running(&self) -> &[InstanceId] {
+        &self.running
+    }
+
+    pub(crate) fn push(&mut self, node: NodeId) {
+        match self.plan.nodes[node.index()] {
+            Node::Zero => {}
+            Node::Timed(index) => {
+                for change in &self.task.timed()[index].changes {
+                    for (world, _) in &mut self.worlds {
+                        match change {
+                            Change::Add(fact) => world.facts[fact.index()] = true,
+                            Change::Delete(fact) => world.facts[fact.index()] = false,
+                            Change::Update { .. } => {}
+                        }
+                    }
+                }
+            }
+            Node::Instant(id) | Node::Start(id) => {
+                let action = &self.plan.instance(id).action;
+                let success = self.likelihoods.start(action).unwrap();
+                match &action.body {
+                    Body::Instantaneous(snap) => self.do_snap(id, snap, success, &[]),
+                    Body::Durative(body) => {
+                        self.do_snap(id, &body.start, success, &body.end.effects);
+                        self.running.push(id);
+                    }
+                }
+            }
+            Node::End(id) => {
+                if let Body::Durative(body) = &self.plan.instance(id).action.body {
+                    self.do_snap(id, &body.end, 1.0, &[]);
+                }
+                self.running.retain(|running| *running != id);
+                for (world, _) in &mut self.worlds {
+                    world.memories.retain(|(owner, _), _| *owner != id);
+                }
+            }
+        }
+        self.look_throughout();
+    }
+
+    fn do_snap(&mut self, id: InstanceId, snap: &SnapAction, success: f64, to_come: &[Effect]) {
+        let arrived = std::mem::take(&mut self.worlds);
+        let mut after = BTreeMap::new();
+        for (world, weight) in arrived {
+            if !self.holds(&snap.condition, &world) {
+                continue;
+            }
+            for (mut next, weight) in self.outcomes(id, snap, &world, weight * success) {
+                for (place, effect) in to_come.iter().enumerate() {
+                    if has_memory(effect) {
+                        let remembered = self.holds(&effect.guard.at_start, &world);
+                        next.memories.insert((id, place), remembered);
+                    }
+                }
+                *after.entry(next).or_insert(0.0) += weight;
+            }
+        }
+        self.worlds = after.into_iter().collect();
+        let arrival = self.values.clone();
+        for effect in &snap.effects {
+            if let Change::Update {
+                operator,
+                fluent,
+                value,
+            } = &effect.change
+            {
+                let amount = value.evaluate(&mut |leaf| number(leaf, &arrival)).unwrap();
+                let old = self.values[fluent].clone();
+                let new = match operator {
+                    UpdateOperator::Assign => amount,
+                    UpdateOperator::Increase => old + amount,
+                    UpdateOperator::Decrease => old - amount,
+                    _ => unreachable!("not drawn"),
+                };
+                self.values.insert(*fluent, new);
+            }
+        }
+    }
+
+    /// The worlds after a snap action, with effects and what happens by itself.
+    fn outcomes(
+        &self,
+        id: InstanceId,
+        snap: &SnapAction,
+        world: &World,
+        weight: f64,
+    ) -> Vec<(World, f64)> {
+        let action = &self.plan.instance(id).action;
+        let mut outcomes = vec![(world.clone(), weight)];
+        for index in 0..self.task.fact_count() {
+            let fact = FactId(u32::try_from(index).unwrap());
+            if self.task.is_derived(fact) {
+                continue;
+            }
+            let mut adds: Vec<f64> = Vec::new();
+            let mut deletes: Vec<f64> = Vec::new();
+            let mut seen: Vec<&Effect> = Vec::new();
+            for (place, effect) in snap.effects.iter().enumerate() {
+                let remembered = world.memories.get(&(id, place)).copied().unwrap_or(true);
+                let is_repeated = seen.contains(&effect);
+                if is_repeated || !remembered || !self.holds(&effect.guard.now, world) {
+                    continue;
+                }
+                seen.push(effect);
+                let chance = |makes_true| {
+                    let chance = self.likelihoods.effect(self.task, action, fact, makes_true);
+                    chance.unwrap()
+                };
+                match effect.change {
+                    Change::Add(own) if own == fact => adds.push(chance(true)),
+                    Change::Delete(own) if own == fact => deletes.push(chance(false)),
+                    _ => {}
+                }
+            }
+            let was = f64::from(u8::from(world.facts[index]));
+            let flip = self.likelihoods.flip(self.task, fact).unwrap();
+            let p = self.chance(was, &adds, &deletes, flip);
+            outcomes = outcomes
+                .into_iter()
+                .flat_map(|(world, weight)| {
+                    [(true, p), (false, 1.0 - p)].map(|(truth, p)| {
+                        let mut world = world.clone();
+                        world.facts[index] = truth;
+                        (world, weight * p)
+                    })
+                })
+                .filter(|(_, weight)| *weight > 0.0)
+                .collect();
+        }
+        outcomes
+    }
+
+    /// P(true afterwards) of a fact that was true with probability 0 or 1.
+    fn chance(&self, was: f64, adds: &[f64], deletes: &[f64], flip: Flip) -> f64 {
+        let none = |of: &[f64]| of.iter().map(|p| 1.0 - p).product::<f64>();
+        match self.semantics {
+            Semantics::Paper => match (adds, deletes) {
+                ([], []) => flip.after(was),
+                (_, []) => 1.0 - none(adds),
+                ([], _) => none(deletes),
+                _ => (1.0 - none(adds)) + none(adds) * none(deletes),
+            },
+            Semantics::World => {
+                let kept = was * none(deletes);
+                let reached = kept + (1.0 - kept) * (1.0 - none(adds));
+                flip.after(reached)
+            }
+        }
+    }
+
+    /// What must hold throughout, and what end effects depend on throughout.
+    fn look_throughout(&mut self) {
+        let mut worlds = std::mem::take(&mut self.worlds);
+        for &id in &self.running {
+            let Body::Durative(body) = &self.plan.instance(id).action.body else {
+                continue;
+            };
+            worlds.retain(|(world, _)| self.holds(&body.over_all, world));
+            for (place, effect) in body.end.effects.iter().enumerate() {
+                if has_memory(effect) {
+                    for (world, _) in &mut worlds {
+                        let held = self.holds(&effect.guard.over_all, world);
+                        if let Some(memory) = world.memories.get_mut(&(id, place)) {
+                            *memory &= held;
+                        }
+                    }
+                }
+            }
+        }
+        self.worlds = worlds;
+    }
+
+    fn holds(&self, condition: &Condition, world: &World) -> bool {
+        match condition {
+            Condition::Fact(fact) if self.task.is_derived(*fact) => {
+                // The rules of these tests do not depend on each other.
+                let mut rules = self.task.rules_of(*fact).iter();
+                rules.any(|rule| self.holds(&rule.body, world))
+            }
+            Condition::Fact(fact) => world.facts[fact.index()],
+            Condition::Compare(comparison, left, right) => {
+                let value = |side: &Expression| {
+                    side.evaluate(&mut |leaf| number(leaf, &self.values)).unwrap()
+                };
+                comparison.holds(&value(left), &value(right))
+            }
+            Condition::Not(part) => !self.holds(part, world),
+            Condition::And(parts) => parts.iter().all(|part| self.holds(part, world)),
+            Condition::Or(parts) => parts.iter().any(|part| self.holds(part, world)),
+        }
+    }
+}
+
+fn end_effects(plan: &PartialOrderPlan, id: InstanceId) -> &[Effect] {
+    match &plan.instance(id).action.body {
+        Body::Durative(body) => &body.end.effects,
+        Body::Instantaneous(_) => &[],
+    }
+}
+
+fn has_memory(effect: &Effect) -> bool {
+    !effect.guard.at_start.is_trivial() || !effect.guard.over_all.is_trivial()
+}
+
+fn number(leaf: &Expression, values: &BTreeMap<FluentId, Rational>) -> Option<Rational> {
+    match leaf {
+        Expression::Fluent(fluent) => values.get(fluent).cloned(),
+        _ => None,
+    }
+}

@@ -1,0 +1,83 @@
+//! All orders, one after the other.
+
+use elbowroom_plan::{Node, NodeId};
+use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
+
+use super::Worlds;
+use super::random::Case;
+
+/// The best P(A ∩ G) of all orders; only those count for which there is time, which is asked of
+/// the network as a whole, and those that work nominally if `works` says so.
+pub(crate) fn best(case: &Case, semantics: Semantics, search: &OrderSearch) -> Option<f64> {
+    let worlds = Worlds::new(
+        &case.task,
+        &case.plan,
+        &case.likelihoods,
+        semantics,
+        &case.circumstances,
+    );
+    let mut best = None;
+    let mut sequence = Vec::new();
+    let certain = Likelihoods::certain();
+    // What happens if nothing goes wrong; every world of it counts where all orders do.
+    let nominal = Worlds::new(
+        &case.task,
+        &case.plan,
+        &certain,
+        Semantics::Paper,
+        &case.circumstances,
+    );
+    extend(case, search, (worlds, nominal), &mut sequence, &mut best);
+    best
+}
+
+fn extend(
+    case: &Case,
+    search: &OrderSearch,
+    (worlds, nominal): (Worlds<'_>, Worlds<'_>),
+    sequence: &mut Vec<NodeId>,
+    best: &mut Option<f64>,
+) {
+    if search.windows(&case.circumstances, sequence).is_none() {
+        return;
+    }
+    let must_work = search.settings().candidates == Candidates::Working;
+    let is_timed = |node: &NodeId| matches!(case.plan.nodes[node.index()], Node::Timed(_));
+    if worlds.running().is_empty() && !sequence.last().is_some_and(is_timed) {
+        let p = worlds.success_probability();
+        let counts = !must_work || nominal.success_probability() > 0.0;
+        if counts && p > 0.0 && best.is_none_or(|best| p > best) {
+            *best = Some(p);
+        }
+    }
+    let is_dead = must_work && nominal.actions_probability() == 0.0;
+    if is_dead || worlds.actions_probability() == 0.0 {
+        return;
+    }
+    let next_timed = sequence.iter().filter(|node| is_timed(node)).count();
+    for (at, what) in case.plan.nodes.iter().enumerate() {
+        let node = NodeId::from(at);
+        let is_new = !sequence.contains(&node);
+        let is_next = match what {
+            Node::Zero => false,
+            Node::Start(id) | Node::Instant(id) => {
+                is_new && !case.circumstances.is_running(*id)
+            }
+            Node::End(id) => worlds.running().contains(id),
+            Node::Timed(index) => is_new && *index == next_timed,
+        };
+        let is_allowed = !search.settings().keeps_interference
+            || !case
+                .plan
+                .interference()
+                .any(|link| link.from == node && sequence.contains(&link.to));
+        if is_next && is_allowed {
+            let (mut worlds, mut nominal) = (worlds.clone(), nominal.clone());
+            worlds.push(node);
+            nominal.push(node);
+            sequence.push(node);
+            extend(case, search, (worlds, nominal), sequence, best);
+            sequence.pop();
+        }
+    }
+}
