@@ -215,13 +215,21 @@ impl Reduction {
 
     /// A parameter in a product that the corners of a box say nothing about.
     ///
-    /// Products are exact only one inequality at a time, and only if the multiplied parameter does
-    /// not also move the times.
+    /// Products are exact only one inequality at a time, only if the multiplied parameter does not
+    /// also move the times, and only if it does not multiply itself: a square is least between the
+    /// ends of an interval, unless its coefficient is negative.
     pub(crate) fn undecided_at_corners(&self, case: &BadCase) -> Option<ParameterId> {
-        let inequalities = case.inequalities.iter();
-        let mut multiplied =
-            inequalities.flat_map(|inequality| inequality.expression.multiplied_parameters());
-        multiplied.find(|&id| case.inequalities.len() > 1 || self.is_in_network(id))
+        let is_joint = case.inequalities.len() > 1;
+        let expressions = case.inequalities.iter().map(|i| &i.expression);
+        expressions
+            .flat_map(|expression| {
+                let squared = expression.squared_parameter();
+                let multiplied = expression
+                    .multiplied_parameters()
+                    .filter(|&id| is_joint || self.is_in_network(id));
+                squared.into_iter().chain(multiplied)
+            })
+            .next()
     }
 
     /// Adds `to - from <= constant + reach(end)`.

@@ -240,17 +240,13 @@ impl<'a> Soundness<'a> {
         broken: &Broken,
     ) -> Option<Counterexample> {
         if let Requirement::Separation { first, second } = broken.requirement
-            && let [too_near] = &broken.case.differences[..]
+            && broken.case.differences.len() == 1
         {
-            // Far apart the wrong way round is no mistake by itself, but then there are schedules
-            // in between.
+            // The wrong way round may do no harm, if they are far apart or one is a timed initial
+            // after the end of the plan. But schedules are convex: between such a one and the one
+            // that the order was taken from lies one with the happenings in order, and too near.
             let mut near = broken.case.clone();
-            near.differences.push(Difference {
-                from: second,
-                to: first,
-                bound: too_near.bound.clone(),
-                is_strict: true,
-            });
+            near.differences.push(Difference::not_after(first, second));
             let witness = bad_case::witness(&self.reduction, envelope, &near, None);
             if witness.is_some() {
                 return witness;

@@ -25,16 +25,19 @@ enum Theme {
     Rates,
     /// Conditional effects.
     Guards,
+    /// Parameters that stand in several places.
+    Shared,
 }
 
 impl Theme {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Mixed,
         Self::Mixed,
         Self::Mixed,
         Self::Timed,
         Self::Rates,
         Self::Guards,
+        Self::Shared,
     ];
 }
 
