@@ -85,6 +85,9 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
     if nominal.dice.chance(75) {
         nominal.tighten();
     }
+    if nominal.dice.chance(15) {
+        nominal.add_far_limit();
+    }
     Some(nominal.case)
 }
 
