@@ -7,6 +7,8 @@ use elbowroom_plan::reduction::{BoxEnd, Edge, Reduction, Side};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
+use crate::cycles::{Cycles, Role};
+
 /// How many corners are looked at before the question is given up.
 pub(crate) const MOST_CORNERS: usize = 1 << 14;
 
@@ -28,19 +30,6 @@ pub(crate) struct Feasibility {
     corners: Vec<Corner>,
 }
 
-/// Through which of its ends a parameter can make the network inconsistent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Role {
-    /// It is on no cycle.
-    None,
-    /// Small values break things: it is only used as an upper bound.
-    Lower,
-    /// Large values break things: it is only used as a lower bound.
-    Upper,
-    /// Both can.
-    Both,
-}
-
 /// A choice of ends, and the network there.
 #[derive(Clone, Debug)]
 struct Corner {
@@ -49,7 +38,13 @@ struct Corner {
 }
 
 /// Values in the box for which there is no schedule.
-pub(crate) type Infeasible = Valuation;
+#[derive(Clone, Debug)]
+pub(crate) enum Infeasible {
+    /// These.
+    At(Valuation),
+    /// Some far out on that side, wherever the other parameters are.
+    FarOut(BoxEnd),
+}
 
 /// Too many parameters are on cycles both ways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,13 +57,14 @@ impl Feasibility {
     ) -> Result<Self, TooManyCorners> {
         let edges = reduction.edges().to_vec();
         let class_count = reduction.class_count();
+        let mut cycles = Cycles::new(&edges, class_count);
         let roles: Vec<Role> = (0..plan.parameters.len())
             .map(ParameterId::from)
             .map(|id| {
                 if reduction.coupled.contains(&id) {
                     Role::Both
                 } else {
-                    role(&edges, class_count, id)
+                    cycles.role(id)
                 }
             })
             .collect();
@@ -100,7 +96,7 @@ impl Feasibility {
         };
         for end in ends {
             if end.reach(envelope).is_none() && !self.goes_on_for_ever(end) {
-                return Some(self.far_out(envelope, end));
+                return Some(Infeasible::FarOut(end));
             }
         }
         match moved {
@@ -140,8 +136,16 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).is_ok()
     }
 
+    /// The values that were meant.
+    pub(crate) fn values(&self, envelope: &DecoupledEnvelope, found: Infeasible) -> Valuation {
+        match found {
+            Infeasible::At(values) => values,
+            Infeasible::FarOut(end) => self.far_out(envelope, end),
+        }
+    }
+
     /// Values without a schedule, with the parameter so far out on that side as it takes.
-    fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Infeasible {
+    fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
         let mut values: Valuation = envelope
             .intervals
             .iter()
@@ -187,7 +191,7 @@ impl Feasibility {
         for sides in corners {
             match self.network(&sides, envelope) {
                 Some(network) => built.push(Corner { sides, network }),
-                None => return Some(valuation(&sides, envelope)),
+                None => return Some(Infeasible::At(valuation(&sides, envelope))),
             }
         }
         self.corners = built;
@@ -286,7 +290,7 @@ impl Feasibility {
                     for (corner, checkpoint) in self.corners.iter_mut().zip(&checkpoints) {
                         corner.network.undo_to(*checkpoint);
                     }
-                    return Some(values);
+                    return Some(Infeasible::At(values));
                 }
             }
         }
@@ -300,7 +304,7 @@ impl Feasibility {
             if corner.sides.get(&end.parameter) == Some(&end.side) {
                 match self.network(&corner.sides, envelope) {
                     Some(network) => rebuilt.push((index, network)),
-                    None => return Some(valuation(&corner.sides, envelope)),
+                    None => return Some(Infeasible::At(valuation(&corner.sides, envelope))),
                 }
             }
         }
@@ -347,39 +351,4 @@ fn all_ends(envelope: &DecoupledEnvelope) -> Vec<BoxEnd> {
         .map(ParameterId::from)
         .flat_map(|parameter| [Side::Lower, Side::Upper].map(|side| BoxEnd { parameter, side }))
         .collect()
-}
-
-/// How an uncoupled parameter lies on cycles. Its edges are one `s -> d` ("at most") and one
-/// `d -> s` ("at least"), or only one of them; going there and back along both says nothing.
-fn role(edges: &[Edge], class_count: usize, parameter: ParameterId) -> Role {
-    let own = |edge: &Edge| edge.end.is_some_and(|end| end.parameter == parameter);
-    let mut successors: Vec<Vec<usize>> = vec![Vec::new(); class_count];
-    for edge in edges.iter().filter(|edge| !own(edge)) {
-        successors[edge.from.index()].push(edge.to.index());
-    }
-    let reaches = |from: usize, to: usize| {
-        let mut seen = vec![false; class_count];
-        let mut stack = vec![from];
-        while let Some(node) = stack.pop() {
-            if node == to {
-                return true;
-            }
-            if !std::mem::replace(&mut seen[node], true) {
-                stack.extend(&successors[node]);
-            }
-        }
-        false
-    };
-    let on_cycle = |side: Side| {
-        edges.iter().filter(|edge| own(edge)).any(|edge| {
-            edge.end.is_some_and(|end| end.side == side)
-                && reaches(edge.to.index(), edge.from.index())
-        })
-    };
-    match (on_cycle(Side::Upper), on_cycle(Side::Lower)) {
-        (false, false) => Role::None,
-        (true, false) => Role::Lower,
-        (false, true) => Role::Upper,
-        (true, true) => Role::Both,
-    }
 }

@@ -126,16 +126,14 @@ pub fn irr(
         }
         let parameter = plan.parameter(end.parameter);
         let widened = match widened(&envelope, parameter, end, &step) {
-            Some(candidate) if oracle.objection_after(&candidate, Some(end))?.is_none() => {
-                Some(candidate)
-            }
+            Some(candidate) if oracle.is_inside_after(&candidate, Some(end))? => Some(candidate),
             _ => None,
         };
         let flow = if let Some(candidate) = widened {
             envelope = candidate;
             frontier.accept(end);
             if let Some(farthest) = farthest(&envelope, parameter, end)
-                && oracle.objection_after(&farthest, Some(end))?.is_none()
+                && oracle.is_inside_after(&farthest, Some(end))?
             {
                 envelope = farthest;
                 frontier.finish(end);

@@ -7,7 +7,7 @@ use elbowroom_plan::reduction::BoxEnd;
 use elbowroom_plan::soundness::{Broken, Counterexample, Soundness};
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
-use crate::feasibility::Feasibility;
+use crate::feasibility::{Feasibility, Infeasible};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
 /// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1).
@@ -38,6 +38,12 @@ pub enum Objection {
     /// For these values of the parameters the plan has no schedule.
     NoSchedule(Valuation),
     /// For some values, some schedule breaks an obligation.
+    Broken(Broken),
+}
+
+/// The same, before the values without a schedule are worked out.
+enum Reason {
+    NoSchedule(Infeasible),
     Broken(Broken),
 }
 
@@ -113,16 +119,42 @@ impl<'a> Oracle<'a> {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Result<Option<Objection>, Refusal> {
+        let reason = self.check(envelope, moved)?;
+        Ok(reason.map(|reason| match reason {
+            Reason::Broken(broken) => Objection::Broken(broken),
+            Reason::NoSchedule(found) => {
+                Objection::NoSchedule(self.feasibility.values(envelope, found))
+            }
+        }))
+    }
+
+    /// Whether there is no [objection](Self::objection_after), which need not be worked out then.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn is_inside_after(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+    ) -> Result<bool, Refusal> {
+        Ok(self.check(envelope, moved)?.is_none())
+    }
+
+    fn check(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+    ) -> Result<Option<Reason>, Refusal> {
         self.checks += 1;
         // Proofs found for a box that was refused, and is not the last accepted one with an end
         // moved out, may not hold in the last accepted one: then the hint says nothing about them.
         let trusted = moved.filter(|_| self.proofs_hold_in_last);
-        let objection = self.sound_and_feasible(envelope, moved, trusted);
-        self.proofs_hold_in_last = match &objection {
+        let reason = self.sound_and_feasible(envelope, moved, trusted);
+        self.proofs_hold_in_last = match &reason {
             Ok(None) => true,
             _ => moved.is_some() && self.proofs_hold_in_last,
         };
-        objection
+        reason
     }
 
     fn sound_and_feasible(
@@ -130,20 +162,21 @@ impl<'a> Oracle<'a> {
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
-    ) -> Result<Option<Objection>, Refusal> {
+    ) -> Result<Option<Reason>, Refusal> {
         if !envelope.contains(&self.around)
             && let Some(without_schedule) = self.move_to(envelope)?
         {
-            return Ok(Some(Objection::NoSchedule(without_schedule)));
+            let found = Infeasible::At(without_schedule);
+            return Ok(Some(Reason::NoSchedule(found)));
         }
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
         if let Some(broken) = self.soundness.broken(envelope, trusted)? {
-            return Ok(Some(Objection::Broken(broken)));
+            return Ok(Some(Reason::Broken(broken)));
         }
-        if let Some(valuation) = self.feasibility.infeasible(envelope, moved) {
+        if let Some(found) = self.feasibility.infeasible(envelope, moved) {
             self.without_schedule += 1;
-            return Ok(Some(Objection::NoSchedule(valuation)));
+            return Ok(Some(Reason::NoSchedule(found)));
         }
         Ok(None)
     }

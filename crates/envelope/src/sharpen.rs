@@ -62,7 +62,7 @@ fn push(
     }
     let mut accepts = |reach: Option<Rational>| -> Result<bool, Refusal> {
         let candidate = end.with_reach(envelope, reach);
-        let is_inside = oracle.objection_after(&candidate, Some(end))?.is_none();
+        let is_inside = oracle.is_inside_after(&candidate, Some(end))?;
         if is_inside {
             *envelope = candidate;
         }

@@ -376,3 +376,50 @@ fn timed_initials_may_be_close_to_each_other() {
     };
     assert_eq!(given.answer(""), "inside");
 }
+
+#[test]
+fn a_parameter_times_itself_is_not_decided_at_corners() {
+    // (x) becomes s²: 64 at both ends of [-8, 8], and 0 between. Below 50, the ends do decide.
+    let squared = |condition: &str| {
+        let domain = format!(
+            "(:synth-parameters ?s)
+             (:durative-action square :parameters () :duration (= ?duration 3)
+                :condition (at end ({condition} (x) 50))
+                :effect (at start (assign (x) (* ?s ?s))))"
+        );
+        let given = Given {
+            domain: &domain,
+            plan: "parameter ?s default 7; durative-action instance n : (square);
+                   c: n.end - n.start in [3, 3];",
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        let oracle = Oracle::new(&task, &plan, &Rational::new(1, 4));
+        oracle.map(|_| given.answers(&["[-7, 7]", "[-8, 7]"]))
+    };
+    assert_eq!(
+        squared(">=").unwrap_err(),
+        Refusal::Coupled {
+            name: "?s".to_owned()
+        }
+    );
+    assert_eq!(
+        squared("<=").unwrap(),
+        ["inside", "end of (square) needs (<= (x) 50)"]
+    );
+}
+
+#[test]
+fn a_counterexample_to_separation_has_the_happenings_in_order() {
+    // A timed initial after the last action does not count, however near.
+    let given = Given {
+        domain: "(:action clear :parameters () :precondition (and) :effect (not (p)))",
+        init: "(at 17/2 (p))",
+        plan: "parameter g default 9; action instance c : (clear);
+               c: c - .zero in [g, inf];",
+        ..Given::default()
+    };
+    let found = given.counterexample("[8, 9]");
+    let gap = &found.schedule[1] - Rational::new(17, 2);
+    assert!(!gap.is_negative() && gap < Rational::new(1, 4));
+}

@@ -416,13 +416,25 @@ fn sum(left: &Rational, right: &Rational, subtract: bool) -> Rational {
     ) = (&left.0, &right.0)
     {
         let c = if subtract { -c } else { *c };
+        // With a whole number on one side, the sum is in lowest terms already.
+        let whole = if *d == 1 {
+            c.checked_mul(*b)
+                .and_then(|c| Some((a.checked_add(c)?, *b)))
+        } else if *b == 1 {
+            a.checked_mul(*d)
+                .and_then(|a| Some((a.checked_add(c)?, *d)))
+        } else {
+            None
+        };
+        if let Some((numerator, denominator)) = whole
+            && numerator != i64::MIN
+        {
+            return Rational(Small {
+                numerator,
+                denominator,
+            });
+        }
         if b == d {
-            if *b == 1
-                && let Some(whole) = a.checked_add(c)
-                && whole != i64::MIN
-            {
-                return Rational::integer(whole);
-            }
             return Rational::reduced(i128::from(*a) + i128::from(c), i128::from(*b));
         }
         let (a, b, c, d) = (
@@ -450,10 +462,23 @@ impl<'a> Mul<&'a Rational> for &Rational {
                     numerator: c,
                     denominator: d,
                 },
-            ) => Rational::reduced(
-                i128::from(*a) * i128::from(*c),
-                i128::from(*b) * i128::from(*d),
-            ),
+            ) => {
+                // Most products are with 1 or -1, or of whole numbers.
+                let (is_sign, is_signed) = (d == &1 && c.abs() == 1, b == &1 && a.abs() == 1);
+                if (is_sign || is_signed || (b == &1 && d == &1))
+                    && let Some(numerator) = a.checked_mul(*c)
+                    && numerator != i64::MIN
+                {
+                    return Rational(Small {
+                        numerator,
+                        denominator: b * d,
+                    });
+                }
+                Rational::reduced(
+                    i128::from(*a) * i128::from(*c),
+                    i128::from(*b) * i128::from(*d),
+                )
+            }
             _ => Rational::from_big(self.to_big() * other.to_big()),
         }
     }

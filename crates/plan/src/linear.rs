@@ -219,6 +219,14 @@ impl Linear {
         value
     }
 
+    /// A parameter whose square has a positive coefficient.
+    pub fn squared_parameter(&self) -> Option<ParameterId> {
+        let square = self.products.iter().find(|&(&(first, factor), amount)| {
+            factor == Factor::Parameter(first) && amount.is_positive()
+        });
+        square.map(|(&(id, _), _)| id)
+    }
+
     /// The parameters that stand in products.
     pub fn multiplied_parameters(&self) -> impl Iterator<Item = ParameterId> + '_ {
         self.products.keys().flat_map(|&(first, factor)| {

@@ -207,8 +207,10 @@ pub enum Refusal {
         /// Where it stands.
         place: String,
     },
-    /// A parameter both multiplies a time and bounds a difference of times.
-    #[error("parameter {name} multiplies a time and also bounds one; vary one of the two only")]
+    /// The ends of a parameter's interval do not decide what happens between them.
+    #[error(
+        "parameter {name} is multiplied by itself, or by a time that it also bounds, or with several numbers of one condition; give it a value, or vary one of these only"
+    )]
     Coupled {
         /// The parameter.
         name: String,

@@ -215,13 +215,21 @@ impl Reduction {
 
     /// A parameter in a product that the corners of a box say nothing about.
     ///
-    /// Products are exact only one inequality at a time, and only if the multiplied parameter does
-    /// not also move the times.
+    /// Products are exact only one inequality at a time, only if the multiplied parameter does not
+    /// also move the times, and only if it does not multiply itself: a square is least between the
+    /// ends of an interval, unless its coefficient is negative.
     pub(crate) fn undecided_at_corners(&self, case: &BadCase) -> Option<ParameterId> {
-        let inequalities = case.inequalities.iter();
-        let mut multiplied =
-            inequalities.flat_map(|inequality| inequality.expression.multiplied_parameters());
-        multiplied.find(|&id| case.inequalities.len() > 1 || self.is_in_network(id))
+        let is_joint = case.inequalities.len() > 1;
+        let expressions = case.inequalities.iter().map(|i| &i.expression);
+        expressions
+            .flat_map(|expression| {
+                let squared = expression.squared_parameter();
+                let multiplied = expression
+                    .multiplied_parameters()
+                    .filter(|&id| is_joint || self.is_in_network(id));
+                squared.into_iter().chain(multiplied)
+            })
+            .next()
     }
 
     /// Adds `to - from <= constant + reach(end)`.
@@ -242,24 +250,14 @@ impl Reduction {
 
     /// Of parallel edges that depend on the same end only the tightest says anything.
     fn keep_tightest(&mut self) {
-        let mut tightest: BTreeMap<(ClassId, ClassId, Option<BoxEnd>), Rational> = BTreeMap::new();
-        for edge in self.edges.drain(..) {
-            let bound = tightest
-                .entry((edge.from, edge.to, edge.end))
-                .or_insert_with(|| edge.constant.clone());
-            if edge.constant < *bound {
-                *bound = edge.constant;
-            }
-        }
-        self.edges = tightest
-            .into_iter()
-            .map(|((from, to, end), constant)| Edge {
-                from,
-                to,
-                constant,
-                end,
-            })
-            .collect();
+        self.edges.sort_by(|a, b| {
+            let place = |edge: &Edge| (edge.from, edge.to, edge.end);
+            place(a)
+                .cmp(&place(b))
+                .then_with(|| a.constant.cmp(&b.constant))
+        });
+        self.edges
+            .dedup_by(|b, a| (a.from, a.to, a.end) == (b.from, b.to, b.end));
     }
 
     /// The node's class, and by how much the node comes after it. One node more than the plan has
@@ -269,6 +267,11 @@ impl Reduction {
             Some((class, offset)) => (*class, offset.clone()),
             None => (self.moment(), Rational::ZERO),
         }
+    }
+
+    /// By how much nodes come after their classes.
+    pub(crate) fn offsets(&self) -> impl Iterator<Item = &Rational> {
+        self.places.iter().map(|(_, offset)| offset)
     }
 
     /// The class of the moment at which an over-all condition is read.

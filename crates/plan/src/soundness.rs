@@ -9,9 +9,12 @@
 
 mod bad_case;
 mod certificate;
+mod corner;
 mod flow;
+mod lazy;
 mod linear_program;
 mod proof;
+mod scale;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -23,9 +26,11 @@ use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Req
 use crate::parameter::{ParametrizedPlan, Valuation};
 use crate::reduction::{BoxEnd, Reduction};
 use crate::stn_plan::NodeId;
-use bad_case::{Outcome, Schedules};
+use bad_case::Outcome;
 use certificate::Certificate;
-use proof::{Proof, Prover};
+use lazy::{Lazy, numbers};
+use proof::Proof;
+use scale::Numbers;
 
 /// Decides, box by box, whether every schedule is valid.
 #[derive(Clone, Debug)]
@@ -36,6 +41,8 @@ pub struct Soundness<'a> {
     obligations: Obligations,
     direct: Vec<DirectCase>,
     over_all: Vec<Option<Proof>>,
+    /// The numbers in all bounds but the ends of boxes; `None` if they are large.
+    numbers: Option<Numbers>,
     /// The case that broke last: the likeliest to break next.
     suspect: usize,
     /// How many bad cases have been refuted from scratch.
@@ -117,6 +124,7 @@ impl<'a> Soundness<'a> {
             check_over_all(task, plan, &reduction, over_all, &schedule)?;
         }
         let over_all = vec![None; obligations.over_all.len()];
+        let numbers = numbers(&reduction, &obligations);
         Ok(Self {
             task,
             plan,
@@ -124,6 +132,7 @@ impl<'a> Soundness<'a> {
             obligations,
             direct,
             over_all,
+            numbers,
             suspect: 0,
             refutations: 0,
         })
@@ -163,11 +172,12 @@ impl<'a> Soundness<'a> {
             obligations,
             direct,
             over_all,
+            numbers,
             suspect,
             refutations,
             ..
         } = self;
-        let mut schedules = Lazy::Unmade(reduction, envelope);
+        let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
         let first = (*suspect).min(direct.len());
         let mut found = None;
         for index in (first..direct.len()).chain(0..first) {
@@ -216,8 +226,7 @@ impl<'a> Soundness<'a> {
                 return Ok(None);
             };
             *refutations += 1;
-            let mut prover = Prover::new(self.task, self.plan, over_all, schedules);
-            match prover.prove(proof.as_ref(), moved)? {
+            match schedules.prove(self.task, self.plan, over_all, proof.as_ref(), moved)? {
                 Ok(found) => *proof = Some(found),
                 Err(case) => {
                     return Ok(Some(Broken {
@@ -240,17 +249,13 @@ impl<'a> Soundness<'a> {
         broken: &Broken,
     ) -> Option<Counterexample> {
         if let Requirement::Separation { first, second } = broken.requirement
-            && let [too_near] = &broken.case.differences[..]
+            && broken.case.differences.len() == 1
         {
-            // Far apart the wrong way round is no mistake by itself, but then there are schedules
-            // in between.
+            // The wrong way round may do no harm, if they are far apart or one is a timed initial
+            // after the end of the plan. But schedules are convex: between such a one and the one
+            // that the order was taken from lies one with the happenings in order, and too near.
             let mut near = broken.case.clone();
-            near.differences.push(Difference {
-                from: second,
-                to: first,
-                bound: too_near.bound.clone(),
-                is_strict: true,
-            });
+            near.differences.push(Difference::not_after(first, second));
             let witness = bad_case::witness(&self.reduction, envelope, &near, None);
             if witness.is_some() {
                 return witness;
@@ -285,27 +290,6 @@ impl DirectCase {
             Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
             None => proof.holds_in(envelope, None),
         })
-    }
-}
-
-/// The network of a box, made when first needed.
-enum Lazy<'a> {
-    Unmade(&'a Reduction, &'a DecoupledEnvelope),
-    Made(Schedules<'a>),
-    /// The box has no schedule at all: then none is bad.
-    Empty,
-}
-
-impl<'a> Lazy<'a> {
-    /// `None` if the box has no schedule at all.
-    fn get(&mut self) -> Option<&mut Schedules<'a>> {
-        if let Self::Unmade(reduction, envelope) = *self {
-            *self = Schedules::new(reduction, envelope).map_or(Self::Empty, Self::Made);
-        }
-        match self {
-            Self::Made(schedules) => Some(schedules),
-            Self::Unmade(..) | Self::Empty => None,
-        }
     }
 }
 

@@ -57,7 +57,7 @@ impl<W: Weight> Network<W> {
             if !std::mem::take(&mut tree.is_queued[node.index()]) {
                 continue;
             }
-            for &id in self.leaving(node) {
+            for id in self.leaving(node) {
                 let constraint = self.constraint(id);
                 let limit = schedule[node].plus(&constraint.bound);
                 if limit >= schedule[constraint.to] {

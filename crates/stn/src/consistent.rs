@@ -114,6 +114,20 @@ impl<W: Weight> ConsistentNetwork<W> {
         self.resize();
     }
 
+    /// Like [`undo_to`](Self::undo_to), and goes back to `schedule` as well, which was the present
+    /// one at `checkpoint`.
+    ///
+    /// Without that, times only ever move back, a little with each constraint that is tried; with
+    /// it they stay within what the constraints that are left and those tried since can add up to,
+    /// so that machine integers as weights can be chosen not to overflow.
+    pub fn undo_with(&mut self, checkpoint: Checkpoint, schedule: &Schedule<W>) {
+        self.network
+            .truncate(checkpoint.node_count, checkpoint.constraint_count);
+        self.schedule.clone_from(schedule);
+        self.resize();
+        debug_assert!(self.schedule.holds_in(&self.network));
+    }
+
     fn resize(&mut self) {
         self.schedule.resize(self.network.node_count());
         self.repair.resize(self.network.node_count());
@@ -186,7 +200,7 @@ impl<W: Weight> Repair<W> {
             if std::mem::replace(&mut self.is_final[node.index()], true) {
                 continue;
             }
-            for &id in network.leaving(node) {
+            for id in network.leaving(node) {
                 self.tighten(id, anchor, network, schedule)?;
             }
         }

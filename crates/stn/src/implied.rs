@@ -1,7 +1,7 @@
 //! Constraints that the others imply.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 
 use crate::{ConsistentNetwork, ConstraintId, NodeId, Weight};
 
@@ -51,7 +51,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             let mut looked_at = 0;
             while let Some(&node) = members.get(looked_at) {
                 looked_at += 1;
-                for &id in network.entering(node) {
+                for id in network.entering(node) {
                     let from = network.constraint(id).from;
                     if is_tight(id) && group_of[from.index()] == usize::MAX {
                         group_of[from.index()] = groups.len();
@@ -126,7 +126,7 @@ impl<W: Weight> Search<'_, W> {
         let mut stack = vec![edge.from];
         mark[edge.from.index()] = Some(avoided);
         while let Some(node) = stack.pop() {
-            for &id in network.leaving(node) {
+            for id in network.leaving(node) {
                 let to = network.constraint(id).to;
                 let is_open = id != avoided
                     && !self.is_gone[id.index()]
@@ -157,27 +157,24 @@ impl<W: Weight> Search<'_, W> {
         });
         let mut reach = Reach::new(group_count);
         for source in sources {
-            let mut edges_by_target: BTreeMap<usize, Vec<ConstraintId>> = BTreeMap::new();
-            for (id, target) in self.edges_out_of(source) {
-                edges_by_target.entry(target).or_default().push(id);
-            }
-            reach.look_for_detours(self, source, &edges_by_target);
-            for (target, edges) in edges_by_target {
-                self.thin_out(edges, reach.has_detour[target]);
+            let mut edges: Vec<(usize, ConstraintId)> = Vec::new();
+            edges.extend(self.edges_out_of(source).map(|(id, target)| (target, id)));
+            edges.sort_unstable();
+            reach.look_for_detours(self, source, &edges);
+            for edges in edges.chunk_by_mut(|a, b| a.0 == b.0) {
+                self.thin_out(edges, reach.has_detour[edges[0].0]);
             }
         }
     }
 
     /// Of the edges between two groups, keeps the oldest shortest one if there is no detour.
-    fn thin_out(&mut self, mut edges: Vec<ConstraintId>, has_detour: bool) {
+    fn thin_out(&mut self, edges: &mut [(usize, ConstraintId)], has_detour: bool) {
         // What cannot go counts as older than the rest: it makes the others superfluous.
-        edges.sort_unstable_by_key(|id| (self.can_go[id.index()], *id));
-        let shortest = edges
-            .iter()
-            .min_by_key(|id| &self.slack[id.index()])
-            .copied();
+        edges.sort_unstable_by_key(|&(_, id)| (self.can_go[id.index()], id));
+        let ids = || edges.iter().map(|&(_, id)| id);
+        let shortest = ids().min_by_key(|id| &self.slack[id.index()]);
         let needed = shortest.filter(|_| !has_detour);
-        for id in edges {
+        for id in ids() {
             if self.can_go[id.index()] && Some(id) != needed {
                 self.is_gone[id.index()] = true;
             }
@@ -195,7 +192,7 @@ impl<W: Weight> Search<'_, W> {
         members
             .flat_map(|&node| network.leaving(node))
             .filter(|id| !self.is_gone[id.index()])
-            .map(|&id| (id, self.group(network.constraint(id).to)))
+            .map(|id| (id, self.group(network.constraint(id).to)))
             .filter(move |&(_, target)| target != group)
     }
 }
@@ -228,19 +225,20 @@ impl<W: Weight> Reach<W> {
         &mut self,
         search: &Search<'_, W>,
         source: usize,
-        edges_by_target: &BTreeMap<usize, Vec<ConstraintId>>,
+        edges: &[(usize, ConstraintId)],
     ) {
         self.clear();
         self.is_final[source] = true;
         self.touched.push(source);
         let mut open: Vec<(W, usize)> = Vec::new();
-        for (&target, edges) in edges_by_target {
-            let lengths = edges.iter().map(|id| &search.slack[id.index()]);
+        for edges in edges.chunk_by(|a, b| a.0 == b.0) {
+            let target = edges[0].0;
+            let lengths = edges.iter().map(|(_, id)| &search.slack[id.index()]);
             let Some(shortest) = lengths.min() else {
                 continue;
             };
             self.reach(target, shortest.clone());
-            if edges.iter().any(|id| search.can_go[id.index()]) {
+            if edges.iter().any(|(_, id)| search.can_go[id.index()]) {
                 open.push((shortest.clone(), target));
             }
         }

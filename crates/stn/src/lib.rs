@@ -47,6 +47,7 @@
 mod consistency;
 mod consistent;
 mod implied;
+mod lists;
 mod minimal;
 mod network;
 mod paths;

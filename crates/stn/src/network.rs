@@ -4,7 +4,8 @@ use std::fmt;
 
 use elbowroom_num::Rational;
 
-use crate::{Schedule, Weight};
+use crate::lists::Lists;
+use crate::{Direction, Schedule, Weight};
 
 /// A time point of a network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -95,18 +96,18 @@ impl<W: Weight> Constraint<W> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network<W = Rational> {
     constraints: Vec<Constraint<W>>,
-    /// For each node, the constraints whose `from` it is, in the order they were added.
-    leaving: Vec<Vec<ConstraintId>>,
-    /// For each node, the constraints whose `to` it is, in the order they were added.
-    entering: Vec<Vec<ConstraintId>>,
+    /// For each node, the constraints whose `from` it is.
+    leaving: Lists,
+    /// For each node, the constraints whose `to` it is.
+    entering: Lists,
 }
 
 impl<W> Default for Network<W> {
     fn default() -> Self {
         Self {
             constraints: Vec::new(),
-            leaving: Vec::new(),
-            entering: Vec::new(),
+            leaving: Lists::default(),
+            entering: Lists::default(),
         }
     }
 }
@@ -121,31 +122,31 @@ impl<W: Weight> Network<W> {
     pub fn with_nodes(node_count: usize) -> Self {
         Self {
             constraints: Vec::new(),
-            leaving: vec![Vec::new(); node_count],
-            entering: vec![Vec::new(); node_count],
+            leaving: Lists::with_nodes(node_count),
+            entering: Lists::with_nodes(node_count),
         }
     }
 
     /// A new time point, free of constraints.
     pub fn add_node(&mut self) -> NodeId {
-        let node = NodeId::from_index(self.leaving.len());
-        self.leaving.push(Vec::new());
-        self.entering.push(Vec::new());
+        let node = NodeId::from_index(self.node_count());
+        self.leaving.add_node();
+        self.entering.add_node();
         node
     }
 
     /// Adds a constraint between two nodes of the network.
     pub fn add(&mut self, constraint: Constraint<W>) -> ConstraintId {
         let id = ConstraintId::from_index(self.constraints.len());
-        self.leaving[constraint.from.index()].push(id);
-        self.entering[constraint.to.index()].push(id);
+        self.leaving.push(constraint.from);
+        self.entering.push(constraint.to);
         self.constraints.push(constraint);
         id
     }
 
     /// How many nodes there are; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
     pub fn node_count(&self) -> usize {
-        self.leaving.len()
+        self.leaving.node_count()
     }
 
     /// All nodes.
@@ -168,14 +169,31 @@ impl<W: Weight> Network<W> {
         (0..self.constraints.len()).map(ConstraintId::from_index)
     }
 
-    /// The constraints whose `from` is `node`.
-    pub fn leaving(&self, node: NodeId) -> &[ConstraintId] {
-        &self.leaving[node.index()]
+    /// The constraints whose `from` is `node`, in the order they were added.
+    pub fn leaving(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
+        self.leaving.of(node)
     }
 
-    /// The constraints whose `to` is `node`.
-    pub fn entering(&self, node: NodeId) -> &[ConstraintId] {
-        &self.entering[node.index()]
+    /// The constraints whose `to` is `node`, in the order they were added.
+    pub fn entering(&self, node: NodeId) -> impl Iterator<Item = ConstraintId> + '_ {
+        self.entering.of(node)
+    }
+
+    /// The first constraint to follow from `node` in that direction.
+    pub(crate) fn first(&self, node: NodeId, direction: Direction) -> Option<ConstraintId> {
+        self.lists(direction).first(node)
+    }
+
+    /// The next one after `id`.
+    pub(crate) fn after(&self, id: ConstraintId, direction: Direction) -> Option<ConstraintId> {
+        self.lists(direction).after(id)
+    }
+
+    fn lists(&self, direction: Direction) -> &Lists {
+        match direction {
+            Direction::FromRoot => &self.leaving,
+            Direction::ToRoot => &self.entering,
+        }
     }
 
     /// The network without the constraints `left_out`; the others keep their order.
@@ -201,21 +219,22 @@ impl<W: Weight> Network<W> {
     ) -> Vec<NodeId> {
         let mut finished = Vec::with_capacity(self.node_count());
         let mut is_seen = vec![false; self.node_count()];
-        let mut path: Vec<(NodeId, usize)> = Vec::new();
+        // Nodes, each with the next constraint to look at.
+        let mut path: Vec<(NodeId, Option<ConstraintId>)> = Vec::new();
         for root in self.nodes() {
             if !std::mem::replace(&mut is_seen[root.index()], true) {
-                path.push((root, 0));
+                path.push((root, self.leaving.first(root)));
             }
             while let Some((node, next)) = path.last_mut() {
-                let Some(&id) = self.leaving(*node).get(*next) else {
+                let Some(id) = *next else {
                     finished.push(*node);
                     path.pop();
                     continue;
                 };
-                *next += 1;
+                *next = self.leaving.after(id);
                 let to = self.constraint(id).to;
                 if is_followed(id) && !std::mem::replace(&mut is_seen[to.index()], true) {
-                    path.push((to, 0));
+                    path.push((to, self.leaving.first(to)));
                 }
             }
         }
@@ -227,10 +246,9 @@ impl<W: Weight> Network<W> {
     /// No constraint that stays may mention a node that goes.
     pub(crate) fn truncate(&mut self, node_count: usize, constraint_count: usize) {
         while self.constraints.len() > constraint_count {
-            // The newest constraint is the last in both of its lists.
             if let Some(constraint) = self.constraints.pop() {
-                self.leaving[constraint.from.index()].pop();
-                self.entering[constraint.to.index()].pop();
+                self.leaving.pop(constraint.from);
+                self.entering.pop(constraint.to);
             }
         }
         self.leaving.truncate(node_count);

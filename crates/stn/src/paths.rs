@@ -110,11 +110,9 @@ impl<W: Weight> ConsistentNetwork<W> {
             if goal == Some(node) {
                 break;
             }
-            let edges = match direction {
-                Direction::FromRoot => network.leaving(node),
-                Direction::ToRoot => network.entering(node),
-            };
-            for &id in edges {
+            let mut next = network.first(node, direction);
+            while let Some(id) = next {
+                next = network.after(id, direction);
                 let constraint = network.constraint(id);
                 let far = direction.far_end(constraint);
                 if is_final[far.index()] {

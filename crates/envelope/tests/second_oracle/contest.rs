@@ -204,7 +204,13 @@ fn random_box(
             &parameter.nominal - &below,
             &parameter.nominal + &above,
         );
-        let wide = wide.intersection(&parameter.range);
+        let mut wide = wide.intersection(&parameter.range);
+        if dice.chance(6) {
+            wide.lower = parameter.range.lower.clone();
+        }
+        if dice.chance(6) {
+            wide.upper = parameter.range.upper.clone();
+        }
         if !wide.is_empty() {
             *interval = wide;
         }

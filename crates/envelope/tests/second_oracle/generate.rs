@@ -25,16 +25,19 @@ enum Theme {
     Rates,
     /// Conditional effects.
     Guards,
+    /// Parameters that stand in several places.
+    Shared,
 }
 
 impl Theme {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 7] = [
         Self::Mixed,
         Self::Mixed,
         Self::Mixed,
         Self::Timed,
         Self::Rates,
         Self::Guards,
+        Self::Shared,
     ];
 }
 
@@ -81,6 +84,9 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
     nominal.open_numbers();
     if nominal.dice.chance(75) {
         nominal.tighten();
+    }
+    if nominal.dice.chance(15) {
+        nominal.add_far_limit();
     }
     Some(nominal.case)
 }

@@ -222,6 +222,7 @@ impl Compiler<'_> {
                 }
             }
         }
+        guards.retain(|(_, condition)| !condition.is_trivial());
         Ok(guards)
     }
 

@@ -1,26 +1,42 @@
 //! Deciding whether a bad case is possible in a box.
 
-use std::collections::BTreeMap;
-
 use elbowroom_num::{Delta, Rational};
-use elbowroom_stn::{ConsistentNetwork, Constraint, NegativeCycle, NodeId as ClassId};
+use elbowroom_stn::{
+    Checkpoint, ConsistentNetwork, Constraint, NegativeCycle, Network, NodeId as ClassId, Schedule,
+    Weight,
+};
 
 use super::Counterexample;
 use super::certificate::Certificate;
+use super::corner::corners;
 use super::flow;
 use super::linear_program;
+use super::scale::{Exactly, Scale};
 use crate::decoupled::DecoupledEnvelope;
-use crate::linear::{Factor, Linear};
+use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Inequality};
 use crate::parameter::{ParameterId, Valuation};
-use crate::reduction::{BoxEnd, BoxNetwork, Reduction, Side};
+use crate::reduction::{BoxEnd, Reduction, Side};
 
 /// The schedules of a box: a network that can be tightened for a while.
-pub(crate) struct Schedules<'a> {
+pub(crate) struct Schedules<'a, S: Scale> {
     pub(crate) reduction: &'a Reduction,
     pub(crate) envelope: &'a DecoupledEnvelope,
-    pub(crate) network: ConsistentNetwork<Delta>,
+    network: ConsistentNetwork<S::Weight>,
+    scale: S,
+    /// A schedule without assumptions.
+    base: Schedule<S::Weight>,
+    /// For the first constraints of the network, a position in [`Reduction::edges`].
     edges: Vec<usize>,
+    /// The constraints after these: what is assumed.
+    assumed: Vec<Constraint<Delta>>,
+}
+
+/// A moment to come back to.
+pub(crate) struct Before<W> {
+    checkpoint: Checkpoint,
+    schedule: Schedule<W>,
+    assumed: usize,
 }
 
 /// Whether a bad case is possible.
@@ -34,16 +50,50 @@ pub(crate) enum Outcome {
     Unknown(ParameterId),
 }
 
-impl<'a> Schedules<'a> {
+impl<'a, S: Scale> Schedules<'a, S> {
     /// All schedules for values in the box, or `None` if there are none at all.
-    pub(crate) fn new(reduction: &'a Reduction, envelope: &'a DecoupledEnvelope) -> Option<Self> {
-        let BoxNetwork { network, edges } = reduction.network(envelope);
+    pub(crate) fn new(
+        reduction: &'a Reduction,
+        envelope: &'a DecoupledEnvelope,
+        scale: S,
+    ) -> Option<Self> {
+        let parameters = (0..envelope.intervals.len()).map(ParameterId::from);
+        let reaches: Vec<[Option<S::Weight>; 2]> = parameters
+            .map(|parameter| {
+                [Side::Lower, Side::Upper].map(|side| {
+                    let reach = BoxEnd { parameter, side }.reach(envelope)?;
+                    Some(scale.weight(&Delta::from(reach)))
+                })
+            })
+            .collect();
+        let mut network = Network::with_nodes(reduction.class_count());
+        let mut edges = Vec::with_capacity(reduction.edges().len());
+        for (index, edge) in reduction.edges().iter().enumerate() {
+            let constant = scale.weight(&Delta::from(edge.constant.clone()));
+            let bound = match edge.end {
+                None => constant,
+                Some(end) => match &reaches[end.parameter.index()][end.side as usize] {
+                    Some(reach) => constant.plus(reach),
+                    None => continue,
+                },
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound,
+            });
+            edges.push(index);
+        }
         let network = ConsistentNetwork::try_from(network).ok()?;
+        let base = network.schedule().clone();
         Some(Self {
             reduction,
             envelope,
             network,
+            scale,
+            base,
             edges,
+            assumed: Vec::new(),
         })
     }
 
@@ -52,48 +102,63 @@ impl<'a> Schedules<'a> {
     /// # Errors
     /// The proof that this leaves no schedule; the network is as before.
     pub(crate) fn assume(&mut self, difference: &Difference) -> Result<(), Certificate> {
-        let constraint = self.constraint(difference);
-        let bound = constraint.bound.clone();
-        self.network
-            .add(constraint)
-            .map(|_| ())
-            .map_err(|cycle| self.certificate(&cycle, &bound))
+        let constraint = constraint(self.reduction, difference);
+        let weighted = Constraint {
+            from: constraint.from,
+            to: constraint.to,
+            bound: self.scale.weight(&constraint.bound),
+        };
+        match self.network.add(weighted) {
+            Ok(_) => {
+                self.assumed.push(constraint);
+                Ok(())
+            }
+            Err(cycle) => Err(self.certificate(&cycle, &constraint.bound)),
+        }
     }
 
-    /// `to - from <= bound` over classes.
-    fn constraint(&self, difference: &Difference) -> Constraint<Delta> {
-        let (from, from_offset) = self.reduction.place(difference.from);
-        let (to, to_offset) = self.reduction.place(difference.to);
-        let bound = &difference.bound + &from_offset - &to_offset;
-        let bound = if difference.is_strict {
-            Delta::just_below(bound)
-        } else {
-            Delta::from(bound)
-        };
-        Constraint { from, to, bound }
+    /// The present moment, to come back to.
+    pub(crate) fn before(&self) -> Before<S::Weight> {
+        Before {
+            checkpoint: self.network.checkpoint(),
+            schedule: self.network.schedule().clone(),
+            assumed: self.assumed.len(),
+        }
+    }
+
+    /// Forgets what has been assumed since.
+    pub(crate) fn undo_to(&mut self, before: &Before<S::Weight>) {
+        self.network.undo_with(before.checkpoint, &before.schedule);
+        self.assumed.truncate(before.assumed);
+    }
+
+    /// Adds a time point: the moment of an over-all condition.
+    pub(crate) fn add_moment(&mut self) {
+        self.network.add_node();
     }
 
     /// The proof a negative cycle is; its first constraint, with bound `added`, was refused.
-    fn certificate(&self, cycle: &NegativeCycle<Delta>, added: &Delta) -> Certificate {
+    fn certificate(&self, cycle: &NegativeCycle<S::Weight>, added: &Delta) -> Certificate {
         let mut certificate = Certificate::default();
-        let constraints = self.network.network().constraints();
         for id in &cycle.constraints {
-            match (self.edges.get(id.index()), constraints.get(id.index())) {
-                (Some(&edge), _) => {
+            let assumed = id.index().checked_sub(self.edges.len());
+            match assumed.map(|index| self.assumed.get(index)) {
+                None => {
+                    let edge = self.edges[id.index()];
                     certificate.add_edge(&self.reduction.edges()[edge], &Rational::ONE);
                 }
-                (None, Some(constraint)) => {
+                Some(Some(constraint)) => {
                     certificate.add_constant(&constraint.bound, &Rational::ONE);
                 }
-                (None, None) => certificate.add_constant(added, &Rational::ONE),
+                Some(None) => certificate.add_constant(added, &Rational::ONE),
             }
         }
         certificate
     }
 
-    /// Whether all of the case can be at once, on top of what is assumed.
+    /// Whether all of the case can be at once.
     pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
-        let before = self.network.checkpoint();
+        let checkpoint = self.network.checkpoint();
         let mut refuted = None;
         for difference in &case.differences {
             if let Err(certificate) = self.assume(difference) {
@@ -102,7 +167,10 @@ impl<'a> Schedules<'a> {
             }
         }
         let outcome = refuted.unwrap_or_else(|| self.inequalities_possible(case));
-        self.network.undo_to(before);
+        if !self.assumed.is_empty() {
+            self.network.undo_with(checkpoint, &self.base);
+            self.assumed.clear();
+        }
         outcome
     }
 
@@ -122,7 +190,7 @@ impl<'a> Schedules<'a> {
             ids.dedup();
             ids
         };
-        let corners = self.corners(&multiplied);
+        let corners = corners(self.envelope, &multiplied);
         if let (Some(parameter), true) =
             (self.reduction.undecided_at_corners(case), corners.len() > 1)
         {
@@ -185,8 +253,7 @@ impl<'a> Schedules<'a> {
         if inequalities.len() <= 1 && self.reduction.coupled.is_empty() && !is_shared {
             return None;
         }
-        let assumed = &self.network.network().constraints()[self.edges.len()..];
-        linear_program::refute(self.reduction, self.envelope, assumed, inequalities)
+        linear_program::refute(self.reduction, self.envelope, &self.assumed, inequalities)
     }
 
     /// The proof that `expression <= 0` fails in all schedules, if it does.
@@ -208,15 +275,16 @@ impl<'a> Schedules<'a> {
             certificate.add_end(BoxEnd { parameter, side }, &coefficient.abs());
         }
         let flow = flow::cheapest(&self.network, &demand)?;
-        let constraints = self.network.network().constraints();
         for (index, amount) in flow
             .iter()
             .enumerate()
             .filter(|(_, amount)| amount.is_positive())
         {
-            match self.edges.get(index) {
-                Some(&edge) => certificate.add_edge(&self.reduction.edges()[edge], amount),
-                None => certificate.add_constant(&constraints[index].bound, amount),
+            if let Some(&edge) = self.edges.get(index) {
+                certificate.add_edge(&self.reduction.edges()[edge], amount);
+            } else {
+                let assumed = &self.assumed[index - self.edges.len()];
+                certificate.add_constant(&assumed.bound, amount);
             }
         }
         certificate
@@ -234,119 +302,19 @@ impl<'a> Schedules<'a> {
         demand[0] = -demand.iter().sum::<Rational>();
         (constant, demand)
     }
-
-    /// The combinations of ends of the parameters' intervals. Where an end is infinite, the
-    /// combination says what becomes of an expression as the parameter grows without bound.
-    fn corners(&self, parameters: &[ParameterId]) -> Vec<Corner> {
-        let mut corners = vec![Corner::default()];
-        for &parameter in parameters {
-            let interval = self.envelope.interval(parameter);
-            let zero = Rational::ZERO;
-            let (lower, upper) = (interval.lower.value(), interval.upper.value());
-            let mut ends = vec![lower.ok_or(false), upper.ok_or(true)];
-            if lower.is_none() && upper.is_none() {
-                // Where the factor vanishes, any value shows what is left.
-                ends.push(Ok(&zero));
-            }
-            ends.dedup();
-            corners = corners
-                .iter()
-                .flat_map(|corner| {
-                    ends.iter().map(move |end| {
-                        let mut corner = corner.clone();
-                        match *end {
-                            Ok(value) => {
-                                corner.values.insert(parameter, value.clone());
-                            }
-                            Err(is_upper) => corner.infinite.push((parameter, is_upper)),
-                        }
-                        corner
-                    })
-                })
-                .collect();
-        }
-        corners
-    }
 }
 
-/// Values for multiplied parameters.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Corner {
-    values: BTreeMap<ParameterId, Rational>,
-    /// Parameters at an infinite end, and whether it is the upper one.
-    infinite: Vec<(ParameterId, bool)>,
-}
-
-impl Corner {
-    /// The inequality with these values put in.
-    fn apply(&self, inequality: &Inequality) -> Inequality {
-        let mut expression = inequality.expression.with_values(&self.values);
-        let mut is_strict = inequality.is_strict;
-        for &(parameter, is_upper) in &self.infinite {
-            // As the parameter grows, its coefficient alone decides. The expression gets below
-            // zero if the coefficient can be negative (for a parameter that goes down: positive).
-            let coefficient = coefficient_of(&expression, parameter);
-            if coefficient == Linear::default() {
-                continue;
-            }
-            let sign = Rational::from(if is_upper { 1 } else { -1 });
-            expression = coefficient.scaled(&sign);
-            is_strict = true;
-        }
-        Inequality {
-            expression,
-            is_strict,
-        }
-    }
-}
-
-impl Corner {
-    /// The valuation with the parameters at infinite ends so far out that it will do.
-    ///
-    /// As in [`apply`](Self::apply), the first of them outgrows the second, and so on.
-    fn far_out(
-        &self,
-        mut valuation: Valuation,
-        will_do: &dyn Fn(&Valuation) -> bool,
-    ) -> Option<Valuation> {
-        let mut step = Rational::ONE;
-        for _ in 0..MOST_DOUBLINGS {
-            let mut reach = step.clone();
-            for &(parameter, is_upper) in self.infinite.iter().rev() {
-                valuation[parameter.index()] = if is_upper { reach.clone() } else { -&reach };
-                reach *= &step;
-            }
-            if will_do(&valuation) {
-                return Some(valuation);
-            }
-            step = &step + &step;
-        }
-        None
-    }
-}
-
-/// How often values are doubled to show what becomes of an expression as they grow.
-const MOST_DOUBLINGS: usize = 256;
-
-/// The factor of a parameter in an expression.
-fn coefficient_of(expression: &Linear, parameter: ParameterId) -> Linear {
-    let mut coefficient = Linear::default();
-    if let Some(constant) = expression.parameters.get(&parameter) {
-        coefficient.constant = constant.clone();
-    }
-    for (&(first, factor), amount) in &expression.products {
-        match factor {
-            Factor::Time(node) if first == parameter => coefficient.add_time(node, amount),
-            Factor::Parameter(second) if first == parameter => {
-                coefficient.add_scaled(&Linear::parameter(second), amount);
-            }
-            Factor::Parameter(second) if second == parameter => {
-                coefficient.add_scaled(&Linear::parameter(first), amount);
-            }
-            Factor::Time(_) | Factor::Parameter(_) => {}
-        }
-    }
-    coefficient
+/// `to - from <= bound` over classes.
+fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delta> {
+    let (from, from_offset) = reduction.place(difference.from);
+    let (to, to_offset) = reduction.place(difference.to);
+    let bound = &difference.bound + &from_offset - &to_offset;
+    let bound = if difference.is_strict {
+        Delta::just_below(bound)
+    } else {
+        Delta::from(bound)
+    };
+    Constraint { from, to, bound }
 }
 
 /// Calls `add` with each class and its share of the expression's times, and returns the constant
@@ -373,11 +341,12 @@ pub(crate) fn witness(
     case: &BadCase,
     least: Option<&Linear>,
 ) -> Option<Counterexample> {
-    let schedules = Schedules::new(reduction, envelope)?;
+    // Without any schedule there is none to show.
+    Schedules::new(reduction, envelope, Exactly)?;
     let assumed: Vec<_> = case
         .differences
         .iter()
-        .map(|d| schedules.constraint(d))
+        .map(|d| constraint(reduction, d))
         .collect();
     let multiplied: Vec<ParameterId> = case
         .inequalities
@@ -389,8 +358,7 @@ pub(crate) fn witness(
         (None, [inequality]) => Some(inequality.expression.clone()),
         (None, _) => None,
     };
-    schedules
-        .corners(&multiplied)
+    corners(envelope, &multiplied)
         .into_iter()
         .find_map(|corner| {
             let fixed: Vec<Inequality> =

@@ -8,15 +8,18 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use elbowroom_num::{Delta, Rational};
-use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId};
+use elbowroom_num::Rational;
+use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Weight};
 
 /// How much flows along each constraint, by its number.
 pub(crate) type Flow = Vec<Rational>;
 
 /// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to
 /// zero), or `None` if there is none: then the expression has no greatest value.
-pub(crate) fn cheapest(network: &ConsistentNetwork<Delta>, demand: &[Rational]) -> Option<Flow> {
+pub(crate) fn cheapest<W: Weight>(
+    network: &ConsistentNetwork<W>,
+    demand: &[Rational],
+) -> Option<Flow> {
     let mut search = Search {
         network,
         flow: vec![Rational::ZERO; network.network().constraints().len()],
@@ -54,24 +57,24 @@ enum Step {
     Back(ConstraintId),
 }
 
-struct Search<'a> {
-    network: &'a ConsistentNetwork<Delta>,
+struct Search<'a, W> {
+    network: &'a ConsistentNetwork<W>,
     flow: Flow,
     /// Invariant: no residual step is cheaper than the difference of its nodes' potentials.
-    potential: Vec<Delta>,
+    potential: Vec<W>,
 }
 
-impl Search<'_> {
+impl<W: Weight> Search<'_, W> {
     /// The node with open demand nearest to `source`, and the way there. Dijkstra's algorithm with
     /// reduced costs; the potentials are brought up to date.
     fn nearest(&mut self, source: NodeId, demand: &[Rational]) -> Option<(NodeId, Vec<Step>)> {
         let network = self.network.network();
         let count = network.node_count();
-        let mut distances: Vec<Option<Delta>> = vec![None; count];
+        let mut distances: Vec<Option<W>> = vec![None; count];
         let mut steps: Vec<Option<(Step, NodeId)>> = vec![None; count];
         let mut is_final = vec![false; count];
-        let mut queue = BinaryHeap::from([Reverse((Delta::ZERO, source))]);
-        distances[source.index()] = Some(Delta::ZERO);
+        let mut queue = BinaryHeap::from([Reverse((W::zero(), source))]);
+        distances[source.index()] = Some(W::zero());
         let mut sink = None;
         while let Some(Reverse((distance, node))) = queue.pop() {
             if std::mem::replace(&mut is_final[node.index()], true) {
@@ -83,24 +86,23 @@ impl Search<'_> {
             }
             let along = network
                 .leaving(node)
-                .iter()
-                .map(|&id| (Step::Along(id), network.constraint(id).to));
+                .map(|id| (Step::Along(id), network.constraint(id).to));
             let back = network
                 .entering(node)
-                .iter()
                 .filter(|id| self.flow[id.index()].is_positive())
-                .map(|&id| (Step::Back(id), network.constraint(id).from));
+                .map(|id| (Step::Back(id), network.constraint(id).from));
             for (step, far) in along.chain(back) {
                 if is_final[far.index()] {
                     continue;
                 }
                 let cost = match step {
                     Step::Along(id) => network.constraint(id).bound.clone(),
-                    Step::Back(id) => -&network.constraint(id).bound,
+                    Step::Back(id) => network.constraint(id).bound.negated(),
                 };
-                let reduced =
-                    &(&cost + &self.potential[node.index()]) - &self.potential[far.index()];
-                let candidate = &distance + &reduced;
+                let reduced = cost
+                    .plus(&self.potential[node.index()])
+                    .minus(&self.potential[far.index()]);
+                let candidate = distance.plus(&reduced);
                 if distances[far.index()]
                     .as_ref()
                     .is_none_or(|old| candidate < *old)
@@ -116,7 +118,7 @@ impl Search<'_> {
             let moved = distance
                 .as_ref()
                 .map_or(&reach, |distance| distance.min(&reach));
-            *potential = &*potential + moved;
+            *potential = potential.plus(moved);
         }
         let mut path = Vec::new();
         let mut node = sink;

@@ -1,10 +1,10 @@
 //! The proof that an over-all condition holds: a tree over the places of its moment.
 
 use elbowroom_model::Task;
-use elbowroom_stn::Checkpoint;
 
 use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
+use super::scale::Scale;
 use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
 use crate::parameter::{ParameterId, ParametrizedPlan};
@@ -40,11 +40,11 @@ impl Proof {
 }
 
 /// Looks for a moment at which an over-all condition is false.
-pub(crate) struct Prover<'a, 'b> {
+pub(crate) struct Prover<'a, 'b, S: Scale> {
     pub(crate) task: &'a Task,
     pub(crate) plan: &'a ParametrizedPlan,
     pub(crate) over_all: &'a OverAll,
-    pub(crate) schedules: &'b mut Schedules<'a>,
+    pub(crate) schedules: &'b mut Schedules<'a, S>,
     /// The differences assumed so far, for the counterexample.
     assumed: Vec<Difference>,
     places: usize,
@@ -53,12 +53,12 @@ pub(crate) struct Prover<'a, 'b> {
 /// A proof, or how the condition can be false.
 pub(crate) type Attempt = Result<Proof, BadCase>;
 
-impl<'a, 'b> Prover<'a, 'b> {
+impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
     pub(crate) fn new(
         task: &'a Task,
         plan: &'a ParametrizedPlan,
         over_all: &'a OverAll,
-        schedules: &'b mut Schedules<'a>,
+        schedules: &'b mut Schedules<'a, S>,
     ) -> Self {
         Self {
             task,
@@ -76,8 +76,8 @@ impl<'a, 'b> Prover<'a, 'b> {
         old: Option<&Proof>,
         moved: Option<BoxEnd>,
     ) -> Result<Attempt, Refusal> {
-        let before = self.schedules.network.checkpoint();
-        self.schedules.network.add_node();
+        let before = self.schedules.before();
+        self.schedules.add_moment();
         let inside = [
             Difference::before(self.over_all.start, self.over_all.moment),
             Difference::before(self.over_all.moment, self.over_all.end),
@@ -96,7 +96,7 @@ impl<'a, 'b> Prover<'a, 'b> {
             Some(attempt) => attempt,
             None => self.place(0, &mut Vec::new(), old, moved)?,
         };
-        self.schedules.network.undo_to(before);
+        self.schedules.undo_to(&before);
         Ok(attempt)
     }
 
@@ -159,7 +159,7 @@ impl<'a, 'b> Prover<'a, 'b> {
         old: Option<&Proof>,
         moved: Option<BoxEnd>,
     ) -> Result<Attempt, Refusal> {
-        let checkpoint: Checkpoint = self.schedules.network.checkpoint();
+        let before = self.schedules.before();
         if let Err(certificate) = self.schedules.assume(&difference) {
             return Ok(Ok(Proof::NoMoment(certificate)));
         }
@@ -168,7 +168,7 @@ impl<'a, 'b> Prover<'a, 'b> {
         if attempt.is_ok() {
             self.assumed.pop();
         }
-        self.schedules.network.undo_to(checkpoint);
+        self.schedules.undo_to(&before);
         Ok(attempt)
     }
 

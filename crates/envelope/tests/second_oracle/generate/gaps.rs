@@ -56,6 +56,18 @@ impl Nominal<'_> {
         }
     }
 
+    /// A limit that changes nothing but the size of the numbers: machine integers no longer do.
+    pub(super) fn add_far_limit(&mut self) {
+        let nodes = self.nodes();
+        let to = *self.dice.pick(&nodes[1..]);
+        self.case.gaps.push(Gap {
+            from: Node::Zero,
+            to,
+            lower: Bound::Infinite,
+            upper: Bound::Finite(Rational::from(i64::MAX / 3)),
+        });
+    }
+
     /// A constraint so many halves wide around the nominal difference, or without end.
     fn add_gap(&mut self, from: Node, to: Node, width: i64, least: Option<Rational>) {
         let gap = &self.time(to) - &self.time(from);

@@ -10,10 +10,16 @@ use crate::case::Gap;
 use crate::numbers;
 
 impl Nominal<'_> {
-    /// Makes one to four numbers parameters.
+    /// Makes one to four numbers parameters, or, where parameters are to be shared, puts one or
+    /// two of them in up to five places.
     pub(super) fn open_numbers(&mut self) {
-        for _ in 0..*self.dice.pick(&[1, 1, 2, 2, 3, 4]) {
+        let count = match self.theme {
+            Theme::Shared => *self.dice.pick(&[2, 3, 4, 5]),
+            _ => *self.dice.pick(&[1, 1, 2, 2, 3, 4]),
+        };
+        for _ in 0..count {
             let which = match self.theme {
+                Theme::Shared => *self.dice.pick(&[0, 4, 4, 9, 9, 9, 9]),
                 Theme::Timed if self.dice.chance(60) => 8,
                 Theme::Rates if self.dice.chance(70) => 5,
                 _ => self.dice.below(10),

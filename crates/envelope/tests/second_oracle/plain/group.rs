@@ -116,12 +116,13 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a node's time depends on a parameter.
+    /// Whether the time of a timed initial depends on a parameter: no constraint fixes it.
     fn is_open(&self, node: usize) -> bool {
-        self.plan.plan.constraints.iter().any(|constraint| {
+        !self.plan.plan.constraints.iter().any(|constraint| {
             constraint.to.index() == node
                 && constraint.from == NodeId::ZERO
-                && matches!(constraint.upper, Bound::Parameter(_))
+                && constraint.lower == constraint.upper
+                && matches!(constraint.upper, Bound::Finite(_))
         })
     }
 
