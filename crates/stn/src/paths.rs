@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use elbowroom_num::Rational;
 
-use crate::{ConsistentNetwork, Constraint, ConstraintId, NodeId, Schedule, Weight};
+use crate::{ConsistentNetwork, Constraint, ConstraintId, Network, NodeId, Schedule, Weight};
 
 /// Which end of the paths is the same for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,11 @@ impl<W: Weight> ShortestPaths<W> {
     /// schedule; `None` when there is none.
     pub fn distance(&self, node: NodeId) -> Option<&W> {
         self.distances[node.index()].as_ref()
+    }
+
+    /// The constraint next to the node on its path.
+    pub(crate) fn step(&self, node: NodeId) -> Option<ConstraintId> {
+        self.steps[node.index()].map(|(id, _)| id)
     }
 
     /// The constraints whose sum is the bound, in the order of the path from its begin to its
@@ -110,11 +115,7 @@ impl<W: Weight> ConsistentNetwork<W> {
             if goal == Some(node) {
                 break;
             }
-            let edges = match direction {
-                Direction::FromRoot => network.leaving(node),
-                Direction::ToRoot => network.entering(node),
-            };
-            for &id in edges {
+            for &id in direction.edges(network, node) {
                 let constraint = network.constraint(id);
                 let far = direction.far_end(constraint);
                 if is_final[far.index()] {
@@ -147,14 +148,22 @@ impl<W: Weight> ConsistentNetwork<W> {
 }
 
 impl Direction {
-    fn far_end<W>(self, constraint: &Constraint<W>) -> NodeId {
+    /// The edges along which paths go on from `node`, away from the root.
+    pub(crate) fn edges<W: Weight>(self, network: &Network<W>, node: NodeId) -> &[ConstraintId] {
+        match self {
+            Direction::FromRoot => network.leaving(node),
+            Direction::ToRoot => network.entering(node),
+        }
+    }
+
+    pub(crate) fn far_end<W>(self, constraint: &Constraint<W>) -> NodeId {
         match self {
             Direction::FromRoot => constraint.to,
             Direction::ToRoot => constraint.from,
         }
     }
 
-    fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
+    pub(crate) fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
         match self {
             Direction::FromRoot => distance.minus(&schedule[node]),
             Direction::ToRoot => distance.plus(&schedule[node]),
