@@ -7,8 +7,8 @@ use elbowroom_num::Rational;
 pub trait Planner {
     /// A plan from here. See [`Situation`] for what such a plan looks like.
     ///
-    /// The plan's facts and fluents are those of `task`.
-    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
+    /// The plan's facts and fluents are those of `task`, whose table may grow for that.
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned;
 }
 
 /// What a planner answers, and how long it took.
@@ -39,7 +39,7 @@ pub enum PlanAnswer {
 pub struct NoPlanner;
 
 impl Planner for NoPlanner {
-    fn plan(&mut self, _task: &Task, _situation: &Situation) -> Planned {
+    fn plan(&mut self, _task: &mut Task, _situation: &Situation) -> Planned {
         Planned {
             answer: PlanAnswer::NotFound {
                 why: "there is no planner in this run".to_owned(),

@@ -1,6 +1,8 @@
 //! The record of a run: everything that came in and went out, in order.
 
-use elbowroom_model::{Situation, TimeTriggeredPlan};
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::event::{Command, Observation};
@@ -13,6 +15,9 @@ pub trait Recorder {
     /// One entry. What is kept must be kept before this returns, so that a run that is cut short
     /// leaves its record.
     fn record(&mut self, entry: &Entry<'_>);
+
+    /// The table of facts and fluents has grown; those known keep their numbers.
+    fn know(&mut self, _task: &Arc<Task>) {}
 }
 
 /// Keeps nothing.

@@ -1,5 +1,8 @@
 //! Where plans are executed: a port.
 
+use std::sync::Arc;
+
+use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
@@ -44,6 +47,10 @@ pub trait World {
     ) -> Result<Vec<Observation>, WorldError> {
         Ok(Vec::new())
     }
+
+    /// The table of facts and fluents has grown, because a plan mentions new ones. Those known
+    /// keep their numbers.
+    fn know(&mut self, _task: &Arc<Task>) {}
 }
 
 /// Time that has passed.

@@ -1,6 +1,8 @@
 //! From one plan to the next.
 
-use elbowroom_model::{RunningAction, Situation};
+use std::sync::Arc;
+
+use elbowroom_model::{RunningAction, Situation, Task};
 use elbowroom_num::Interval;
 
 use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
@@ -53,7 +55,16 @@ impl Run<'_> {
             reason,
             situation: &situation,
         });
-        let planned = self.ports.planner.plan(&self.task, &situation);
+        let mut task = Task::clone(&self.task);
+        let planned = self.ports.planner.plan(&mut task, &situation);
+        if (task.fact_count(), task.fluent_count())
+            != (self.task.fact_count(), self.task.fluent_count())
+        {
+            self.task = Arc::new(task);
+            self.belief.know(Arc::clone(&self.task));
+            self.ports.world.know(&self.task);
+            self.ports.recorder.know(&self.task);
+        }
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
