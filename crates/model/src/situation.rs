@@ -1,9 +1,12 @@
 //! A problem in mid-execution.
 
+use std::sync::Arc;
+
 use elbowroom_num::{Interval, Rational};
 
-use crate::ground::Action;
+use crate::ground::{Action, Change, FactId, FluentId};
 use crate::plan::{Step, TimeTriggeredPlan};
+use crate::problem::{FunctionId, ObjectId, PredicateId, TimedChange, TimedInitial};
 use crate::task::{State, Task};
 
 /// Where things stand at one moment, and what is still under way.
@@ -47,6 +50,77 @@ impl Situation {
             state: task.initial().clone(),
             running: Vec::new(),
         }
+    }
+}
+
+impl Task {
+    /// A task for finding out what can be reached from a situation, with the same facts and
+    /// fluents under the same numbers: [`ground`](crate::reachability::ground) finds the actions
+    /// that some plan from there can start.
+    ///
+    /// It begins with the situation's state. In its [`Task::problem`], though not in
+    /// [`Task::timed`], what the running actions may do is listed among the timed initials.
+    #[must_use]
+    pub fn beginning_at(&self, situation: &Situation) -> Self {
+        let mut problem = (*self.problem).clone();
+        let facts = situation.state.facts.iter();
+        problem.initial_facts = facts.map(|&fact| self.symbol_of_fact(fact)).collect();
+        let values = situation.state.values.iter();
+        problem.initial_values = values
+            .map(|(&fluent, value)| {
+                let (function, arguments) = self.symbol_of_fluent(fluent);
+                (function, arguments, value.clone())
+            })
+            .collect();
+        problem.timed.retain(|timed| timed.time > situation.time);
+        let bodies = situation
+            .running
+            .iter()
+            .filter_map(|running| running.action.durative());
+        for body in bodies {
+            let at_end = body.end.effects.iter().map(|effect| match &effect.change {
+                Change::Add(fact) => {
+                    let (predicate, arguments) = self.symbol_of_fact(*fact);
+                    TimedChange::Add(predicate, arguments)
+                }
+                Change::Delete(fact) => {
+                    let (predicate, arguments) = self.symbol_of_fact(*fact);
+                    TimedChange::Delete(predicate, arguments)
+                }
+                Change::Update { fluent, .. } => self.some_value_of(*fluent),
+            });
+            let meanwhile = body
+                .continuous
+                .iter()
+                .map(|effect| self.some_value_of(effect.fluent));
+            let changes: Vec<TimedChange> = at_end.chain(meanwhile).collect();
+            problem
+                .timed
+                .extend(changes.into_iter().map(|change| TimedInitial {
+                    time: situation.time.clone(),
+                    change,
+                }));
+        }
+        let mut task = self.clone();
+        task.problem = Arc::new(problem);
+        task.initial = situation.state.clone();
+        task
+    }
+
+    fn symbol_of_fact(&self, fact: FactId) -> (PredicateId, Vec<ObjectId>) {
+        let symbol = self.facts.get_index(fact.index());
+        symbol.expect("a fact of this task").clone()
+    }
+
+    fn symbol_of_fluent(&self, fluent: FluentId) -> (FunctionId, Vec<ObjectId>) {
+        let symbol = self.fluents.get_index(fluent.index());
+        symbol.expect("a fluent of this task").clone()
+    }
+
+    /// Stands for any change of a fluent: whether it changes is all that reachability asks.
+    fn some_value_of(&self, fluent: FluentId) -> TimedChange {
+        let (function, arguments) = self.symbol_of_fluent(fluent);
+        TimedChange::Assign(function, arguments, Rational::ZERO)
     }
 }
 

@@ -1,0 +1,298 @@
+//! The embedded temporal planner.
+//!
+//! Forward search over the starts and ends of actions, in the line of CRIKEY3, POPF and COLIN
+//! (Coles, Fox, Long & Smith, AAAI 2008; Coles, Coles, Fox & Long, ICAPS 2010 and IJCAI 2009),
+//! with the queues of LAMA (Richter & Westphal, JAIR 2010).
+//!
+//! The way through the module:
+//!
+//! 1. [`plan`] grounds the task from the situation on, and compiles it (`compile`): small
+//!    numbers for facts and fluents, ticks for time, and for each happening the list of what it
+//!    must keep away from.
+//! 2. `search` chooses happenings one after the other. Only what interferes keeps that order in
+//!    time, so a sequence of choices stands for a plan in which much happens side by side. The
+//!    times that are not settled form a small network (`network`).
+//! 3. `relaxed` estimates how far the goal is.
+//! 4. `extract` turns the choices into a plan with times, and shows it to the judge.
+
+mod answer;
+mod apply;
+mod compile;
+mod extract;
+mod formula;
+mod hash;
+mod metric;
+mod network;
+mod relaxed;
+mod search;
+mod state;
+mod time;
+
+use std::ops::ControlFlow;
+
+use elbowroom_model::problem::Metric;
+use elbowroom_model::reachability::{self, Grounding};
+use elbowroom_model::validate::Report;
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
+pub use compile::Unsupported;
+
+use apply::Step;
+use compile::Compiled;
+use search::{Search, Style, Turn};
+use time::NEVER;
+
+/// How many states are looked at between two reports.
+const REPORT_EVERY: u64 = 256;
+
+/// How many states the hasty search may look at before the complete one gets its first turns.
+const HASTE: u64 = 20_000;
+
+/// Finds a plan from `situation`.
+///
+/// `observe` is called now and then, and for each better plan; with `Break` the search ends, and
+/// the best plan so far is the answer. Every plan has been found valid by
+/// [`elbowroom_model::validate_from`], exactly, with the given ε. The same input gives the same
+/// answer, and the same sequence of reports.
+pub fn plan(
+    task: &mut Task,
+    situation: &Situation,
+    settings: &Settings,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
+    let mut progress = Progress::default();
+    if observe(&progress).is_break() {
+        return none_found(Stopped::Interrupted, progress.counts);
+    }
+    let mut continued;
+    let grounded = if *situation == Situation::initial(task) {
+        &mut *task
+    } else {
+        continued = task.beginning_at(situation);
+        &mut continued
+    };
+    let limits = reachability::Settings::default();
+    let grounding = match reachability::ground(grounded, &limits) {
+        reachability::Answer::Complete(grounding) => grounding,
+        reachability::Answer::LimitReached => {
+            return none_found(Stopped::OutOfMemory, progress.counts);
+        }
+    };
+    progress.counts.actions = grounding.actions.len() as u64;
+    if let Some(proof) = unreachable(grounded, &grounding) {
+        return Answer::Unsolvable {
+            proof,
+            counts: progress.counts,
+        };
+    }
+    let compiled = compile::compile(grounded, &grounding, situation, &settings.epsilon);
+    let compiled = match compiled {
+        Ok(compiled) => compiled,
+        Err(unsupported) => return Answer::Unsupported(unsupported),
+    };
+    Planner {
+        task,
+        situation,
+        settings,
+        observe,
+        compiled: &compiled,
+        progress,
+        best: None,
+    }
+    .run()
+}
+
+fn none_found(stopped: Stopped, counts: Counts) -> Answer {
+    Answer::NoneFound { stopped, counts }
+}
+
+fn unreachable(task: &Task, grounding: &Grounding) -> Option<Proof> {
+    if grounding.unreachable_goals.is_empty() && !grounding.goal.is_contradiction() {
+        return None;
+    }
+    let reasons = grounding
+        .unreachable_goals
+        .iter()
+        .map(|goal| format!("`{}` cannot become true", task.describe_condition(goal)));
+    Some(Proof::Unreachable(reasons.collect()))
+}
+
+/// One run.
+struct Planner<'a> {
+    task: &'a mut Task,
+    situation: &'a Situation,
+    settings: &'a Settings,
+    observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    compiled: &'a Compiled,
+    progress: Progress,
+    best: Option<Found>,
+}
+
+impl Planner<'_> {
+    fn run(mut self) -> Answer {
+        let compiled = self.compiled;
+        let mut hasty = Search::new(
+            compiled,
+            Style {
+                is_hasty: true,
+                variants: 4,
+            },
+        );
+        let mut complete = Search::new(
+            compiled,
+            Style {
+                is_hasty: false,
+                variants: usize::MAX,
+            },
+        );
+        let mut budget = HASTE;
+        let stopped = loop {
+            match self.work(&mut hasty, Phase::Hasty, budget) {
+                Outcome::Stop(stopped) => break stopped,
+                Outcome::Over if !hasty.is_incomplete() => break Stopped::Exhausted,
+                Outcome::Over => {
+                    if let Outcome::Stop(stopped) =
+                        self.work(&mut complete, Phase::Complete, u64::MAX)
+                    {
+                        break stopped;
+                    }
+                    break Stopped::Exhausted;
+                }
+                Outcome::BudgetSpent => {}
+            }
+            match self.work(&mut complete, Phase::Complete, budget) {
+                Outcome::Stop(stopped) => break stopped,
+                Outcome::Over => break Stopped::Exhausted,
+                Outcome::BudgetSpent => {}
+            }
+            budget = budget.saturating_mul(2);
+        };
+        let is_complete = |search: &Search<'_>| !search.is_incomplete();
+        let is_proof = stopped == Stopped::Exhausted
+            && compiled.is_exact
+            && compiled.gap.is_none()
+            && (is_complete(&hasty) || is_complete(&complete));
+        let counts = self.progress.counts;
+        match self.best {
+            Some(found) => Answer::Plan {
+                found,
+                stopped,
+                counts,
+            },
+            None if is_proof => Answer::Unsolvable {
+                proof: Proof::Exhausted {
+                    states: counts.evaluated,
+                },
+                counts,
+            },
+            None => none_found(stopped, counts),
+        }
+    }
+
+    /// Lets a search look at so many states.
+    fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
+        self.progress.phase = phase;
+        let before = (self.progress.counts, search.counts());
+        for turn in 0..budget {
+            match search.turn() {
+                Turn::Over => return Outcome::Over,
+                Turn::Nothing => {}
+                Turn::Goal(steps) => {
+                    self.count(&before, search);
+                    if let Some(outcome) = self.consider(&steps, search) {
+                        return outcome;
+                    }
+                }
+            }
+            if turn % REPORT_EVERY == REPORT_EVERY - 1 {
+                self.count(&before, search);
+                if (self.observe)(&self.progress).is_break() {
+                    return Outcome::Stop(Stopped::Interrupted);
+                }
+                if self.progress.counts.memory > self.settings.max_memory {
+                    return Outcome::Stop(Stopped::OutOfMemory);
+                }
+            }
+        }
+        self.count(&before, search);
+        Outcome::BudgetSpent
+    }
+
+    fn count(&mut self, before: &(Counts, Counts), search: &Search<'_>) {
+        let (counts, start, now) = (&mut self.progress.counts, before.1, search.counts());
+        counts.expanded = before.0.expanded + now.expanded - start.expanded;
+        counts.generated = before.0.generated + now.generated - start.generated;
+        counts.evaluated = before.0.evaluated + now.evaluated - start.evaluated;
+        counts.memory = before.0.memory + now.memory - start.memory;
+    }
+
+    /// Looks at the choices that a search takes for a plan.
+    fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
+        let judged = extract::plan_of(
+            self.task,
+            self.situation,
+            self.compiled,
+            steps,
+            self.settings,
+        );
+        let Some((plan, report)) = judged else {
+            search.has_lost = true;
+            return None;
+        };
+        let found = self.value(plan, &report);
+        if self
+            .best
+            .as_ref()
+            .is_some_and(|best| best.value <= found.value)
+        {
+            return None;
+        }
+        self.progress.best = Some(found.value.clone());
+        self.progress.plan = Some(found.clone());
+        let is_makespan = found.value == found.makespan;
+        let (end, _) = self.compiled.scale.floor(&found.makespan);
+        self.best = Some(found);
+        let flow = (self.observe)(&self.progress);
+        self.progress.plan = None;
+        if flow.is_break() {
+            return Some(Outcome::Stop(Stopped::Interrupted));
+        }
+        if self.settings.first_plan_only {
+            return Some(Outcome::Stop(Stopped::FirstPlan));
+        }
+        if is_makespan {
+            search.set_horizon((end - 1).min(NEVER));
+        }
+        None
+    }
+
+    fn value(&self, plan: TimeTriggeredPlan, report: &Report) -> Found {
+        let makespan = report.makespan.clone();
+        let metric = match self.settings.objective {
+            Objective::Makespan => None,
+            Objective::Metric => self.task.problem().metric.clone(),
+        };
+        let value = metric
+            .and_then(|metric| self.metric(&metric, report))
+            .unwrap_or_else(|| makespan.clone());
+        Found {
+            plan,
+            makespan,
+            value,
+        }
+    }
+
+    /// The metric's value at the end of a plan, negated if more is better.
+    fn metric(&self, metric: &Metric, report: &Report) -> Option<Rational> {
+        let value = metric::metric_value(self.task, metric.expression.as_ref()?, report)?;
+        Some(if metric.maximize { -value } else { value })
+    }
+}
+
+enum Outcome {
+    Stop(Stopped),
+    Over,
+    BudgetSpent,
+}

@@ -1,0 +1,167 @@
+//! What is asked of the planner, and what it answers.
+
+use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_num::Rational;
+
+use super::compile::Unsupported;
+
+/// How to plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// How far apart interfering happenings must be, in the domain's unit of time; positive.
+    pub epsilon: Rational,
+    /// About how many bytes the search may keep. When they are used up, the search ends as if it
+    /// had been interrupted.
+    pub max_memory: usize,
+    /// Whether to stop at the first plan, or to go on for better ones until interrupted or until
+    /// there is none.
+    pub first_plan_only: bool,
+    /// What makes a plan better than another.
+    pub objective: Objective,
+}
+
+/// What makes a plan better than another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Objective {
+    /// The problem's metric where it has one that can be evaluated, else the makespan.
+    #[default]
+    Metric,
+    /// The makespan, whatever the problem says.
+    Makespan,
+}
+
+impl Default for Settings {
+    /// ε is 0.001, memory 2 GiB, any number of plans, the problem's own metric.
+    fn default() -> Self {
+        Self {
+            epsilon: Rational::new(1, 1000),
+            max_memory: 2 << 30,
+            first_plan_only: false,
+            objective: Objective::Metric,
+        }
+    }
+}
+
+/// How far the search is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// What is being done.
+    pub phase: Phase,
+    /// States made and looked at.
+    pub counts: Counts,
+    /// The best plan so far, exactly when this report is about a new best plan.
+    pub plan: Option<Found>,
+    /// The objective's value of the best plan so far; less is better (what is to be maximized is
+    /// negated).
+    pub best: Option<Rational>,
+}
+
+/// What the planner is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Phase {
+    /// Finding out which actions are possible at all.
+    #[default]
+    Grounding,
+    /// Searching for a first plan, quickly and not everywhere.
+    Hasty,
+    /// Searching everywhere.
+    Complete,
+    /// Looking for better plans.
+    Improving,
+}
+
+/// Statistics of a search.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Ground actions.
+    pub actions: u64,
+    /// States whose successors were listed.
+    pub expanded: u64,
+    /// Successors listed.
+    pub generated: u64,
+    /// States made and estimated.
+    pub evaluated: u64,
+    /// About how many bytes the states take.
+    pub memory: usize,
+}
+
+/// A valid plan, and what it is worth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The plan. From a situation, its first steps continue what is under way.
+    pub plan: TimeTriggeredPlan,
+    /// The time of its last happening, on the task's clock.
+    pub makespan: Rational,
+    /// The objective's value; less is better (what is to be maximized is negated).
+    pub value: Rational,
+}
+
+/// The answer to a planning problem.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// A plan. The judge has found it valid.
+    Plan {
+        /// The best plan found.
+        found: Found,
+        /// Why the search did not go on.
+        stopped: Stopped,
+        /// Statistics.
+        counts: Counts,
+    },
+    /// No plan exists.
+    Unsolvable {
+        /// Why.
+        proof: Proof,
+        /// Statistics.
+        counts: Counts,
+    },
+    /// No plan was found, and nothing is proved.
+    NoneFound {
+        /// Why the search did not go on.
+        stopped: Stopped,
+        /// Statistics.
+        counts: Counts,
+    },
+    /// The problem uses something that this planner does not handle.
+    Unsupported(Unsupported),
+}
+
+impl Answer {
+    /// The plan, if one was found.
+    pub fn found(&self) -> Option<&Found> {
+        match self {
+            Self::Plan { found, .. } => Some(found),
+            _ => None,
+        }
+    }
+}
+
+/// Why a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// The observer said so: a time limit, or an impatient user.
+    Interrupted,
+    /// [`Settings::max_memory`] is used up, or there are too many ground actions.
+    OutOfMemory,
+    /// The first plan was all that was asked for.
+    FirstPlan,
+    /// All that the search can reach was searched. Without a plan, and without a proof, some plans
+    /// were out of its reach.
+    Exhausted,
+}
+
+/// Why no plan exists.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Proof {
+    /// A conjunct of the goal cannot become true even if nothing that was reached is ever lost.
+    #[error("no plan exists: {}", .0.join("; "))]
+    Unreachable(Vec<String>),
+    /// All orders of happenings were tried.
+    #[error(
+        "no plan exists: every order in which things can happen was tried, {states} states in all"
+    )]
+    Exhausted {
+        /// How many states there were.
+        states: u64,
+    },
+}

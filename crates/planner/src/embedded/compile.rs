@@ -1,0 +1,188 @@
+//! The ground problem in the form in which the search reads it.
+//!
+//! Every action becomes one or two *snaps* (Fox & Long's name for starts, ends and instants);
+//! facts, fluents and tests become small numbers; and what keeps happenings apart becomes a list
+//! of *stamps*. A stamp is the latest time at which something of a kind happened, such as "fact 7
+//! was read". Each snap says which stamps it must keep what distance from, and which ones it sets;
+//! so the order that PDDL's no-moving-targets rule and over-all conditions ask for is settled
+//! here once, and the search only takes maxima.
+
+mod builder;
+mod interference;
+mod symbols;
+
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
+use elbowroom_num::Rational;
+
+pub use builder::Unsupported;
+pub(crate) use builder::compile;
+
+use super::formula::{Formula, Numeric, Test};
+use super::state::State;
+use super::time::{Scale, Ticks};
+
+/// No snap, action or the like.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// A problem from a situation on.
+#[derive(Debug)]
+pub(crate) struct Compiled {
+    pub(crate) scale: Scale,
+    pub(crate) epsilon: Ticks,
+    /// When the situation is; nothing new happens earlier.
+    pub(crate) now: Ticks,
+    /// The facts that some condition reads.
+    pub(crate) facts: Vec<FactId>,
+    /// The fluents that matter to some condition, duration or rate.
+    pub(crate) fluents: Vec<FluentId>,
+    pub(crate) tests: Vec<Test>,
+    pub(crate) snaps: Vec<Snap>,
+    pub(crate) actions: Vec<Action>,
+    /// For each fact the stamps of its latest addition and deletion; [`NONE`] if nothing waits for
+    /// them.
+    pub(crate) fact_stamps: Vec<[u32; 2]>,
+    /// How many stamps there are.
+    pub(crate) stamp_count: usize,
+    /// The timed initials to come, by time.
+    pub(crate) timed: Vec<Timed>,
+    pub(crate) goal: Formula,
+    /// The timed initials that write something the goal reads.
+    pub(crate) goal_timed: Vec<u32>,
+    /// The rules of derived facts: what a stratum negates is settled in an earlier one.
+    pub(crate) strata: Vec<Vec<Rule>>,
+    /// The derived facts, by stratum.
+    pub(crate) derived: Vec<Vec<u32>>,
+    pub(crate) initial: State,
+    /// Whether all of this is exact, so that a search that finds nothing proves something.
+    pub(crate) is_exact: bool,
+    /// Whether an instance of some action could be needed that this form cannot express; also an
+    /// obstacle to proofs. Says why.
+    pub(crate) gap: Option<&'static str>,
+    /// Whether some value depends on when things happen.
+    pub(crate) is_symbolic: bool,
+}
+
+/// A start, an end, or an instantaneous action.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Snap {
+    pub(crate) action: u32,
+    pub(crate) condition: Formula,
+    pub(crate) adds: Vec<u32>,
+    pub(crate) deletes: Vec<u32>,
+    pub(crate) updates: Vec<Update>,
+    pub(crate) conditional: Vec<Conditional>,
+    /// Stamps, and how long after them this must happen.
+    pub(crate) after: Vec<(u32, Ticks)>,
+    /// Stamps that this sets.
+    pub(crate) marks: Vec<u32>,
+    /// Timed initials, and how long before them this must happen if it comes first; ascending.
+    pub(crate) before_timed: Vec<(u32, Ticks)>,
+}
+
+/// A numeric effect.
+#[derive(Clone, Debug)]
+pub(crate) struct Update {
+    pub(crate) fluent: u32,
+    pub(crate) operator: UpdateOperator,
+    pub(crate) value: Numeric,
+}
+
+/// A conditional effect.
+#[derive(Clone, Debug)]
+pub(crate) struct Conditional {
+    /// The position among [`Action::guards`] of what was read at the start.
+    pub(crate) at_start: Option<u8>,
+    pub(crate) now: Formula,
+    pub(crate) change: Change,
+}
+
+/// What a conditional effect does.
+#[derive(Clone, Debug)]
+pub(crate) enum Change {
+    Add(u32),
+    Delete(u32),
+    Update(Update),
+}
+
+/// A ground action.
+#[derive(Clone, Debug)]
+pub(crate) struct Action {
+    pub(crate) schema: SchemaId,
+    pub(crate) arguments: Vec<ObjectId>,
+    /// Its start, or the instantaneous action; [`NONE`] if it is under way in the situation.
+    pub(crate) start: u32,
+    /// [`NONE`] for an instantaneous action.
+    pub(crate) end: u32,
+    pub(crate) over_all: Formula,
+    /// What end effects read at the start.
+    pub(crate) guards: Vec<Formula>,
+    pub(crate) duration: Duration,
+    pub(crate) flows: Vec<Flow>,
+    /// Timed initials that would break the over-all condition while the action runs; ascending.
+    pub(crate) breaking_timed: Vec<u32>,
+    /// Whether it can end as soon as it has started, as far as the order of happenings goes; see
+    /// the search.
+    pub(crate) is_eager: bool,
+    /// Whether it cannot start while another instance of it runs.
+    pub(crate) excludes_itself: bool,
+    /// Whether something reads `?duration`, or changes continuously.
+    pub(crate) uses_duration: bool,
+}
+
+/// How long an action may take.
+#[derive(Clone, Debug)]
+pub(crate) struct Duration {
+    /// The constant bounds.
+    pub(crate) least: Rational,
+    pub(crate) most: Option<Rational>,
+    /// The bounds that depend on the state.
+    pub(crate) bounds: Vec<Bound>,
+}
+
+/// `?duration comparison value`.
+#[derive(Clone, Debug)]
+pub(crate) struct Bound {
+    pub(crate) comparison: Comparison,
+    pub(crate) value: Numeric,
+    /// Whether it is read at the end.
+    pub(crate) at_end: bool,
+}
+
+/// A continuous effect.
+#[derive(Clone, Debug)]
+pub(crate) struct Flow {
+    pub(crate) fluent: u32,
+    pub(crate) rate: Numeric,
+    /// The position among [`Action::guards`] of its condition.
+    pub(crate) guard: Option<u8>,
+}
+
+/// Timed initials of one time.
+#[derive(Clone, Debug)]
+pub(crate) struct Timed {
+    pub(crate) time: Ticks,
+    pub(crate) adds: Vec<u32>,
+    pub(crate) deletes: Vec<u32>,
+    pub(crate) assigns: Vec<(u32, Rational)>,
+    pub(crate) marks: Vec<u32>,
+}
+
+/// `head` holds where `body` does.
+#[derive(Clone, Debug)]
+pub(crate) struct Rule {
+    pub(crate) head: u32,
+    pub(crate) body: Formula,
+}
+
+impl Compiled {
+    /// The snap of that number.
+    pub(crate) fn snap(&self, number: u32) -> &Snap {
+        &self.snaps[number as usize]
+    }
+
+    /// The action of that number.
+    pub(crate) fn action(&self, number: u32) -> &Action {
+        &self.actions[number as usize]
+    }
+}

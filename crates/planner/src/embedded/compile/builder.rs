@@ -1,0 +1,754 @@
+//! Compiles a grounded task.
+
+use elbowroom_model::ground::{self, Body, Change as ModelChange, Condition, DurativeBody};
+use elbowroom_model::problem::Comparison;
+use elbowroom_model::reachability::Grounding;
+use elbowroom_model::{Footprint, Situation, Task};
+use elbowroom_num::{End, Rational};
+
+use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
+use super::symbols::Symbols;
+use super::{
+    Action, Bound, Change, Compiled, Conditional, Duration, Flow, NONE, Rule, Snap, Timed, Update,
+};
+use crate::embedded::formula::{Formula, Numeric};
+use crate::embedded::state::{Open, State};
+use crate::embedded::time::{Scale, Ticks};
+
+/// A feature that the embedded planner does not handle, with the action or the like that uses it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the embedded planner does not handle {feature} ({place}); try an external planner")]
+pub struct Unsupported {
+    /// What it is.
+    pub feature: String,
+    /// Where it was met.
+    pub place: String,
+}
+
+/// Compiles `grounding`, which is what `task` can reach from `situation`.
+pub(crate) fn compile(
+    task: &mut Task,
+    grounding: &Grounding,
+    situation: &Situation,
+    epsilon: &Rational,
+) -> Result<Compiled, Unsupported> {
+    let mut footprints = full_footprints(task, grounding);
+    let mut builder = Builder::new(task);
+    builder.read_conditions(grounding, situation);
+    for running in &situation.running {
+        builder.check(&running.action)?;
+        builder.links_of(&running.action);
+    }
+    for action in &grounding.actions {
+        builder.check(action)?;
+        builder.links_of(action);
+    }
+    let scale = scale_of(task, grounding, situation, epsilon);
+    builder.epsilon = scale.ceil(epsilon).0.max(1);
+    for running in &situation.running {
+        builder.running(&running.action);
+    }
+    for (number, action) in grounding.actions.iter().enumerate() {
+        builder.action(action, footprints.get_mut(number).and_then(Option::take));
+    }
+    Ok(builder.finish(grounding, situation, scale))
+}
+
+struct Builder<'a> {
+    task: &'a Task,
+    symbols: Symbols,
+    links: Links,
+    epsilon: Ticks,
+    snaps: Vec<Snap>,
+    wishes: Vec<Wishes>,
+    actions: Vec<Action>,
+    over_all: Vec<Condition>,
+}
+
+/// The footprints of start and end, as the judge sees them, of the actions from which grounding
+/// has dropped conditional effects: these interfere even where they never happen.
+fn full_footprints(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Touches, Touches)>> {
+    let problem = task.problem();
+    let is_conditional: Vec<bool> = problem
+        .schemas
+        .iter()
+        .map(|schema| {
+            let (first, second) = match &schema.body {
+                elbowroom_model::problem::Body::Instantaneous { effects, .. } => {
+                    (&effects[..], &[][..])
+                }
+                elbowroom_model::problem::Body::Durative {
+                    start_effects,
+                    end_effects,
+                    ..
+                } => (&start_effects[..], &end_effects[..]),
+            };
+            first.iter().chain(second).any(|effect| {
+                let guard = &effect.guard;
+                !(guard.at_start.is_trivial()
+                    && guard.over_all.is_trivial()
+                    && guard.now.is_trivial())
+            })
+        })
+        .collect();
+    if !is_conditional.contains(&true) {
+        return Vec::new();
+    }
+    grounding
+        .actions
+        .iter()
+        .map(|action| {
+            if !is_conditional[action.schema.index()] {
+                return None;
+            }
+            let full = task.instantiate(action.schema, &action.arguments).ok()?;
+            Some((
+                Touches::of_footprint(Footprint::of_start(task, &full)),
+                Touches::of_footprint(Footprint::of_end(task, &full)),
+            ))
+        })
+        .collect()
+}
+
+/// The grid for all times and constant durations.
+fn scale_of(
+    task: &Task,
+    grounding: &Grounding,
+    situation: &Situation,
+    epsilon: &Rational,
+) -> Scale {
+    let mut numbers: Vec<&Rational> = vec![epsilon, &situation.time];
+    numbers.extend(task.timed().iter().map(|timed| &timed.time));
+    for running in &situation.running {
+        numbers.push(&running.start);
+        for end in [&running.duration.lower, &running.duration.upper] {
+            numbers.extend(end.value());
+        }
+    }
+    for action in &grounding.actions {
+        for constraint in action.durative().map_or(&[][..], |body| &body.duration) {
+            if let ground::Expression::Constant(value) = &constraint.bound {
+                numbers.push(value);
+            }
+        }
+    }
+    Scale::of(numbers.into_iter())
+}
+
+impl<'a> Builder<'a> {
+    fn new(task: &'a Task) -> Self {
+        Self {
+            task,
+            symbols: Symbols::new(task),
+            links: Links::default(),
+            epsilon: 1,
+            snaps: Vec::new(),
+            wishes: Vec::new(),
+            actions: Vec::new(),
+            over_all: Vec::new(),
+        }
+    }
+
+    /// Numbers all facts that are read, and all fluents that matter, before any effect is looked
+    /// at: what nothing reads is left out of the states.
+    fn read_conditions(&mut self, grounding: &Grounding, situation: &Situation) {
+        let symbols = &mut self.symbols;
+        symbols.formula(&grounding.goal);
+        for rule in &grounding.rules {
+            symbols.fact(rule.head);
+            symbols.formula(&rule.body);
+        }
+        let running = situation.running.iter().map(|running| &running.action);
+        for action in running.clone().chain(&grounding.actions) {
+            read_action(symbols, action);
+        }
+        // A value that another fluent's change reads matters if that fluent does.
+        loop {
+            let before = symbols.fluents.len();
+            for action in running.clone().chain(&grounding.actions) {
+                visit_changes(action, &mut |fluent, value| {
+                    if symbols.known_fluent(fluent).is_some() {
+                        value.visit_fluents(&mut |read| {
+                            symbols.fluent(read);
+                        });
+                    }
+                });
+            }
+            if symbols.fluents.len() == before {
+                break;
+            }
+        }
+        // An increase of a fluent without a value is a mistake that the judge would find.
+        for action in running.chain(&grounding.actions) {
+            visit_changes(action, &mut |fluent, _| {
+                if !situation.state.values.contains_key(&fluent) {
+                    symbols.fluent(fluent);
+                }
+            });
+        }
+    }
+
+    /// Refuses what cannot be searched.
+    fn check(&self, action: &ground::Action) -> Result<(), Unsupported> {
+        let refuse = |feature: &str| {
+            Err(Unsupported {
+                feature: feature.to_owned(),
+                place: format!("action {}", action.name),
+            })
+        };
+        let mut has_unknown = false;
+        action.map_leaves(&mut |leaf| {
+            has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
+            None
+        });
+        if has_unknown {
+            return refuse("numbers left open (:synth-parameters)");
+        }
+        let Some(body) = action.durative() else {
+            return Ok(());
+        };
+        let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
+        if body.end.effects.iter().any(|e| guarded(&e)) {
+            return refuse("effects under a condition over the whole action");
+        }
+        if body
+            .continuous
+            .iter()
+            .any(|e| !e.guard.over_all.is_trivial())
+        {
+            return refuse("continuous effects under a condition over the whole action");
+        }
+        Ok(())
+    }
+
+    fn links_of(&mut self, action: &ground::Action) {
+        if let Some(body) = action.durative() {
+            self.links.note(self.task, &body.over_all);
+        }
+    }
+
+    fn push_snap(&mut self, snap: Snap, wishes: Wishes) -> u32 {
+        self.snaps.push(snap);
+        self.wishes.push(wishes);
+        narrow(self.snaps.len() - 1)
+    }
+
+    /// An action that is under way: only its end is to come.
+    fn running(&mut self, action: &ground::Action) {
+        let Some(body) = action.durative() else {
+            return;
+        };
+        let number = narrow(self.actions.len());
+        let touches = Touches::of_end(self.task, action);
+        let end = self.end_of(number, body, &touches);
+        let compiled = self.durative(action, body, NONE, end, Vec::new());
+        self.actions.push(compiled);
+        self.over_all.push(body.over_all.clone());
+    }
+
+    fn action(&mut self, action: &ground::Action, footprints: Option<(Touches, Touches)>) {
+        let number = narrow(self.actions.len());
+        let (starts, ends) = footprints.unwrap_or_else(|| {
+            (
+                Touches::of_start(self.task, action),
+                Touches::of_end(self.task, action),
+            )
+        });
+        let mut wishes = starts.wishes(self.epsilon, &self.links);
+        match &action.body {
+            Body::Instantaneous(body) => {
+                let snap = self.snap(number, body, &mut Vec::new());
+                let start = self.push_snap(snap, wishes);
+                self.actions.push(Action {
+                    schema: action.schema,
+                    arguments: action.arguments.clone(),
+                    start,
+                    end: NONE,
+                    over_all: Formula::default(),
+                    guards: Vec::new(),
+                    duration: Duration {
+                        least: Rational::ZERO,
+                        most: Some(Rational::ZERO),
+                        bounds: Vec::new(),
+                    },
+                    flows: Vec::new(),
+                    breaking_timed: Vec::new(),
+                    is_eager: false,
+                    excludes_itself: true,
+                    uses_duration: false,
+                });
+                self.over_all.push(Condition::TRUE);
+            }
+            Body::Durative(body) => {
+                let over_all = Touches::of_condition(self.task, &body.over_all);
+                wishes.need_from_now_on(&over_all);
+                let mut guards = Vec::new();
+                let snap = self.snap(number, &body.start, &mut guards);
+                let start = self.push_snap(snap, wishes);
+                let end = self.end_with(number, body, &ends, &mut guards);
+                let compiled = self.durative(action, body, start, end, guards);
+                self.actions.push(compiled);
+                self.over_all.push(body.over_all.clone());
+            }
+        }
+    }
+
+    /// The end of an action that is under way; its guards are decided.
+    fn end_of(&mut self, number: u32, body: &DurativeBody, touches: &Touches) -> u32 {
+        let mut decided = body.clone();
+        for effect in &mut decided.end.effects {
+            effect.guard.at_start = Condition::TRUE;
+        }
+        self.end_with(number, &decided, touches, &mut Vec::new())
+    }
+
+    fn end_with(
+        &mut self,
+        number: u32,
+        body: &DurativeBody,
+        touches: &Touches,
+        guards: &mut Vec<Formula>,
+    ) -> u32 {
+        let mut wishes = touches.wishes(self.epsilon, &self.links);
+        wishes.needed_until_now(self.task, &body.over_all);
+        let snap = self.snap(number, &body.end, guards);
+        self.push_snap(snap, wishes)
+    }
+
+    fn snap(&mut self, action: u32, body: &ground::SnapAction, guards: &mut Vec<Formula>) -> Snap {
+        let mut snap = Snap {
+            action,
+            condition: self.symbols.formula(&body.condition),
+            ..Snap::default()
+        };
+        for effect in &body.effects {
+            let change = match &effect.change {
+                ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
+                ModelChange::Delete(fact) => self.symbols.known_fact(*fact).map(Change::Delete),
+                ModelChange::Update {
+                    operator,
+                    fluent,
+                    value,
+                } => self.symbols.known_fluent(*fluent).map(|fluent| {
+                    Change::Update(Update {
+                        fluent,
+                        operator: *operator,
+                        value: self.symbols.numeric(value),
+                    })
+                }),
+            };
+            let Some(change) = change else { continue };
+            if effect.guard.is_trivial() {
+                match change {
+                    Change::Add(fact) => snap.adds.push(fact),
+                    Change::Delete(fact) => snap.deletes.push(fact),
+                    Change::Update(update) => snap.updates.push(update),
+                }
+                continue;
+            }
+            let at_start = (!effect.guard.at_start.is_trivial()).then(|| {
+                guards.push(self.symbols.formula(&effect.guard.at_start));
+                u8::try_from(guards.len() - 1).unwrap_or(u8::MAX)
+            });
+            let now = self.symbols.formula(&effect.guard.now);
+            snap.conditional.push(Conditional {
+                at_start,
+                now,
+                change,
+            });
+        }
+        // An addition wins over a deletion by the same happening.
+        let adds = std::mem::take(&mut snap.adds);
+        snap.deletes.retain(|fact| !adds.contains(fact));
+        snap.adds = adds;
+        snap
+    }
+
+    fn durative(
+        &mut self,
+        action: &ground::Action,
+        body: &DurativeBody,
+        start: u32,
+        end: u32,
+        mut guards: Vec<Formula>,
+    ) -> Action {
+        let mut flows = Vec::new();
+        for effect in &body.continuous {
+            let guard = (start != NONE && !effect.guard.at_start.is_trivial()).then(|| {
+                guards.push(self.symbols.formula(&effect.guard.at_start));
+                u8::try_from(guards.len() - 1).unwrap_or(u8::MAX)
+            });
+            if let Some(fluent) = self.symbols.known_fluent(effect.fluent) {
+                flows.push(Flow {
+                    fluent,
+                    rate: self.symbols.numeric(&effect.rate),
+                    guard,
+                });
+            }
+        }
+        let over_all = self.symbols.formula(&body.over_all);
+        let mut duration = Duration {
+            least: Rational::ZERO,
+            most: None,
+            bounds: Vec::new(),
+        };
+        for constraint in &body.duration {
+            duration.constrain(constraint, self.symbols.numeric(&constraint.bound));
+        }
+        let uses_duration = !flows.is_empty() || {
+            let mut reads = false;
+            let mut look = |leaf: &ground::Expression| {
+                reads |= *leaf == ground::Expression::Duration;
+            };
+            body.over_all
+                .visit_expressions(&mut |e| e.visit_leaves(&mut look));
+            for snap in [&body.start, &body.end] {
+                snap.condition
+                    .visit_expressions(&mut |e| e.visit_leaves(&mut look));
+                for effect in &snap.effects {
+                    effect
+                        .guard
+                        .now
+                        .visit_expressions(&mut |e| e.visit_leaves(&mut look));
+                    if let ModelChange::Update { value, .. } = &effect.change {
+                        value.visit_leaves(&mut look);
+                    }
+                }
+            }
+            reads
+        };
+        Action {
+            schema: action.schema,
+            arguments: action.arguments.clone(),
+            start,
+            end,
+            over_all,
+            guards,
+            duration,
+            flows,
+            breaking_timed: Vec::new(),
+            is_eager: start != NONE
+                && is_eager(&self.snaps[start as usize], &self.snaps[end as usize]),
+            excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
+            uses_duration,
+        }
+    }
+
+    fn finish(mut self, grounding: &Grounding, situation: &Situation, scale: Scale) -> Compiled {
+        let goal = self.symbols.formula(&grounding.goal);
+        let mut rules: Vec<Rule> = Vec::new();
+        for rule in &grounding.rules {
+            let body = self.symbols.formula(&rule.body);
+            let head = self.symbols.fact(rule.head);
+            rules.push(Rule { head, body });
+        }
+        let (strata, derived) = stratified(rules, self.task, &self.symbols);
+        let coming: Vec<_> = self
+            .task
+            .timed()
+            .iter()
+            .filter(|timed| timed.time > situation.time)
+            .collect();
+        let timed_wishes: Vec<Wishes> = coming
+            .iter()
+            .map(|timed| Touches::of_timed(timed).wishes(self.epsilon, &self.links))
+            .collect();
+        let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
+        let waiting = TimedWishes::of(&timed_wishes);
+        for (snap, wishes) in self.snaps.iter_mut().zip(&self.wishes) {
+            snap.after = stamps.after(wishes);
+            snap.marks = stamps.marks(wishes);
+            snap.before_timed = waiting.before(&wishes.makes);
+        }
+        if !coming.is_empty() {
+            for (action, over_all) in self.actions.iter_mut().zip(&self.over_all) {
+                let mut needs = Wishes::default();
+                for conjunct in over_all.conjuncts() {
+                    if matches!(conjunct, Condition::Fact(_) | Condition::Not(_)) {
+                        needs.needed_until_now(self.task, conjunct);
+                    }
+                }
+                let breaking = waiting.before(&needs.makes);
+                action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
+            }
+        }
+        let goal_reads = Touches::of_condition(self.task, &grounding.goal);
+        let mut goal_wishes = Wishes::default();
+        goal_wishes.need_from_now_on(&goal_reads);
+        let goal_accesses: Vec<_> = goal_wishes
+            .after
+            .iter()
+            .map(|(access, _)| *access)
+            .collect();
+        let goal_timed = (0..coming.len())
+            .filter(|&number| {
+                let makes = &timed_wishes[number].makes;
+                makes.iter().any(|access| goal_accesses.contains(access))
+            })
+            .map(narrow)
+            .collect();
+        let mut is_exact = scale.exactly(&Rational::ONE).is_some();
+        let timed = coming
+            .iter()
+            .zip(&timed_wishes)
+            .map(|(happening, wishes)| {
+                let (time, exact) = scale.floor(&happening.time);
+                is_exact &= exact;
+                let mut timed = Timed {
+                    time,
+                    adds: Vec::new(),
+                    deletes: Vec::new(),
+                    assigns: Vec::new(),
+                    marks: stamps.marks(wishes),
+                };
+                for change in &happening.changes {
+                    match change {
+                        ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
+                        ModelChange::Delete(fact) => {
+                            timed.deletes.extend(self.symbols.known_fact(*fact));
+                        }
+                        ModelChange::Update { fluent, value, .. } => {
+                            if let (Some(fluent), ground::Expression::Constant(value)) =
+                                (self.symbols.known_fluent(*fluent), value)
+                            {
+                                timed.assigns.push((fluent, value.clone()));
+                            }
+                        }
+                    }
+                }
+                timed
+            })
+            .collect();
+        let now = scale.floor(&situation.time);
+        let epsilon = scale.ceil(&Rational::ZERO).0.max(self.epsilon);
+        is_exact &= now.1;
+        let mut compiled = Compiled {
+            scale,
+            epsilon,
+            now: now.0,
+            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
+            facts: self.symbols.facts,
+            fluents: self.symbols.fluents,
+            tests: self.symbols.tests,
+            snaps: self.snaps,
+            actions: self.actions,
+            stamp_count: stamps.count(),
+            timed,
+            goal,
+            goal_timed,
+            strata,
+            derived,
+            initial: State::default(),
+            is_exact,
+            gap: None,
+            is_symbolic: false,
+        };
+        compiled.is_symbolic = is_symbolic(&compiled);
+        compiled.initial = initial(&mut compiled, situation);
+        compiled
+    }
+}
+
+impl Duration {
+    fn constrain(&mut self, constraint: &ground::DurationConstraint, value: Numeric) {
+        let Some(constant) = value.as_constant() else {
+            self.bounds.push(Bound {
+                comparison: constraint.comparison,
+                value,
+                at_end: constraint.at_end,
+            });
+            return;
+        };
+        if !matches!(constraint.comparison, Comparison::AtMost | Comparison::Less)
+            && *constant > self.least
+        {
+            self.least = constant.clone();
+        }
+        if !matches!(
+            constraint.comparison,
+            Comparison::AtLeast | Comparison::Greater
+        ) && self.most.as_ref().is_none_or(|most| constant < most)
+        {
+            self.most = Some(constant.clone());
+        }
+    }
+}
+
+/// Whether it costs little to let the end follow the start at once in the order of happenings:
+/// unless the action offers something only while it runs.
+fn is_eager(start: &Snap, end: &Snap) -> bool {
+    let offers = end.deletes.iter().any(|fact| start.adds.contains(fact))
+        || end.conditional.iter().any(
+            |effect| matches!(effect.change, Change::Delete(fact) if start.adds.contains(&fact)),
+        );
+    let lends = end.updates.iter().any(|back| {
+        back.operator.is_additive()
+            && start
+                .updates
+                .iter()
+                .any(|out| out.fluent == back.fluent && out.operator != back.operator)
+    });
+    !offers && !lends
+}
+
+fn excludes_itself(start: &Snap) -> bool {
+    start.condition.literals.iter().any(|literal| {
+        if literal.truth() {
+            start.deletes.contains(&literal.fact())
+        } else {
+            start.adds.contains(&literal.fact())
+        }
+    })
+}
+
+fn read_action(symbols: &mut Symbols, action: &ground::Action) {
+    let snap = |symbols: &mut Symbols, snap: &ground::SnapAction| {
+        symbols.formula(&snap.condition);
+        for effect in &snap.effects {
+            symbols.formula(&effect.guard.now);
+            symbols.formula(&effect.guard.at_start);
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(body) => snap(symbols, body),
+        Body::Durative(body) => {
+            snap(symbols, &body.start);
+            snap(symbols, &body.end);
+            symbols.formula(&body.over_all);
+            for constraint in &body.duration {
+                symbols.numeric(&constraint.bound);
+            }
+            for effect in &body.continuous {
+                symbols.formula(&effect.guard.at_start);
+            }
+        }
+    }
+}
+
+/// Calls `visit` for each numeric effect of the action.
+fn visit_changes(
+    action: &ground::Action,
+    visit: &mut impl FnMut(ground::FluentId, &ground::Expression),
+) {
+    let effects = |effects: &[ground::Effect], visit: &mut dyn FnMut(_, &_)| {
+        for effect in effects {
+            if let ModelChange::Update { fluent, value, .. } = &effect.change {
+                visit(*fluent, value);
+            }
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(body) => effects(&body.effects, visit),
+        Body::Durative(body) => {
+            effects(&body.start.effects, visit);
+            effects(&body.end.effects, visit);
+            for effect in &body.continuous {
+                visit(effect.fluent, &effect.rate);
+            }
+        }
+    }
+}
+
+/// Whether some number depends on when things happen: on a duration that can be chosen, or on
+/// how far a continuous change has come.
+fn is_symbolic(compiled: &Compiled) -> bool {
+    compiled.actions.iter().any(|action| {
+        !action.flows.is_empty()
+            || action.uses_duration
+                && !(action
+                    .duration
+                    .bounds
+                    .iter()
+                    .any(|b| b.comparison == Comparison::Equal)
+                    || action.duration.most.as_ref() == Some(&action.duration.least))
+    })
+}
+
+/// The rules by strata, and the heads of each.
+fn stratified(rules: Vec<Rule>, task: &Task, symbols: &Symbols) -> (Vec<Vec<Rule>>, Vec<Vec<u32>>) {
+    if rules.is_empty() {
+        return (Vec::new(), Vec::new());
+    }
+    let mut level = vec![0_usize; symbols.facts.len()];
+    let is_derived: Vec<bool> = symbols.facts.iter().map(|&f| task.is_derived(f)).collect();
+    // As deep as there are derived facts, unless one rests on its own negation; the task has made
+    // sure that none does.
+    for _ in 0..=rules.len() {
+        let mut changed = false;
+        for rule in &rules {
+            let mut needed = level[rule.head as usize];
+            rule.body.visit_literals(&mut |literal| {
+                let fact = literal.fact() as usize;
+                if is_derived[fact] {
+                    needed = needed.max(level[fact] + usize::from(!literal.truth()));
+                }
+            });
+            if needed > level[rule.head as usize] {
+                level[rule.head as usize] = needed;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    let count = level.iter().max().copied().unwrap_or(0) + 1;
+    let mut strata = vec![Vec::new(); count];
+    let mut derived = vec![Vec::new(); count];
+    for (fact, _) in is_derived
+        .iter()
+        .enumerate()
+        .filter(|(_, derived)| **derived)
+    {
+        derived[level[fact]].push(narrow(fact));
+    }
+    for rule in rules {
+        strata[level[rule.head as usize]].push(rule);
+    }
+    (strata, derived)
+}
+
+fn initial(compiled: &mut Compiled, situation: &Situation) -> State {
+    let facts = compiled
+        .facts
+        .iter()
+        .map(|fact| situation.state.facts.contains(fact));
+    let values = compiled
+        .fluents
+        .iter()
+        .map(|fluent| situation.state.values.get(fluent).cloned())
+        .collect();
+    let mut state = State::new(compiled, facts, values);
+    let mut is_exact = true;
+    for (number, running) in situation.running.iter().enumerate() {
+        let (start, exact) = compiled.scale.floor(&running.start);
+        is_exact &= exact;
+        let (least, most) = (&running.duration.lower, &running.duration.upper);
+        let elapsed = &situation.time - &running.start;
+        let (least, exact) = match least {
+            End::Infinite => (0, true),
+            End::Closed(value) => compiled.scale.ceil(value),
+            End::Open(value) => (compiled.scale.floor(value).0 + 1, false),
+        };
+        is_exact &= exact;
+        let least = least.max(compiled.scale.ceil(&elapsed).0);
+        let (most, exact) = match most {
+            End::Infinite => (None, true),
+            End::Closed(value) => {
+                let (ticks, exact) = compiled.scale.floor(value);
+                (Some(ticks), exact)
+            }
+            End::Open(value) => (Some(compiled.scale.ceil(value).0 - 1), false),
+        };
+        is_exact &= exact;
+        state
+            .open
+            .push(Open::under_way(narrow(number), start, least, most));
+    }
+    compiled.is_exact &= is_exact;
+    state
+}
+
+fn narrow(number: usize) -> u32 {
+    u32::try_from(number).expect("fewer than 2^32 entries")
+}

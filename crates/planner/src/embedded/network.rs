@@ -1,0 +1,293 @@
+//! The temporal network of those happenings whose times are not settled yet.
+//!
+//! A happening is settled when no action under way could still push it to a later time: then the
+//! earliest time it can have is the best for everything that follows, and it leaves the network.
+//! What stays is small, and is all that matters of the past besides the stamps.
+//!
+//! All constraints are of the form `to >= from + distance`. The network keeps the earliest time of
+//! each node, and is consistent if no node is later than its latest time and no cycle pushes
+//! itself (Cesta & Oddi, "Gaining efficiency and flexibility in the simple temporal problem",
+//! TIME 1996, for the incremental test).
+
+use super::time::{NEVER, Ticks};
+
+/// A happening of the network.
+pub(crate) type NodeId = u16;
+
+/// No node: the happening is settled.
+pub(crate) const SETTLED: NodeId = NodeId::MAX;
+
+/// See the module.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Network {
+    nodes: Vec<Node>,
+    edges: Vec<Edge>,
+    /// Stamps that unsettled happenings have set.
+    pub(crate) marks: Vec<(u32, NodeId)>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    earliest: Ticks,
+    latest: Ticks,
+}
+
+/// `to >= from + distance`.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    from: NodeId,
+    to: NodeId,
+    distance: Ticks,
+}
+
+/// The constraints contradict each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Inconsistent;
+
+impl Network {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    pub(crate) fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub(crate) fn earliest(&self, node: NodeId) -> Ticks {
+        self.nodes[node as usize].earliest
+    }
+
+    /// The earliest time at which all of its happenings can be over.
+    pub(crate) fn earliest_end(&self) -> Ticks {
+        let times = self.nodes.iter().map(|node| node.earliest);
+        times.max().unwrap_or(-NEVER)
+    }
+
+    /// Adds a node that comes at given distances after others.
+    pub(crate) fn add_node(
+        &mut self,
+        earliest: Ticks,
+        latest: Ticks,
+        after: &[(NodeId, Ticks)],
+    ) -> Result<NodeId, Inconsistent> {
+        // A plan of sixty thousand happenings that are all unsettled is beyond us anyway.
+        let node = NodeId::try_from(self.nodes.len()).map_err(|_| Inconsistent)?;
+        if node == SETTLED {
+            return Err(Inconsistent);
+        }
+        let mut time = earliest;
+        for &(from, distance) in after {
+            time = time.max(self.earliest(from) + distance);
+            self.edges.push(Edge {
+                from,
+                to: node,
+                distance,
+            });
+        }
+        if time > latest {
+            return Err(Inconsistent);
+        }
+        self.nodes.push(Node {
+            earliest: time,
+            latest,
+        });
+        Ok(node)
+    }
+
+    /// Adds `to >= from + distance`, where the network was consistent without it.
+    pub(crate) fn add_edge(
+        &mut self,
+        from: NodeId,
+        to: NodeId,
+        distance: Ticks,
+    ) -> Result<(), Inconsistent> {
+        self.edges.push(Edge { from, to, distance });
+        let time = self.earliest(from) + distance;
+        self.push(to, time, from)
+    }
+
+    /// Moves a node to `time` or later, and all that this moves in turn. When it would move
+    /// `origin`, the new edge from there has closed a cycle that pushes itself.
+    fn push(&mut self, node: NodeId, time: Ticks, origin: NodeId) -> Result<(), Inconsistent> {
+        let mut waiting = vec![(node, time)];
+        while let Some((node, time)) = waiting.pop() {
+            let place = &mut self.nodes[node as usize];
+            if time <= place.earliest {
+                continue;
+            }
+            if time > place.latest || node == origin {
+                return Err(Inconsistent);
+            }
+            place.earliest = time;
+            for edge in self.edges.iter().filter(|edge| edge.from == node) {
+                waiting.push((edge.to, time + edge.distance));
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a node happen no earlier than `time`.
+    pub(crate) fn delay(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
+        self.push(node, time, SETTLED)
+    }
+
+    /// Makes a node happen no later than `time`.
+    pub(crate) fn hurry(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
+        let place = &mut self.nodes[node as usize];
+        place.latest = place.latest.min(time);
+        if place.earliest > place.latest {
+            return Err(Inconsistent);
+        }
+        Ok(())
+    }
+
+    /// Notes that a node has set a stamp. Older nodes that are known to come before it need not be
+    /// remembered for that stamp.
+    pub(crate) fn mark(&mut self, stamp: u32, node: NodeId) {
+        let edges = &self.edges;
+        self.marks.retain(|&(other, older)| {
+            other != stamp
+                || !edges
+                    .iter()
+                    .any(|edge| edge.from == older && edge.to == node && edge.distance >= 0)
+        });
+        self.marks.push((stamp, node));
+    }
+
+    /// Keeps only what the nodes `open` can still push. Hands the stamps and times of what is
+    /// settled to `settle`, and returns the new names of the nodes.
+    pub(crate) fn settle(
+        &mut self,
+        open: impl Iterator<Item = NodeId>,
+        settle: &mut dyn FnMut(u32, Ticks),
+    ) -> Vec<NodeId> {
+        let mut names = vec![SETTLED; self.nodes.len()];
+        let mut waiting: Vec<NodeId> = open.collect();
+        let mut is_kept = vec![false; self.nodes.len()];
+        while let Some(node) = waiting.pop() {
+            if !std::mem::replace(&mut is_kept[node as usize], true) {
+                let next = self.edges.iter().filter(|edge| edge.from == node);
+                waiting.extend(next.map(|edge| edge.to));
+            }
+        }
+        let mut count = 0;
+        for (name, _) in names.iter_mut().zip(&is_kept).filter(|(_, kept)| **kept) {
+            *name = count;
+            count += 1;
+        }
+        let nodes = &self.nodes;
+        self.marks.retain_mut(|(stamp, node)| {
+            if !is_kept[*node as usize] {
+                settle(*stamp, nodes[*node as usize].earliest);
+                return false;
+            }
+            *node = names[*node as usize];
+            true
+        });
+        // No kept node can push a settled one, so an edge with a kept source is kept whole.
+        self.edges.retain_mut(|edge| {
+            let is_kept = is_kept[edge.from as usize];
+            if is_kept {
+                edge.from = names[edge.from as usize];
+                edge.to = names[edge.to as usize];
+            }
+            is_kept
+        });
+        let mut position = 0;
+        self.nodes.retain(|_| {
+            position += 1;
+            is_kept[position - 1]
+        });
+        names
+    }
+
+    /// For each node, the least time it must come after `origin`; `-NEVER` if it need not.
+    pub(crate) fn distances_from(&self, origin: NodeId) -> Vec<Ticks> {
+        let mut distances = vec![-NEVER; self.nodes.len()];
+        distances[origin as usize] = 0;
+        let mut waiting = vec![origin];
+        while let Some(node) = waiting.pop() {
+            let reached = distances[node as usize];
+            for edge in self.edges.iter().filter(|edge| edge.from == node) {
+                let distance = reached + edge.distance;
+                if distance > distances[edge.to as usize] {
+                    distances[edge.to as usize] = distance;
+                    waiting.push(edge.to);
+                }
+            }
+        }
+        distances
+    }
+
+    /// How late a node can be so that nothing it pushes is too late.
+    pub(crate) fn latest_given(&self, distances: &[Ticks]) -> Ticks {
+        let nodes = self.nodes.iter().zip(distances);
+        nodes
+            .filter(|(node, distance)| node.latest < NEVER && **distance > -NEVER)
+            .map(|(node, distance)| node.latest - distance)
+            .min()
+            .unwrap_or(NEVER)
+    }
+
+    /// All constraints between nodes, as `(from, to, distance)`.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = (NodeId, NodeId, Ticks)> + '_ {
+        self.edges
+            .iter()
+            .map(|edge| (edge.from, edge.to, edge.distance))
+    }
+
+    /// The earliest and latest time of each node, by its own bounds and what pushes it.
+    pub(crate) fn bounds(&self) -> impl Iterator<Item = (Ticks, Ticks)> + '_ {
+        self.nodes.iter().map(|node| (node.earliest, node.latest))
+    }
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+            + self.edges.capacity() * size_of::<Edge>()
+            + self.marks.capacity() * size_of::<(u32, NodeId)>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Inconsistent, NEVER, Network};
+
+    #[test]
+    fn a_late_end_pushes_its_start_and_what_follows_it() {
+        let mut network = Network::default();
+        let start = network.add_node(0, NEVER, &[]).unwrap();
+        let follower = network.add_node(0, NEVER, &[(start, 1)]).unwrap();
+        let end = network.add_node(50, NEVER, &[(start, 10)]).unwrap();
+        network.add_edge(end, start, -10).unwrap();
+        assert_eq!(network.earliest(start), 40);
+        assert_eq!(network.earliest(follower), 41);
+    }
+
+    #[test]
+    fn a_cycle_that_pushes_itself_is_found() {
+        let mut network = Network::default();
+        let start = network.add_node(0, NEVER, &[]).unwrap();
+        let inside = network.add_node(0, NEVER, &[(start, 11)]).unwrap();
+        let end = network
+            .add_node(0, NEVER, &[(start, 10), (inside, 0)])
+            .unwrap();
+        assert_eq!(network.add_edge(end, start, -10), Err(Inconsistent));
+    }
+
+    #[test]
+    fn what_nothing_can_push_any_more_is_settled() {
+        let mut network = Network::default();
+        let first = network.add_node(5, NEVER, &[]).unwrap();
+        let second = network.add_node(7, NEVER, &[(first, 1)]).unwrap();
+        network.mark(3, first);
+        network.mark(4, second);
+        let mut settled = Vec::new();
+        let names = network.settle([second].into_iter(), &mut |stamp, time| {
+            settled.push((stamp, time));
+        });
+        assert_eq!(settled, [(3, 5)]);
+        assert_eq!(names[second as usize], 0);
+        assert_eq!(network.marks, [(4, 0)]);
+    }
+}

@@ -1,0 +1,340 @@
+//! The heuristic: how many steps a plan takes when nothing that was reached is ever lost.
+//!
+//! Facts, their negations, numeric tests and the like are *propositions*. The cost of a
+//! proposition is the sum over what its cheapest achiever needs (h_add, Bonet & Geffner 2001); a
+//! relaxed plan is read off the cheapest achievers (Keyder & Geffner 2008, "FF(h_a)"), and its
+//! first steps are the preferred ones (Hoffmann & Nebel 2001). A numeric test that adding up
+//! changes can reach costs as many repetitions as the gap asks for (Scala et al. 2016); other
+//! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
+//! plan.
+
+mod deadlines;
+mod graph;
+mod numbers;
+
+use super::apply::Step;
+use super::compile::Compiled;
+use super::state::State;
+
+pub(crate) use graph::Graph;
+use super::network::SETTLED;
+use super::time::{NEVER, Ticks};
+use deadlines::Deadlines;
+use graph::Kind;
+
+/// Beyond this, costs are all alike.
+const MOST: u32 = 1 << 20;
+
+/// Not reached.
+const UNREACHED: u32 = u32::MAX;
+
+/// No operator: true in the state.
+const NO_OPERATOR: u32 = u32::MAX;
+
+/// What one evaluation found.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Estimate {
+    /// How many steps the relaxed plan has.
+    pub(crate) steps: u32,
+    /// The steps whose conditions hold in the state; in time they may still be impossible.
+    pub(crate) applicable: Vec<Step>,
+    /// Those among them that are in the relaxed plan.
+    pub(crate) preferred: Vec<Step>,
+}
+
+/// Evaluates states; keeps its tables from one to the next.
+#[derive(Debug)]
+pub(crate) struct Relaxed<'a> {
+    compiled: &'a Compiled,
+    graph: Graph,
+    cost: Vec<u32>,
+    achiever: Vec<u32>,
+    /// How often the achiever must be repeated.
+    repetitions: Vec<u32>,
+    /// How many preconditions an operator waits for.
+    missing: Vec<u32>,
+    operator_cost: Vec<u32>,
+    is_used: Vec<bool>,
+    is_wanted: Vec<bool>,
+    gaps: Vec<f64>,
+    buckets: Vec<Vec<u32>>,
+    applicable: Vec<u32>,
+    deadlines: Deadlines,
+    /// Nothing may happen later.
+    pub(crate) horizon: Ticks,
+}
+
+impl<'a> Relaxed<'a> {
+    /// With `merges_eager`, actions that can end at once count as one step.
+    pub(crate) fn new(compiled: &'a Compiled, merges_eager: bool) -> Self {
+        let graph = Graph::of(compiled, merges_eager);
+        let (propositions, operators) = (graph.proposition_count, graph.operators.len());
+        Self {
+            compiled,
+            cost: vec![UNREACHED; propositions],
+            achiever: vec![NO_OPERATOR; propositions],
+            repetitions: vec![1; propositions],
+            missing: Vec::with_capacity(operators),
+            operator_cost: vec![0; operators],
+            is_used: vec![false; operators],
+            is_wanted: vec![false; propositions],
+            gaps: vec![0.0; compiled.tests.len()],
+            buckets: Vec::new(),
+            applicable: Vec::new(),
+            deadlines: Deadlines::default(),
+            horizon: NEVER,
+            graph,
+        }
+    }
+
+    /// The estimate, or `None` if even the relaxed goal is out of reach.
+    pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
+        self.prepare(state);
+        self.spread(state);
+        let mut estimate = Estimate::default();
+        for open in &state.open {
+            let end = self.graph.end_of[open.action as usize];
+            if self.missing[end as usize] > 0 {
+                return None;
+            }
+        }
+        if self
+            .graph
+            .goal
+            .iter()
+            .any(|&goal| self.cost[goal as usize] == UNREACHED)
+        {
+            return None;
+        }
+        self.extract(state, &mut estimate);
+        self.list_applicable(state, &mut estimate);
+        Some(estimate)
+    }
+
+    /// Costs of what holds in the state.
+    fn prepare(&mut self, state: &State) {
+        self.cost.fill(UNREACHED);
+        self.missing.clone_from(&self.graph.precondition_counts);
+        for (cost, operator) in self.operator_cost.iter_mut().zip(&self.graph.operators) {
+            *cost = operator.cost;
+        }
+        self.applicable.clear();
+        if self.horizon < NEVER
+            || !self.graph.windows.is_empty()
+            || state.open.iter().any(|open| open.node == SETTLED && open.most < NEVER)
+        {
+            self.deadlines
+                .exclude_late(self.compiled, &self.graph, state, self.horizon, &mut self.missing);
+        }
+        let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
+            if cost[proposition as usize] != 0 {
+                cost[proposition as usize] = 0;
+                if buckets.is_empty() {
+                    buckets.push(Vec::new());
+                }
+                buckets[0].push(proposition);
+            }
+        };
+        let (cost, buckets) = (&mut self.cost, &mut self.buckets);
+        for fact in 0..self.compiled.facts.len() {
+            let truth = state.facts[fact / 64] >> (fact % 64) & 1;
+            let proposition = 2 * fact + usize::from(truth == 0);
+            #[allow(clippy::cast_possible_truncation, reason = "facts are numbered by u32")]
+            reach(proposition as u32, cost, buckets);
+        }
+        for (number, gap) in self.gaps.iter_mut().enumerate() {
+            #[allow(clippy::cast_possible_truncation, reason = "tests are numbered by u32")]
+            let test = number as u32;
+            let is_free = self.graph.is_free_test[number];
+            if is_free || state.passes(self.compiled, test, None) {
+                reach(self.graph.test(test), cost, buckets);
+            } else {
+                *gap = numbers::gap(self.compiled, test, state);
+            }
+        }
+        for open in &state.open {
+            reach(self.graph.running(open.action), cost, buckets);
+        }
+    }
+
+    /// Dijkstra's algorithm from what holds.
+    fn spread(&mut self, state: &State) {
+        for position in 0..self.graph.sources.len() {
+            let operator = self.graph.sources[position];
+            let is_past = matches!(
+                self.graph.operators[operator as usize].kind,
+                Kind::Timed(timed) if timed < state.timed
+            );
+            if !is_past && self.missing[operator as usize] == 0 {
+                self.fire(operator);
+            }
+        }
+        let mut cost = 0;
+        while cost < self.buckets.len() {
+            let Some(proposition) = self.buckets[cost].pop() else {
+                cost += 1;
+                continue;
+            };
+            #[allow(clippy::cast_possible_truncation, reason = "below MOST")]
+            let reached = cost as u32;
+            // Each cost that a proposition had is in the queue once; only the last one counts.
+            if self.cost[proposition as usize] != reached {
+                continue;
+            }
+            for position in self.graph.needing(proposition) {
+                let operator = self.graph.needing_list[position] as usize;
+                self.operator_cost[operator] = self.operator_cost[operator]
+                    .saturating_add(reached)
+                    .min(MOST);
+                self.missing[operator] -= 1;
+                if self.missing[operator] == 0 {
+                    #[allow(clippy::cast_possible_truncation, reason = "counted by u32")]
+                    self.fire(operator as u32);
+                }
+            }
+        }
+    }
+
+    /// The operator's preconditions are reached.
+    fn fire(&mut self, operator: u32) {
+        let data = &self.graph.operators[operator as usize];
+        let cost = self.operator_cost[operator as usize];
+        if cost == data.cost && data.is_step {
+            self.applicable.push(operator);
+        }
+        for position in data.effects.clone() {
+            let proposition = self.graph.effects[position];
+            Self::lower(
+                &mut self.cost,
+                &mut self.achiever,
+                &mut self.repetitions,
+                &mut self.buckets,
+                (proposition, operator, cost, 1),
+            );
+        }
+        for position in data.gains.clone() {
+            let (test, gain) = self.graph.gains[position];
+            let times = numbers::repetitions(self.gaps[test as usize], gain);
+            let Some(times) = times else { continue };
+            let total = cost
+                .saturating_add((times - 1).saturating_mul(data.cost))
+                .min(MOST);
+            Self::lower(
+                &mut self.cost,
+                &mut self.achiever,
+                &mut self.repetitions,
+                &mut self.buckets,
+                (self.graph.test(test), operator, total, times),
+            );
+        }
+    }
+
+    fn lower(
+        costs: &mut [u32],
+        achievers: &mut [u32],
+        repetitions: &mut [u32],
+        buckets: &mut Vec<Vec<u32>>,
+        (proposition, operator, cost, times): (u32, u32, u32, u32),
+    ) {
+        let index = proposition as usize;
+        if cost < costs[index] {
+            costs[index] = cost;
+            achievers[index] = operator;
+            repetitions[index] = times;
+            if buckets.len() <= cost as usize {
+                buckets.resize(cost as usize + 1, Vec::new());
+            }
+            buckets[cost as usize].push(proposition);
+        }
+    }
+
+    /// Counts the steps of a relaxed plan, and notes its first steps.
+    fn extract(&mut self, state: &State, estimate: &mut Estimate) {
+        let mut wanted: Vec<u32> = self.graph.goal.clone();
+        let mut used: Vec<u32> = Vec::new();
+        let mut touched: Vec<u32> = Vec::new();
+        for open in &state.open {
+            let end = self.graph.end_of[open.action as usize];
+            Self::use_operator(&mut self.is_used, &mut used, end);
+            let needs = self.graph.operators[end as usize].preconditions.clone();
+            wanted.extend_from_slice(&self.graph.preconditions[needs]);
+        }
+        while let Some(proposition) = wanted.pop() {
+            let index = proposition as usize;
+            if self.cost[index] == 0 || std::mem::replace(&mut self.is_wanted[index], true) {
+                continue;
+            }
+            touched.push(proposition);
+            let operator = self.achiever[index];
+            let data = &self.graph.operators[operator as usize];
+            estimate.steps += (self.repetitions[index] - 1) * data.cost;
+            if Self::use_operator(&mut self.is_used, &mut used, operator) {
+                wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
+                if let Kind::Start(action) = data.kind {
+                    // What starts must end.
+                    let end = self.graph.end_of[action as usize];
+                    if self.missing[end as usize] == 0
+                        && Self::use_operator(&mut self.is_used, &mut used, end)
+                    {
+                        let needs = self.graph.operators[end as usize].preconditions.clone();
+                        wanted.extend_from_slice(&self.graph.preconditions[needs]);
+                    }
+                }
+            }
+        }
+        for &operator in &used {
+            let data = &self.graph.operators[operator as usize];
+            estimate.steps += data.cost;
+            self.is_used[operator as usize] = false;
+            if self.operator_cost[operator as usize] == data.cost {
+                push_steps(data.kind, state, &mut estimate.preferred);
+            } else if matches!(data.kind, Kind::Timed(_)) {
+                push_steps(data.kind, state, &mut estimate.preferred);
+            }
+        }
+        for proposition in touched {
+            self.is_wanted[proposition as usize] = false;
+        }
+        estimate.preferred.sort_unstable();
+        estimate.preferred.dedup();
+    }
+
+    fn use_operator(is_used: &mut [bool], used: &mut Vec<u32>, operator: u32) -> bool {
+        let is_new = !std::mem::replace(&mut is_used[operator as usize], true);
+        if is_new {
+            used.push(operator);
+        }
+        is_new
+    }
+
+    fn list_applicable(&mut self, state: &State, estimate: &mut Estimate) {
+        for &operator in &self.applicable {
+            let kind = self.graph.operators[operator as usize].kind;
+            if !matches!(kind, Kind::Timed(_)) {
+                push_steps(kind, state, &mut estimate.applicable);
+            }
+        }
+        if (state.timed as usize) < self.compiled.timed.len() {
+            estimate.applicable.push(Step::Timed);
+        }
+        estimate.applicable.sort_unstable();
+        estimate.applicable.dedup();
+    }
+}
+
+/// The steps that an operator stands for.
+fn push_steps(kind: Kind, state: &State, steps: &mut Vec<Step>) {
+    match kind {
+        Kind::Start(action) => steps.push(Step::Start(action)),
+        Kind::Whole(action) => steps.push(Step::Whole(action)),
+        Kind::End(action) => {
+            for (place, open) in (0..).zip(&state.open) {
+                if open.action == action {
+                    steps.push(Step::End(place));
+                }
+            }
+        }
+        Kind::Timed(_) => steps.push(Step::Timed),
+        Kind::Axiom => {}
+    }
+}

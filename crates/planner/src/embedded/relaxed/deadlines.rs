@@ -1,0 +1,173 @@
+//! When things can happen at the earliest, and what is too late for its deadline.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::super::compile::{Compiled, NONE};
+use super::super::network::SETTLED;
+use super::super::state::State;
+use super::super::time::{NEVER, Ticks};
+use super::graph::{Graph, Kind, Operator};
+
+/// Tables kept from one state to the next.
+#[derive(Debug, Default)]
+pub(super) struct Deadlines {
+    /// The earliest time of each proposition.
+    time: Vec<Ticks>,
+    missing: Vec<u32>,
+    /// The earliest beginning of each operator; [`NEVER`] while something is missing.
+    begin: Vec<Ticks>,
+    queue: BinaryHeap<Reverse<(Ticks, u32)>>,
+}
+
+impl Deadlines {
+    /// Makes operators that come too late wait for ever: those whose conditions cannot be true in
+    /// time, when nothing that was reached is ever lost and everything happens as early as it can
+    /// (h_max, Haslum & Geffner, ECP 2001, with the windows of timed initials).
+    pub(super) fn exclude_late(
+        &mut self,
+        compiled: &Compiled,
+        graph: &Graph,
+        state: &State,
+        horizon: Ticks,
+        waiting: &mut [u32],
+    ) {
+        self.time.clear();
+        self.time.resize(graph.proposition_count, NEVER);
+        self.missing.clone_from(&graph.precondition_counts);
+        self.begin.clear();
+        self.begin.resize(graph.operators.len(), compiled.now);
+        self.queue.clear();
+        self.reach_what_holds(compiled, graph, state);
+        for &operator in &graph.sources {
+            self.fire(compiled, graph, state, operator, horizon);
+        }
+        while let Some(Reverse((time, proposition))) = self.queue.pop() {
+            if self.time[proposition as usize] != time {
+                continue;
+            }
+            for position in graph.needing(proposition) {
+                let operator = graph.needing_list[position];
+                self.missing[operator as usize] -= 1;
+                let begin = &mut self.begin[operator as usize];
+                *begin = (*begin).max(time);
+                if self.missing[operator as usize] == 0 {
+                    self.fire(compiled, graph, state, operator, horizon);
+                }
+            }
+        }
+        for (number, waiting) in waiting.iter_mut().enumerate() {
+            if self.missing[number] > 0 || self.begin[number] >= NEVER {
+                *waiting += 1;
+            }
+        }
+    }
+
+    fn reach_what_holds(&mut self, compiled: &Compiled, graph: &Graph, state: &State) {
+        for (fact, stamps) in compiled.fact_stamps.iter().enumerate() {
+            let is_true = state.facts[fact / 64] >> (fact % 64) & 1 == 1;
+            let stamp = stamps[usize::from(!is_true)];
+            let mut time = compiled.now;
+            if stamp != NONE {
+                time = time.max(state.stamps[stamp as usize]);
+                for &(marked, node) in &state.network.marks {
+                    if marked == stamp {
+                        time = time.max(state.network.earliest(node));
+                    }
+                }
+            }
+            self.lower(2 * fact + usize::from(!is_true), time);
+        }
+        for test in 0..compiled.tests.len() {
+            let number = u32::try_from(test).expect("few tests");
+            if graph.is_free_test[test] || state.passes(compiled, number, None) {
+                self.lower(graph.test(number) as usize, compiled.now);
+            }
+        }
+        for open in &state.open {
+            let start = if open.node == SETTLED {
+                open.start
+            } else {
+                state.network.earliest(open.node)
+            };
+            self.lower(graph.running(open.action) as usize, start + open.least);
+        }
+    }
+
+    fn lower(&mut self, proposition: usize, time: Ticks) {
+        if time < self.time[proposition] {
+            self.time[proposition] = time;
+            let number = u32::try_from(proposition).expect("numbered by u32");
+            self.queue.push(Reverse((time, number)));
+        }
+    }
+
+    fn fire(
+        &mut self,
+        compiled: &Compiled,
+        graph: &Graph,
+        state: &State,
+        number: u32,
+        horizon: Ticks,
+    ) {
+        let operator = &graph.operators[number as usize];
+        let mut begin = self.begin[number as usize];
+        if let Kind::Timed(timed) = operator.kind {
+            if timed < state.timed {
+                begin = NEVER;
+            } else {
+                begin = begin.max(compiled.timed[timed as usize].time);
+            }
+        } else {
+            begin = in_windows(graph, operator, begin);
+            if begin > horizon - operator.span {
+                begin = NEVER;
+            }
+        }
+        if let Kind::End(action) = operator.kind {
+            // An end that can come too late for all instances under way, and for no other.
+            let is_running_only = compiled.action(action).start == NONE;
+            let is_late = |open: &super::super::state::Open| {
+                open.action != action || open.most < NEVER && begin > open.start + open.most
+            };
+            if is_running_only && state.open.iter().all(is_late) {
+                begin = NEVER;
+            }
+        }
+        self.begin[number as usize] = begin;
+        if begin >= NEVER {
+            return;
+        }
+        for position in operator.effects.clone() {
+            let time = begin + graph.delays[position];
+            self.lower(graph.effects[position] as usize, time);
+        }
+        for position in operator.gains.clone() {
+            let (test, _) = graph.gains[position];
+            self.lower(graph.test(test) as usize, begin);
+        }
+    }
+}
+
+/// The earliest time, not before `begin`, at which the operator can begin as far as the literals
+/// that change at fixed times go.
+fn in_windows(graph: &Graph, operator: &Operator, mut begin: Ticks) -> Ticks {
+    let windows = &graph.windows[operator.windows.clone()];
+    loop {
+        let before = begin;
+        for window in windows {
+            let spans = &graph.timetable[window.timetable as usize];
+            let fitting = spans.iter().find_map(|&(from, until)| {
+                let time = begin.max(from.saturating_add(window.lead));
+                (until >= NEVER || time <= until - window.tail).then_some(time)
+            });
+            let Some(time) = fitting else {
+                return NEVER;
+            };
+            begin = time;
+        }
+        if begin == before {
+            return begin;
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! Greedy best-first search with deferred evaluation: a successor waits in the queue under its
+//! parent's estimate and is made only when its turn comes (Helmert 2006; Richter & Helmert 2009).
+//!
+//! Two queues take turns, one with all successors and one with the preferred ones only; whenever
+//! a better estimate is found, the preferred ones get a long turn.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::answer::Counts;
+use super::apply::{Step, Stepper};
+use super::compile::Compiled;
+use super::hash::Map;
+use super::relaxed::Relaxed;
+use super::state::State;
+use super::time::{NEVER, Ticks};
+
+/// How many turns the preferred successors get for a better estimate.
+const BOOST: i64 = 1000;
+
+/// How a search goes about it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Style {
+    /// Whether actions end at once where that costs little. Some plans are lost.
+    pub(crate) is_hasty: bool,
+    /// How many states that differ in times only are kept; more are dropped, and some plans lost.
+    pub(crate) variants: usize,
+}
+
+/// A search in progress.
+#[derive(Debug)]
+pub(crate) struct Search<'a> {
+    compiled: &'a Compiled,
+    style: Style,
+    stepper: Stepper<'a>,
+    relaxed: Relaxed<'a>,
+    nodes: Vec<Node>,
+    /// The nodes of each discrete hash.
+    known: Map<u64, Vec<u32>>,
+    all: Queue,
+    preferred: Queue,
+    turns: [i64; 2],
+    best_steps: u32,
+    /// Whether times are irrelevant but for their distances.
+    is_timeless: bool,
+    /// Whether something was dropped that could have led to a plan.
+    pub(crate) has_lost: bool,
+    pub(crate) expanded: u64,
+    pub(crate) generated: u64,
+    pub(crate) evaluated: u64,
+    pub(crate) memory: usize,
+}
+
+#[derive(Debug)]
+struct Node {
+    parent: u32,
+    step: Step,
+    state: State,
+}
+
+const ROOT: u32 = u32::MAX;
+
+/// Successors by estimate, first come first served.
+#[derive(Debug, Default)]
+struct Queue {
+    buckets: BTreeMap<u32, VecDeque<(u32, Step)>>,
+}
+
+impl Queue {
+    fn push(&mut self, estimate: u32, parent: u32, step: Step) {
+        self.buckets
+            .entry(estimate)
+            .or_default()
+            .push_back((parent, step));
+    }
+
+    fn pop(&mut self) -> Option<(u32, Step)> {
+        let mut first = self.buckets.first_entry()?;
+        let entry = first.get_mut().pop_front();
+        if first.get().is_empty() {
+            first.remove();
+        }
+        entry
+    }
+}
+
+/// What a turn of the search brought.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Turn {
+    /// The choices that lead to a state in which the goal holds.
+    Goal(Vec<Step>),
+    Nothing,
+    /// There is nothing left to look at.
+    Over,
+}
+
+impl<'a> Search<'a> {
+    pub(crate) fn new(compiled: &'a Compiled, style: Style) -> Self {
+        let has_deadline = |most: Ticks| most < NEVER;
+        let is_timeless = compiled.timed.is_empty()
+            && !compiled
+                .initial
+                .open
+                .iter()
+                .any(|open| has_deadline(open.most));
+        Self {
+            compiled,
+            style,
+            stepper: Stepper::new(compiled),
+            relaxed: Relaxed::new(compiled, style.is_hasty),
+            nodes: Vec::new(),
+            known: Map::default(),
+            all: Queue::default(),
+            preferred: Queue::default(),
+            turns: [0, 0],
+            best_steps: u32::MAX,
+            is_timeless,
+            has_lost: false,
+            expanded: 0,
+            generated: 0,
+            evaluated: 0,
+            memory: 0,
+        }
+    }
+
+    /// From now on only plans count that end by then.
+    pub(crate) fn set_horizon(&mut self, horizon: Ticks) {
+        self.stepper.horizon = horizon;
+        self.relaxed.horizon = horizon;
+        self.is_timeless = false;
+    }
+
+    /// Whether the search claims more than it can: it has dropped or rounded something.
+    pub(crate) fn is_incomplete(&self) -> bool {
+        self.has_lost || self.stepper.has_rounded
+    }
+
+    /// Statistics.
+    pub(crate) fn counts(&self) -> Counts {
+        Counts {
+            actions: 0,
+            expanded: self.expanded,
+            generated: self.generated,
+            evaluated: self.evaluated,
+            memory: self.memory,
+        }
+    }
+
+    /// Looks at one more state.
+    pub(crate) fn turn(&mut self) -> Turn {
+        if self.nodes.is_empty() {
+            let initial = self.compiled.initial.clone();
+            if initial.earliest_end() > self.stepper.horizon {
+                return Turn::Over;
+            }
+            return self.visit(ROOT, Step::Timed, initial);
+        }
+        let queue = match self.turns[0] <= self.turns[1] && !self.preferred.buckets.is_empty() {
+            true => 0,
+            false => 1,
+        };
+        self.turns[queue] += 1;
+        let entry = match queue {
+            0 => self.preferred.pop(),
+            _ => self.all.pop().or_else(|| self.preferred.pop()),
+        };
+        let Some((parent, step)) = entry else {
+            return Turn::Over;
+        };
+        let (step, state) = match self.make(parent, step) {
+            Some(made) => made,
+            None => return Turn::Nothing,
+        };
+        self.visit(parent, step, state)
+    }
+
+    /// The successor; in haste, one in which what has started is over, if possible.
+    fn make(&mut self, parent: u32, step: Step) -> Option<(Step, State)> {
+        let state = &self.nodes[parent as usize].state;
+        if let Step::Start(action) | Step::Whole(action) = step {
+            let data = self.compiled.action(action);
+            let runs_already = || {
+                state
+                    .open
+                    .iter()
+                    .filter(|open| open.action == action)
+                    .count()
+            };
+            if !data.excludes_itself && data.end != super::compile::NONE {
+                let most = if self.style.is_hasty { 0 } else { 1 };
+                if runs_already() > most {
+                    self.has_lost = true;
+                    return None;
+                }
+            }
+            if self.style.is_hasty && data.is_eager {
+                let whole = Step::Whole(action);
+                if let Some(next) = self.stepper.apply(state, whole) {
+                    self.has_lost = true;
+                    return Some((whole, next));
+                }
+            }
+        }
+        let step = match step {
+            Step::Whole(action) => Step::Start(action),
+            other => other,
+        };
+        let next = self.stepper.apply(state, step)?;
+        Some((step, next))
+    }
+
+    fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
+        let hash = state.discrete_hash();
+        if self.is_known(hash, &state) {
+            return Turn::Nothing;
+        }
+        self.evaluated += 1;
+        let Some(estimate) = self.relaxed.evaluate(&state) else {
+            return Turn::Nothing;
+        };
+        let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
+        self.known.entry(hash).or_default().push(number);
+        self.memory += state.size() + size_of::<Node>() + 64;
+        let is_goal = self.is_goal(&state);
+        self.nodes.push(Node {
+            parent,
+            step,
+            state,
+        });
+        if is_goal {
+            // A state in which the goal holds may still have successors worth looking at: the
+            // judge can refuse the plan.
+            self.expand(number, &estimate);
+            return Turn::Goal(self.steps_to(number));
+        }
+        self.expand(number, &estimate);
+        Turn::Nothing
+    }
+
+    fn expand(&mut self, number: u32, estimate: &super::relaxed::Estimate) {
+        self.expanded += 1;
+        if estimate.steps < self.best_steps {
+            self.best_steps = estimate.steps;
+            self.turns[0] -= BOOST;
+        }
+        self.memory += 24 * (estimate.preferred.len() + estimate.applicable.len());
+        for &step in &estimate.preferred {
+            self.preferred.push(estimate.steps, number, step);
+        }
+        for &step in &estimate.applicable {
+            self.generated += 1;
+            self.all.push(estimate.steps, number, step);
+        }
+    }
+
+    /// Whether a state that is at least as good has been looked at.
+    fn is_known(&mut self, hash: u64, state: &State) -> bool {
+        let Some(similar) = self.known.get(&hash) else {
+            return false;
+        };
+        let mut variants = 0;
+        for &number in similar {
+            let other = &self.nodes[number as usize].state;
+            if other.is_discretely(state) {
+                if other.is_no_later_than(state, self.is_timeless) {
+                    return true;
+                }
+                variants += 1;
+            }
+        }
+        if variants >= self.style.variants {
+            self.has_lost = true;
+            return true;
+        }
+        false
+    }
+
+    /// Whether the plan could end here.
+    fn is_goal(&self, state: &State) -> bool {
+        let compiled = self.compiled;
+        if !state.open.is_empty()
+            || !compiled
+                .goal
+                .holds(&state.facts, &mut |test| state.passes(compiled, test, None))
+        {
+            return false;
+        }
+        // What happens by itself before the last happening counts.
+        let end = state.earliest_end();
+        compiled
+            .goal_timed
+            .iter()
+            .filter(|&&timed| timed >= state.timed)
+            .all(|&timed| compiled.timed[timed as usize].time > end)
+    }
+
+    fn steps_to(&self, mut number: u32) -> Vec<Step> {
+        let mut steps = Vec::new();
+        while self.nodes[number as usize].parent != ROOT {
+            let node = &self.nodes[number as usize];
+            steps.push(node.step);
+            number = node.parent;
+        }
+        steps.reverse();
+        steps
+    }
+}

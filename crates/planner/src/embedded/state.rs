@@ -1,0 +1,255 @@
+//! A state of the search: what holds after the happenings chosen so far, and what is known of
+//! their times.
+
+use std::hash::{Hash, Hasher};
+
+use elbowroom_num::Rational;
+
+use super::compile::Compiled;
+use super::formula::set;
+use super::hash::Mixer;
+use super::network::{Network, NodeId, SETTLED};
+use super::time::{NEVER, Ticks};
+
+/// See the module.
+///
+/// The happenings chosen so far come in some order; only what interferes keeps its order in time
+/// too, so that a later choice may well happen earlier. That is how a sequence of choices stands
+/// for a plan in which things happen side by side (Coles et al., "Forward-chaining partial-order
+/// planning", ICAPS 2010).
+#[derive(Clone, Debug, Default)]
+pub(crate) struct State {
+    /// A bit for each fact.
+    pub(crate) facts: Vec<u64>,
+    pub(crate) values: Vec<Option<Rational>>,
+    /// The latest settled time at which each kind of thing happened.
+    pub(crate) stamps: Vec<Ticks>,
+    /// What has started and not ended, by action.
+    pub(crate) open: Vec<Open>,
+    /// How many of the timed initials have happened.
+    pub(crate) timed: u32,
+    pub(crate) network: Network,
+    /// The time of the last settled happening.
+    pub(crate) settled_end: Ticks,
+}
+
+/// An action under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Open {
+    pub(crate) action: u32,
+    /// The node of its start, or [`SETTLED`].
+    pub(crate) node: NodeId,
+    /// When it started, if that is settled.
+    pub(crate) start: Ticks,
+    pub(crate) least: Ticks,
+    /// [`NEVER`] if there is no bound.
+    pub(crate) most: Ticks,
+    /// The duration, if it leaves no choice.
+    pub(crate) duration: Option<Rational>,
+    /// Which of the action's guards held at the start.
+    pub(crate) guards: u64,
+}
+
+impl Open {
+    /// An action that was under way before the search began.
+    pub(crate) fn under_way(action: u32, start: Ticks, least: Ticks, most: Option<Ticks>) -> Self {
+        Self {
+            action,
+            node: SETTLED,
+            start,
+            least,
+            most: most.unwrap_or(NEVER),
+            duration: None,
+            guards: u64::MAX,
+        }
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        self.action == other.action
+            && self.guards == other.guards
+            && self.least == other.least
+            && self.most == other.most
+            && (self.node == SETTLED) == (other.node == SETTLED)
+            && self.duration == other.duration
+    }
+}
+
+impl State {
+    /// The state in which the search begins; nothing is under way yet.
+    pub(crate) fn new(
+        compiled: &Compiled,
+        facts: impl Iterator<Item = bool>,
+        values: Vec<Option<Rational>>,
+    ) -> Self {
+        let mut bits = vec![0; compiled.facts.len().div_ceil(64)];
+        for (fact, truth) in facts.enumerate() {
+            set(&mut bits, u32::try_from(fact).expect("few facts"), truth);
+        }
+        let mut state = Self {
+            facts: bits,
+            values,
+            stamps: vec![-NEVER; compiled.stamp_count],
+            settled_end: compiled.now,
+            ..Self::default()
+        };
+        state.derive(compiled);
+        state
+    }
+
+    /// Settles the truth of derived facts.
+    pub(crate) fn derive(&mut self, compiled: &Compiled) {
+        for (rules, heads) in compiled.strata.iter().zip(&compiled.derived) {
+            for &head in heads {
+                set(&mut self.facts, head, false);
+            }
+            loop {
+                let mut changed = false;
+                for rule in rules {
+                    if super::formula::is_set(&self.facts, rule.head) {
+                        continue;
+                    }
+                    let holds = rule
+                        .body
+                        .holds(&self.facts, &mut |test| self.passes(compiled, test, None));
+                    if holds {
+                        set(&mut self.facts, rule.head, true);
+                        changed = true;
+                    }
+                }
+                if !changed {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Whether a numeric test holds. One that reads something without a value does not.
+    pub(crate) fn passes(
+        &self,
+        compiled: &Compiled,
+        test: u32,
+        duration: Option<&Rational>,
+    ) -> bool {
+        let test = &compiled.tests[test as usize];
+        test.difference
+            .value(&self.values, duration)
+            .is_some_and(|value| test.comparison.holds(&value, &Rational::ZERO))
+    }
+
+    /// The earliest time at which all that was chosen can be over; of what is under way, its least
+    /// duration counts.
+    pub(crate) fn earliest_end(&self) -> Ticks {
+        let open = self.open.iter().map(|open| {
+            let start = if open.node == SETTLED {
+                open.start
+            } else {
+                self.network.earliest(open.node)
+            };
+            start + open.least
+        });
+        open.fold(
+            self.settled_end.max(self.network.earliest_end()),
+            Ticks::max,
+        )
+    }
+
+    /// A hash of all but the times.
+    pub(crate) fn discrete_hash(&self) -> u64 {
+        let mut mixer = Mixer::default();
+        for word in &self.facts {
+            mixer.write_u64(*word);
+        }
+        for value in &self.values {
+            value.hash(&mut mixer);
+        }
+        for open in &self.open {
+            mixer.write_u32(open.action);
+            mixer.write_u64(open.guards);
+        }
+        mixer.write_u32(self.timed);
+        mixer.finish()
+    }
+
+    /// Whether two states differ in times only.
+    pub(crate) fn is_discretely(&self, other: &Self) -> bool {
+        self.facts == other.facts
+            && self.timed == other.timed
+            && self.open.len() == other.open.len()
+            && self.open.iter().zip(&other.open).all(|(a, b)| a.is_like(b))
+            && self.values == other.values
+    }
+
+    /// Whether all that can follow the other state can follow this one, in time: every schedule of
+    /// what matters of the other's past is one of this one's. Both must be discretely the same.
+    ///
+    /// Without anything that happens at a fixed time, only distances matter, and `is_timeless`
+    /// says so.
+    pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
+        if is_timeless && self.network.is_empty() {
+            return true;
+        }
+        if !is_timeless && !at_most(&self.latest_stamps(), &other.latest_stamps()) {
+            return false;
+        }
+        if !is_timeless && self.settled_end > other.settled_end {
+            return false;
+        }
+        if self.network.is_empty() {
+            return true;
+        }
+        self.open
+            .iter()
+            .zip(&other.open)
+            .filter(|(open, _)| open.node != SETTLED)
+            .all(|(mine, theirs)| {
+                let (a, b) = (&self.network, &other.network);
+                let (from_mine, from_theirs) =
+                    (a.distances_from(mine.node), b.distances_from(theirs.node));
+                let no_later = is_timeless || a.earliest(mine.node) <= b.earliest(theirs.node);
+                no_later
+                    && a.latest_given(&from_mine) >= b.latest_given(&from_theirs)
+                    && self
+                        .open
+                        .iter()
+                        .zip(&other.open)
+                        .filter(|(open, _)| open.node != SETTLED)
+                        .all(|(i, j)| from_mine[i.node as usize] <= from_theirs[j.node as usize])
+                    && at_most(
+                        &stamp_distances(a, &from_mine, self.stamps.len()),
+                        &stamp_distances(b, &from_theirs, self.stamps.len()),
+                    )
+            })
+    }
+
+    /// The stamps, those of unsettled happenings at their earliest.
+    fn latest_stamps(&self) -> Vec<Ticks> {
+        let mut stamps = self.stamps.clone();
+        for &(stamp, node) in &self.network.marks {
+            let stamp = &mut stamps[stamp as usize];
+            *stamp = (*stamp).max(self.network.earliest(node));
+        }
+        stamps
+    }
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        size_of::<Self>()
+            + 8 * (self.facts.len() + self.stamps.len())
+            + size_of::<Option<Rational>>() * self.values.len()
+            + size_of::<Open>() * self.open.len()
+            + self.network.size()
+    }
+}
+
+fn stamp_distances(network: &Network, distances: &[Ticks], count: usize) -> Vec<Ticks> {
+    let mut stamps = vec![-NEVER; count];
+    for &(stamp, node) in &network.marks {
+        let stamp = &mut stamps[stamp as usize];
+        *stamp = (*stamp).max(distances[node as usize]);
+    }
+    stamps
+}
+
+fn at_most(these: &[Ticks], those: &[Ticks]) -> bool {
+    these.iter().zip(those).all(|(this, that)| this <= that)
+}

@@ -1,0 +1,128 @@
+//! Time as whole numbers of ticks.
+
+use elbowroom_num::Rational;
+
+/// A time or a span of time, in ticks.
+pub(crate) type Ticks = i64;
+
+/// Later than any time that occurs; sums of two of them still fit.
+pub(crate) const NEVER: Ticks = i64::MAX / 4;
+
+/// The finest grid worth having: times up to some hundred million units still fit.
+const FINEST: i128 = 10_000_000_000;
+
+/// The grid used when the exact one would be too fine: it fits times of milliseconds and of a
+/// third of a unit.
+const ROUNDED: i64 = 3_000_000;
+
+/// How many ticks make a unit of time.
+///
+/// The grid is chosen so that all times and constant durations that the problem mentions lie on
+/// it. Where that is impossible, or a duration that depends on the state falls between two ticks,
+/// the search works with rounded numbers; the times of the plan it finds are computed exactly
+/// afterwards, and the search claims no proof.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scale {
+    ticks_per_unit: i64,
+}
+
+impl Scale {
+    /// The coarsest grid that holds all of these numbers, or a fine one if there is none.
+    pub(crate) fn of<'a>(numbers: impl Iterator<Item = &'a Rational>) -> Self {
+        let mut common: i128 = 1;
+        let mut largest = 1.0_f64;
+        for number in numbers {
+            largest = largest.max(number.to_f64().abs());
+            let Some(denominator) = number.denominator() else {
+                return Self::rounded();
+            };
+            let denominator = i128::from(denominator);
+            common = common / gcd(common, denominator) * denominator;
+            if common > FINEST {
+                return Self::rounded();
+            }
+        }
+        #[allow(clippy::cast_precision_loss, reason = "an estimate of magnitudes")]
+        let is_too_large = largest * common as f64 > 1e14;
+        match i64::try_from(common) {
+            Ok(ticks_per_unit) if !is_too_large => Self { ticks_per_unit },
+            _ => Self::rounded(),
+        }
+    }
+
+    fn rounded() -> Self {
+        Self {
+            ticks_per_unit: ROUNDED,
+        }
+    }
+
+    /// The number in ticks, if it lies on the grid and is not enormous.
+    pub(crate) fn exactly(self, number: &Rational) -> Option<Ticks> {
+        let (numerator, denominator) = number.as_small()?;
+        if self.ticks_per_unit % denominator != 0 {
+            return None;
+        }
+        let ticks = numerator.checked_mul(self.ticks_per_unit / denominator)?;
+        (ticks.abs() < NEVER).then_some(ticks)
+    }
+
+    /// The largest number of ticks not above the number, and whether it is exact.
+    pub(crate) fn floor(self, number: &Rational) -> (Ticks, bool) {
+        if let Some(ticks) = self.exactly(number) {
+            return (ticks, true);
+        }
+        let scaled = (number * Rational::from(self.ticks_per_unit)).floor();
+        match scaled.as_small() {
+            Some((ticks, _)) => (ticks.clamp(-NEVER, NEVER), false),
+            None if number.is_negative() => (-NEVER, false),
+            None => (NEVER, false),
+        }
+    }
+
+    /// The smallest number of ticks not below the number, and whether it is exact.
+    pub(crate) fn ceil(self, number: &Rational) -> (Ticks, bool) {
+        let (ticks, exact) = self.floor(&-number);
+        (-ticks, exact)
+    }
+
+    /// The time as a number of units.
+    pub(crate) fn units(self, ticks: Ticks) -> Rational {
+        Rational::new(ticks, self.ticks_per_unit)
+    }
+}
+
+fn gcd(mut a: i128, mut b: i128) -> i128 {
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Scale;
+    use elbowroom_num::Rational;
+
+    #[test]
+    fn the_grid_holds_all_numbers_it_was_made_for() {
+        let numbers = [
+            Rational::new(1, 1000),
+            Rational::new(1, 3),
+            Rational::new(52_548_684_307, 125_000_000),
+        ];
+        let scale = Scale::of(numbers.iter());
+        for number in &numbers {
+            let ticks = scale.exactly(number).expect("on the grid");
+            assert_eq!(scale.units(ticks), *number);
+        }
+        assert_eq!(scale.floor(&Rational::new(1, 7)).1, false);
+    }
+
+    #[test]
+    fn rounding_goes_down_and_up() {
+        let scale = Scale::of([Rational::ONE].iter());
+        assert_eq!(scale.floor(&Rational::new(-3, 2)), (-2, false));
+        assert_eq!(scale.ceil(&Rational::new(-3, 2)), (-1, false));
+        assert_eq!(scale.ceil(&Rational::new(3, 1)), (3, true));
+    }
+}
