@@ -3,3 +3,4 @@
 pub(crate) mod check;
 pub(crate) mod envelope;
 pub(crate) mod stn;
+pub(crate) mod run;

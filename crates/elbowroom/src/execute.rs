@@ -5,4 +5,4 @@ mod analyst;
 mod planners;
 
 pub use analyst::{Analyst, WholeRegion};
-pub use planners::Clockless;
+pub use planners::{Clockless, Embedded};

@@ -165,7 +165,7 @@ impl Region for WholeRegion {
         };
         let explainer = crate::Explainer::new(task, &plan, &self.epsilon);
         let envelope = DecoupledEnvelope::point(values);
-        Some(explainer.explain(&oracle, &envelope, &objection).to_string())
+        Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
 }
 
