@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Envelope(Box<EnvelopeArgs>),
     /// Execute a plan in a world, watch it, and replan when it no longer works
     Run(Box<RunArgs>),
+    /// Compare executors in many runs of an experiment
+    Compare(CompareArgs),
 }
 
 /// The problem that every command is about.
@@ -201,6 +203,40 @@ pub(crate) struct RunArgs {
     /// Print the outcome as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// The experiment (docs/formats/experiment.md)
+    #[arg(value_name = "EXPERIMENT.toml")]
+    pub(crate) experiment: PathBuf,
+    /// How many trials of each problem; by default as many as the experiment says
+    #[arg(long, value_name = "N")]
+    pub(crate) trials: Option<u64>,
+    /// How many threads; 0 is as many as there are processors
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) jobs: usize,
+    /// Make only the part `I` of `N`, counted from 0
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub(crate) shard: Option<(u64, u64)>,
+    /// Make no trials, but put the results of parts together
+    #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
+    pub(crate) merge: Vec<PathBuf>,
+    /// Write results.json, table.md and table.csv there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print the results as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn shard(text: &str) -> Result<(u64, u64), String> {
+    let numbers = text.split_once('/');
+    let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match numbers {
+        Some((shard, shards)) if shard < shards => Ok((shard, shards)),
+        _ => Err("write I/N with 0 <= I < N, as in 0/4".to_owned()),
+    }
 }
 
 /// Who makes plans.

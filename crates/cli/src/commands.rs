@@ -1,6 +1,7 @@
 //! One module for each command.
 
 pub(crate) mod check;
+pub(crate) mod compare;
 pub(crate) mod envelope;
 pub(crate) mod stn;
 pub(crate) mod run;

@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         Command::Check(arguments) => commands::check::run(&arguments),
         Command::Stn(arguments) => commands::stn::run(&arguments),
         Command::Envelope(arguments) => commands::envelope::run(&arguments),
+        Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),
     };
     let exit = answer.unwrap_or_else(|failure| {

@@ -49,6 +49,7 @@
 //! does not print.
 
 mod box_text;
+pub mod compare;
 pub mod execute;
 mod explain;
 pub mod flow;

@@ -106,7 +106,13 @@ impl Run<'_> {
     /// expected to take, and ε after whatever happens last before that.
     fn situation(&self) -> (Situation, Vec<Ticket>) {
         let epsilon = &self.settings.epsilon;
-        let mut time = &self.now + &self.allowance + epsilon;
+        let mut time = &self.now + &self.allowance;
+        if self.now.is_positive() || self.account.started() > 0 {
+            time += epsilon;
+        }
+        if time.is_zero() {
+            return (Situation::initial(&self.task), Vec::new());
+        }
         let mut state = self.belief.clone();
         loop {
             let _ = state.advance(&time);
