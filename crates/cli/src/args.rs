@@ -37,6 +37,10 @@ pub(crate) enum Command {
     Stn(StnArgs),
     /// Find out how far each duration, rate or deadline may deviate
     Envelope(Box<EnvelopeArgs>),
+    /// Execute a plan in a world, watch it, and replan when it no longer works
+    Run(Box<RunArgs>),
+    /// Compare executors in many runs of an experiment
+    Compare(CompareArgs),
 }
 
 /// The problem that every command is about.
@@ -182,6 +186,139 @@ pub(crate) struct EnvelopeArgs {
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(after_long_help = executors_help())]
+pub(crate) struct RunArgs {
+    /// The domain, in PDDL
+    #[arg(value_name = "DOMAIN", required_unless_present = "replay")]
+    pub(crate) domain: Option<PathBuf>,
+    /// The problem, in PDDL
+    #[arg(value_name = "PROBLEM", required_unless_present = "replay")]
+    pub(crate) problem: Option<PathBuf>,
+    /// The plan to begin with; without it, a plan is made
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Who makes plans
+    #[arg(long, value_enum, default_value_t = PlannerChoice::Embedded)]
+    pub(crate) planner: PlannerChoice,
+    /// How many states the embedded planner may look at for one plan
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    pub(crate) planner_states: u64,
+    /// The world to execute in (docs/formats/world.md); without it, everything goes as planned
+    #[arg(long, value_name = "WORLD.toml")]
+    pub(crate) world: Option<PathBuf>,
+    /// A program that is the world, and talks JSON Lines (docs/formats/world-protocol.md)
+    #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
+    pub(crate) world_process: Option<String>,
+    /// How long to wait for each word of that program, in seconds
+    #[arg(long, value_name = "S", default_value = "3600", value_parser = positive)]
+    pub(crate) answer_within: Rational,
+    /// Who decides
+    #[arg(long, value_name = "NAME", default_value = "guarded")]
+    pub(crate) executor: String,
+    /// Which of the possible trajectories of the world to take
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// What to leave open, see `elbowroom help envelope`; by default all durations
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) vary: Vec<String>,
+    /// How close to its limit each end of the envelope should come
+    #[arg(long, value_name = "B", default_value = "1", value_parser = positive)]
+    pub(crate) precision: Rational,
+    /// What becomes of running actions when a new plan is made
+    #[arg(long, value_enum, default_value_t = RunningChoice::Cancel)]
+    pub(crate) running: RunningChoice,
+    /// How long making a plan takes in the world: `measured`, or always so many seconds
+    #[arg(long, value_name = "measured|S", default_value = "0")]
+    pub(crate) planning_time: String,
+    /// How often a new plan may be made
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(crate) max_replans: usize,
+    /// When the run ends in any case, in the world's seconds
+    #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive)]
+    pub(crate) time_limit: Rational,
+    /// Let so many seconds of the world pass in one second
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    pub(crate) realtime: Option<Rational>,
+    /// Write the record of the run there (docs/formats/trace.md)
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) trace: Option<PathBuf>,
+    /// Play a stored trace back, and say whether it comes to the same decisions
+    #[arg(long, value_name = "TRACE", conflicts_with_all = ["domain", "world", "plan", "realtime"])]
+    pub(crate) replay: Option<PathBuf>,
+    /// How far apart interfering happenings must be
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    pub(crate) epsilon: Rational,
+    /// Print the outcome as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// The experiment (docs/formats/experiment.md)
+    #[arg(value_name = "EXPERIMENT.toml")]
+    pub(crate) experiment: PathBuf,
+    /// How many trials of each problem; by default as many as the experiment says
+    #[arg(long, value_name = "N")]
+    pub(crate) trials: Option<u64>,
+    /// How many threads; 0 is as many as there are processors
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) jobs: usize,
+    /// Make only the part `I` of `N`, counted from 0
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    pub(crate) shard: Option<(u64, u64)>,
+    /// Make no trials, but put the results of parts together
+    #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
+    pub(crate) merge: Vec<PathBuf>,
+    /// Write results.json, table.md and table.csv there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print the results as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn shard(text: &str) -> Result<(u64, u64), String> {
+    let numbers = text.split_once('/');
+    let numbers = numbers.and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match numbers {
+        Some((shard, shards)) if shard < shards => Ok((shard, shards)),
+        _ => Err("write I/N with 0 <= I < N, as in 0/4".to_owned()),
+    }
+}
+
+/// Who makes plans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PlannerChoice {
+    /// The planner that is built in
+    Embedded,
+    /// Nobody: when the plan no longer works, the run is over
+    None,
+}
+
+/// What becomes of running actions when a new plan is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RunningChoice {
+    /// They are cancelled
+    Cancel,
+    /// They are awaited
+    Await,
+    /// They go on, and the plan goes on with them
+    Keep,
+}
+
+fn executors_help() -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from("Executors:\n");
+    for executor in elbowroom::execution::executors::EXECUTORS {
+        let _ = writeln!(text, "  {}", executor.usage());
+        let _ = writeln!(text, "      {}", executor.summary);
+        let _ = writeln!(text, "      ({})", executor.paper);
+    }
+    text
 }
 
 const VARY_HELP: &str = "\

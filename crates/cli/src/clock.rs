@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use elbowroom::num::Rational;
+
 /// Measures the time since it was started.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clock(Instant);
@@ -19,5 +21,11 @@ impl Clock {
     /// How long ago it was started.
     pub(crate) fn elapsed(self) -> Duration {
         self.0.elapsed()
+    }
+
+    /// The same in seconds, in thousandths, as the library counts time.
+    pub(crate) fn seconds(self) -> Rational {
+        let milliseconds = i64::try_from(self.0.elapsed().as_millis()).unwrap_or(i64::MAX);
+        Rational::new(milliseconds, 1000)
     }
 }

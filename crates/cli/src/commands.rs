@@ -1,6 +1,8 @@
 //! One module for each command.
 
 pub(crate) mod check;
+pub(crate) mod compare;
 pub(crate) mod envelope;
 pub(crate) mod plan;
 pub(crate) mod stn;
+pub(crate) mod run;

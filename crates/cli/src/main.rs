@@ -33,6 +33,8 @@ fn main() -> ExitCode {
         Command::Plan(arguments) => commands::plan::run(&arguments),
         Command::Stn(arguments) => commands::stn::run(&arguments),
         Command::Envelope(arguments) => commands::envelope::run(&arguments),
+        Command::Compare(arguments) => commands::compare::run(&arguments),
+        Command::Run(arguments) => commands::run::run(&arguments),
     };
     let exit = answer.unwrap_or_else(|failure| {
         output::tell(&failure.to_string());

@@ -49,6 +49,8 @@
 //! does not print.
 
 mod box_text;
+pub mod compare;
+pub mod execute;
 mod explain;
 pub mod flow;
 pub mod graph;
@@ -64,6 +66,7 @@ pub use elbowroom_pddl as pddl;
 pub use elbowroom_plan as plan;
 pub use elbowroom_planner as planner;
 pub use elbowroom_probability as probability;
+pub use elbowroom_report as report;
 pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use explain::{Explainer, Explanation, Shortfall};

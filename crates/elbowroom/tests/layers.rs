@@ -25,6 +25,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("planner", &["num", "model", "stn", "pddl"]),
     ("execution", &["num", "model", "stn", "plan", "probability"]),
     ("sim", &["num", "model", "probability", "execution"]),
+    ("report", &["num", "model", "plan", "execution"]),
     (
         "elbowroom",
         &[
@@ -38,6 +39,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "planner",
             "execution",
             "sim",
+            "report",
         ],
     ),
     ("cli", &["elbowroom"]),

@@ -1,1 +1,52 @@
-//! Decides what to do next while a plan is executed, and says why. No clock, no I/O, no randomness.
+//! Decides what to do next while a plan is executed, watches, replans, and says why.
+//!
+//! In: a task, a plan, and what is observed. Out: decisions, each with its [`Reason`], and in the
+//! end a [`Report`](run::Report). No clock, no input or output, no randomness: the same history
+//! leads to the same decisions, so that a simulation, a robot, a test and a stored trace all drive
+//! the same code.
+//!
+//! - [`Executor`]: chooses. [`executors::EXECUTORS`] lists them all.
+//! - [`run::run`]: the loop of deciding, waiting, taking in what was observed, and replanning.
+//! - [`Progression`]: a state that follows what happens.
+//! - [`Recorder`]: takes the record of a run.
+//!
+//! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
+//! [`Planner`], [`Preparer`] and [`Region`] (what a plan survives). It does not know who stands
+//! behind them; in particular it knows no solver.
+//!
+//! ```
+//! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};
+//!
+//! let guarded: ExecutorSpec = "guarded".parse()?;
+//! assert_eq!(guarded.registered.name, "guarded");
+//! let baseline: ExecutorSpec = "fixed:30".parse()?;
+//! assert_eq!(baseline.argument, Some(30.into()));
+//! assert!(EXECUTORS.iter().all(|executor| !executor.summary.is_empty()));
+//! # Ok::<(), elbowroom_execution::executors::UnknownExecutor>(())
+//! ```
+
+mod dispatch;
+mod event;
+mod executor;
+pub mod executors;
+mod horizon;
+mod planning;
+mod preparation;
+mod progression;
+mod projection;
+mod quantities;
+mod reason;
+mod record;
+pub mod run;
+mod world;
+
+pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
+pub use executor::{
+    Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId,
+};
+pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
+pub use preparation::{Need, Prepared, Preparer, Region};
+pub use progression::{Progression, Underway, Unreadable};
+pub use reason::{Cause, Reason};
+pub use record::{Entry, NoRecord, Recorder};
+pub use world::{Passage, World, WorldError};

@@ -28,6 +28,7 @@ mod interference;
 mod plan;
 pub mod problem;
 pub mod reachability;
+mod residual;
 mod simplify;
 mod situation;
 mod task;

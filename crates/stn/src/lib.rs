@@ -17,7 +17,8 @@
 //! - [`ConsistentNetwork::shortest_paths_from`] and its kin: implied bounds, with the
 //!   constraints that imply them;
 //! - [`ConsistentNetwork::implied`]: the constraints one can leave out;
-//! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks.
+//! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
+//! - [`MovingWindows`]: windows that follow as one time after another becomes known.
 //!
 //! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
 //! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a
@@ -49,6 +50,7 @@ mod consistent;
 mod implied;
 mod lists;
 mod minimal;
+mod moving;
 mod network;
 mod paths;
 mod schedule;
@@ -60,6 +62,7 @@ mod windows;
 pub use consistency::NegativeCycle;
 pub use consistent::{Checkpoint, ConsistentNetwork};
 pub use minimal::Minimal;
+pub use moving::{Grounds, MovingWindows, OutOfWindow, WindowEnd};
 pub use network::{Constraint, ConstraintId, Network, NodeId};
 pub use paths::{Direction, ShortestPaths};
 pub use schedule::Schedule;

@@ -43,6 +43,11 @@ impl<W: Weight> ShortestPaths<W> {
         self.distances[node.index()].as_ref()
     }
 
+    /// The constraint next to the node on its path.
+    pub(crate) fn step(&self, node: NodeId) -> Option<ConstraintId> {
+        self.steps[node.index()].map(|(id, _)| id)
+    }
+
     /// The constraints whose sum is the bound, in the order of the path from its begin to its
     /// end; `None` when there is no bound.
     pub fn path(&self, node: NodeId) -> Option<Vec<ConstraintId>> {
@@ -145,14 +150,14 @@ impl<W: Weight> ConsistentNetwork<W> {
 }
 
 impl Direction {
-    fn far_end<W>(self, constraint: &Constraint<W>) -> NodeId {
+    pub(crate) fn far_end<W>(self, constraint: &Constraint<W>) -> NodeId {
         match self {
             Direction::FromRoot => constraint.to,
             Direction::ToRoot => constraint.from,
         }
     }
 
-    fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
+    pub(crate) fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
         match self {
             Direction::FromRoot => distance.minus(&schedule[node]),
             Direction::ToRoot => distance.plus(&schedule[node]),

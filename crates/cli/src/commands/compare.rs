@@ -1,0 +1,98 @@
+//! `elbowroom compare`: executors in many runs, side by side.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use elbowroom::compare::{self, Experiment, Part, Results};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::args::CompareArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::interrupt::Interrupt;
+use crate::{input, output};
+
+/// Makes an experiment, or a part of it, or puts parts together.
+pub(crate) fn run(arguments: &CompareArgs) -> Answer {
+    let name = arguments.experiment.display().to_string();
+    let text = input::source(&arguments.experiment, "experiment")?;
+    let folder = arguments.experiment.parent().map(Path::to_path_buf).unwrap_or_default();
+    let file = |name: &str| {
+        let path = folder.join(name);
+        fs::read_to_string(&path)
+            .map_err(|error| format!("cannot read {}: {}", path.display(), output::plain(&error)))
+    };
+    let experiment = Experiment::read(text.text(), &file)
+        .map_err(|error| Failure::new(format!("{name}, {error}"), ""))?;
+    let results = if arguments.merge.is_empty() {
+        make(arguments, &experiment)?
+    } else {
+        merged(&arguments.merge)?
+    };
+    if let Some(folder) = &arguments.output {
+        write(folder, &experiment, &results)?;
+    }
+    if arguments.json {
+        output::print_json(&results.json())?;
+    } else {
+        output::print(&results.table(&experiment).plain())?;
+    }
+    Ok(Exit::Yes)
+}
+
+fn make(arguments: &CompareArgs, experiment: &Experiment) -> Result<Results, Failure> {
+    let (shard, shards) = arguments.shard.unwrap_or((0, 1));
+    let part = Part {
+        trials: arguments.trials.unwrap_or(experiment.trials),
+        shard,
+        shards,
+        jobs: arguments.jobs,
+    };
+    let bar = ProgressBar::new(part.count(experiment)).with_style(
+        ProgressStyle::with_template("{bar:30} {pos}/{len} trials, {eta} left")
+            .expect("a template without mistakes"),
+    );
+    let interrupt = Interrupt::listen();
+    let shown = Mutex::new(0_u64);
+    let observe = |done: u64| {
+        if let Ok(mut shown) = shown.lock()
+            && done > *shown
+        {
+            *shown = done;
+            bar.set_position(done);
+        }
+        !interrupt.is_requested()
+    };
+    let results = compare::run(experiment, part, &observe);
+    bar.finish_and_clear();
+    if interrupt.is_requested() {
+        return Err(Failure::new(
+            "interrupted; a table of some of the trials would favour easy problems",
+            "take fewer trials with --trials, or split them with --shard",
+        ));
+    }
+    results.map_err(|error| Failure::new(error, ""))
+}
+
+fn merged(paths: &[PathBuf]) -> Result<Results, Failure> {
+    let mut parts = Vec::new();
+    for path in paths {
+        let text = input::source(path, "results")?;
+        let part = Results::read(text.text());
+        parts.push(part.map_err(|error| Failure::new(format!("{}: {error}", path.display()), ""))?);
+    }
+    Results::merged(&parts).map_err(|error| Failure::new(error, ""))
+}
+
+fn write(folder: &Path, experiment: &Experiment, results: &Results) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| {
+        Failure::new(
+            format!("cannot make the folder {}: {}", folder.display(), output::plain(&error)),
+            "",
+        )
+    })?;
+    let table = results.table(experiment);
+    output::write_file(&folder.join("results.json"), &format!("{:#}\n", results.json()))?;
+    output::write_file(&folder.join("table.md"), &table.markdown())?;
+    output::write_file(&folder.join("table.csv"), &table.csv())
+}

@@ -1,0 +1,294 @@
+//! `elbowroom run`: execute a plan in a world.
+
+mod process;
+mod realtime;
+mod replay;
+mod text;
+mod trace_file;
+
+use std::sync::Arc;
+
+use elbowroom::execute::{Analyst, Embedded, WholeRegion};
+use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict};
+use elbowroom::execution::{NoPlanner, Planner, World};
+use elbowroom::flow;
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::Source;
+use elbowroom::planner::embedded;
+use elbowroom::report::trace;
+use elbowroom::sim::{SimWorld, Unreliable, WorldModel};
+use serde_json::{Value, json};
+
+use crate::args::{PlannerChoice, RunArgs, RunningChoice};
+use crate::clock::Clock;
+use crate::exit::{Answer, Exit, Failure};
+use crate::input::{self, AnyPlan};
+use crate::output;
+use realtime::Realtime;
+use trace_file::TraceFile;
+
+/// Executes a plan, or plays a stored run back.
+pub(crate) fn run(arguments: &RunArgs) -> Answer {
+    if let Some(path) = &arguments.replay {
+        return replay::run(path, arguments.json);
+    }
+    let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
+        return Err(Failure::new("DOMAIN and PROBLEM are missing", ""));
+    };
+    let texts = Texts {
+        domain: input::source(domain, "domain")?,
+        problem: input::source(problem, "problem")?,
+    };
+    let mut task = texts.task()?;
+    let first = match &arguments.plan {
+        Some(path) => Some(time_triggered(&mut task, path)?),
+        None => None,
+    };
+    let choices = Choices::of(arguments)?;
+    let world = world_text(arguments)?;
+    let mut file = TraceFile::open(arguments.trace.as_deref())?;
+    let task = Arc::new(task);
+    let header = header(arguments, &texts, world.as_deref());
+    let report = {
+        let mut sink = |line: &str| file.write(line);
+        let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
+        writer.header(header);
+        match &arguments.world_process {
+            Some(command) => {
+                let mut world = process::ProcessWorld::start(command, &task, &arguments.answer_within)?;
+                let report = choices.run(arguments, &task, first.as_ref(), &mut world, &mut writer);
+                world.stop();
+                report
+            }
+            None => simulated(arguments, &choices, &task, first.as_ref(), world.as_deref(), &mut writer)?,
+        }
+    };
+    file.close()?;
+    if arguments.json {
+        output::print_json(&text::document(&report))?;
+    } else {
+        output::print(&text::human(&report))?;
+    }
+    exit(&report.verdict)
+}
+
+/// Domain and problem as they stand in their files.
+pub(super) struct Texts {
+    pub(super) domain: Source,
+    pub(super) problem: Source,
+}
+
+impl Texts {
+    pub(super) fn task(&self) -> Result<Task, Failure> {
+        let read = elbowroom::pddl::read_problem(&self.domain, &self.problem);
+        Ok(Task::new(Arc::new(input::with_warnings(read)?)))
+    }
+}
+
+/// How to run, from the command line.
+pub(super) struct Choices {
+    pub(super) executor: ExecutorSpec,
+    pub(super) settings: RunSettings,
+    pub(super) flow: flow::Settings,
+}
+
+impl Choices {
+    fn of(arguments: &RunArgs) -> Result<Self, Failure> {
+        Self::new(
+            &arguments.executor,
+            &arguments.vary,
+            &arguments.precision,
+            RunSettings {
+                epsilon: arguments.epsilon.clone(),
+                running: match arguments.running {
+                    RunningChoice::Cancel => RunningRule::Cancel,
+                    RunningChoice::Await => RunningRule::Await,
+                    RunningChoice::Keep => RunningRule::Keep,
+                },
+                planning_time: planning_time(&arguments.planning_time)?,
+                most_replans: arguments.max_replans,
+                time_limit: arguments.time_limit.clone(),
+                ..RunSettings::default()
+            },
+        )
+    }
+
+    pub(super) fn new(
+        executor: &str,
+        vary: &[String],
+        precision: &Rational,
+        settings: RunSettings,
+    ) -> Result<Self, Failure> {
+        let executor = executor
+            .parse()
+            .map_err(|error| Failure::new(error, "`elbowroom run --help` describes them all"))?;
+        let specs = vary.iter().map(|spec| spec.parse());
+        let vary = specs
+            .collect::<Result<_, _>>()
+            .map_err(|error: elbowroom::plan::parametrize::ParametrizeError| Failure::new(error, ""))?;
+        let mut flow = flow::Settings {
+            epsilon: settings.epsilon.clone(),
+            vary,
+            ..flow::Settings::default()
+        };
+        flow.search.precision = precision.clone();
+        Ok(Self {
+            executor,
+            settings,
+            flow,
+        })
+    }
+
+    fn run(
+        &self,
+        arguments: &RunArgs,
+        task: &Arc<Task>,
+        first: Option<&TimeTriggeredPlan>,
+        world: &mut dyn World,
+        recorder: &mut dyn elbowroom::execution::Recorder,
+    ) -> Report {
+        let clock = Clock::start();
+        let seconds = || clock.seconds();
+        let mut none = NoPlanner;
+        let mut embedded = Embedded {
+            settings: embedded::Settings {
+                epsilon: self.settings.epsilon.clone(),
+                ..embedded::Settings::default()
+            },
+            most_states: arguments.planner_states,
+            clock: Some(&seconds),
+        };
+        let planner: &mut dyn Planner = match arguments.planner {
+            PlannerChoice::Embedded => &mut embedded,
+            PlannerChoice::None => &mut none,
+        };
+        self.run_with(task, first, world, planner, recorder)
+    }
+
+    pub(super) fn run_with(
+        &self,
+        task: &Arc<Task>,
+        first: Option<&TimeTriggeredPlan>,
+        world: &mut dyn World,
+        planner: &mut dyn Planner,
+        recorder: &mut dyn elbowroom::execution::Recorder,
+    ) -> Report {
+        let mut analyst = Analyst::new(self.flow.clone());
+        let mut executor = self.executor.build(Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        }));
+        let ports = Ports {
+            world,
+            planner,
+            preparer: &mut analyst,
+            executor: executor.as_mut(),
+            need: self.executor.registered.need,
+            recorder,
+        };
+        run::run(Arc::clone(task), first, &self.settings, ports)
+    }
+}
+
+fn simulated(
+    arguments: &RunArgs,
+    choices: &Choices,
+    task: &Arc<Task>,
+    first: Option<&TimeTriggeredPlan>,
+    world: Option<&str>,
+    recorder: &mut dyn elbowroom::execution::Recorder,
+) -> Result<Report, Failure> {
+    let model = match world {
+        Some(text) => WorldModel::read(text, task.problem()).map_err(|error| {
+            let path = arguments.world.as_deref().unwrap_or(std::path::Path::new("-"));
+            Failure::new(
+                format!("{}, {error}", path.display()),
+                "docs/formats/world.md describes world files",
+            )
+        })?,
+        None => WorldModel::as_planned(),
+    };
+    let sim = SimWorld::new(Arc::clone(task), &model, arguments.seed);
+    let (reports, resolution) = (model.reports.clone(), model.resolution.clone());
+    let mut plain;
+    let mut unreliable;
+    let world: &mut dyn World = if reports.is_perfect() {
+        plain = sim;
+        &mut plain
+    } else {
+        unreliable = Unreliable::new(sim, reports, arguments.seed, resolution);
+        &mut unreliable
+    };
+    Ok(match &arguments.realtime {
+        None => choices.run(arguments, task, first, world, recorder),
+        Some(factor) => {
+            let mut world = Realtime::new(world, factor);
+            choices.run(arguments, task, first, &mut world, recorder)
+        }
+    })
+}
+
+fn time_triggered(
+    task: &mut Task,
+    path: &std::path::Path,
+) -> Result<TimeTriggeredPlan, Failure> {
+    match input::any_plan(task, path)? {
+        AnyPlan::TimeTriggered(plan) => Ok(plan),
+        AnyPlan::Stn(_) => Err(Failure::new(
+            format!("{} is an STN plan file", path.display()),
+            "give a plan with fixed times; its network is made from it",
+        )),
+    }
+}
+
+fn world_text(arguments: &RunArgs) -> Result<Option<String>, Failure> {
+    let Some(path) = &arguments.world else {
+        return Ok(None);
+    };
+    let source = input::source(path, "world")?;
+    Ok(Some(source.text().to_owned()))
+}
+
+fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
+    if text == "measured" {
+        return Ok(PlanningTime::Measured);
+    }
+    match text.parse::<Rational>() {
+        Ok(seconds) if !seconds.is_negative() => Ok(PlanningTime::Seconds(seconds)),
+        _ => Err(Failure::new(
+            format!("`--planning-time {text}` is neither `measured` nor a number of seconds"),
+            "",
+        )),
+    }
+}
+
+/// Everything that the run depends on, so that it can be played back.
+fn header(arguments: &RunArgs, texts: &Texts, world: Option<&str>) -> Value {
+    let source = |source: &Source| json!({ "name": source.name(), "text": source.text() });
+    json!({
+        "domain": source(&texts.domain),
+        "problem": source(&texts.problem),
+        "world": world,
+        "world_process": arguments.world_process,
+        "has_plan": arguments.plan.is_some(),
+        "executor": arguments.executor,
+        "seed": arguments.seed,
+        "vary": arguments.vary,
+        "precision": arguments.precision.to_string(),
+        "running": format!("{:?}", arguments.running).to_lowercase(),
+        "planning_time": arguments.planning_time,
+        "max_replans": arguments.max_replans,
+        "time_limit": arguments.time_limit.to_string(),
+        "epsilon": arguments.epsilon.to_string(),
+    })
+}
+
+pub(super) fn exit(verdict: &Verdict) -> Answer {
+    Ok(match verdict {
+        Verdict::GoalReached => Exit::Yes,
+        Verdict::Unsolvable | Verdict::NoPlan { .. } => Exit::No,
+        Verdict::ReplanLimit | Verdict::TimeLimit => Exit::Limit,
+        Verdict::WorldFailed { why } => return Err(Failure::new(why, "")),
+    })
+}

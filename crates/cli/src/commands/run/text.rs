@@ -1,0 +1,68 @@
+//! What came of a run, in words and as JSON.
+
+use std::fmt::Write as _;
+
+use elbowroom::execution::run::{Report, Verdict};
+use elbowroom::report::trace;
+use serde_json::Value;
+
+use crate::look::{BAD, GOOD, HINT, STRONG, styled};
+use crate::number::nearest;
+use crate::output::counted;
+
+pub(super) fn document(report: &Report) -> Value {
+    let mut document = trace::report(report);
+    document["format"] = "elbowroom-run".into();
+    document["version"] = 1.into();
+    document
+}
+
+pub(super) fn human(report: &Report) -> String {
+    let replans = counted(report.replans, "new plan");
+    let time = nearest(&report.time);
+    let mut text = match &report.verdict {
+        Verdict::GoalReached => {
+            format!("{}: goal reached at {time}, with {replans}\n", styled(GOOD, "done"))
+        }
+        Verdict::Unsolvable => format!(
+            "{}: unsolvable from here, at {time}, after {replans}\n",
+            styled(BAD, "failed")
+        ),
+        Verdict::NoPlan { why } => {
+            format!("{}: no plan to go on with at {time}: {why}\n", styled(BAD, "failed"))
+        }
+        Verdict::ReplanLimit => format!(
+            "{}: given up at {time}, after {replans}; --max-replans allows no more\n",
+            styled(HINT, "limit")
+        ),
+        Verdict::TimeLimit => {
+            format!("{}: the time was up at {time}, after {replans}\n", styled(HINT, "limit"))
+        }
+        Verdict::WorldFailed { why } => {
+            format!("{}: the world failed at {time}: {why}\n", styled(BAD, "failed"))
+        }
+    };
+    if !report.reasons.is_empty() {
+        let _ = writeln!(text, "\n{}", styled(STRONG, "Why the plan was given up"));
+        for reason in &report.reasons {
+            let _ = writeln!(text, "  {reason}");
+        }
+    }
+    let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));
+    for executed in &report.executed {
+        let step = &executed.step;
+        let _ = write!(text, "  {:>10}: {}", nearest(&step.start), step.action.name);
+        if let Some(duration) = &step.duration {
+            let _ = write!(text, " [{}]", nearest(duration));
+        }
+        match executed.ending.as_ref().map(|ending| ending.name()) {
+            Some("succeeded") => {}
+            Some(other) => {
+                let _ = write!(text, " {other}");
+            }
+            None => text.push_str(" still running"),
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,90 @@
+//! Comparing executors in many runs: the papers' tables.
+//!
+//! An [`Experiment`] is a file (`docs/formats/experiment.md`): a problem with blanks and what to
+//! fill in, columns (worlds, and what is left open), and executors. [`run`] makes every trial with
+//! every executor in the same world (common random numbers), so that differences between them are
+//! no accident of the dice. Trials run in parallel; the results do not depend on how many at once,
+//! and the results of parts (shards) add up to those of the whole.
+
+mod clairvoyant;
+mod experiment;
+mod results;
+mod trials;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+pub use experiment::{Column, Experiment, ExperimentError, Published};
+pub use results::{Cell, Pair, Results, ResultsError};
+
+use trials::Setting;
+
+/// Which trials to make, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// How many trials of each problem and column the whole has.
+    pub trials: u64,
+    /// Which part of them: the trials whose number leaves this remainder…
+    pub shard: u64,
+    /// … when divided by this.
+    pub shards: u64,
+    /// How many threads; 0: as many as there are processors.
+    pub jobs: usize,
+}
+
+impl Part {
+    /// The numbers of the trials.
+    pub(crate) fn numbers(self) -> impl Iterator<Item = u64> {
+        (0..self.trials).filter(move |trial| trial % self.shards.max(1) == self.shard)
+    }
+
+    /// How many trials that is for an experiment, all problems and columns together.
+    pub fn count(self, experiment: &Experiment) -> u64 {
+        let settings = experiment.columns.len() * experiment.fillings().len();
+        self.numbers().count() as u64 * settings as u64
+    }
+}
+
+/// Makes the trials. `observe` is told how many are done, and says whether to go on.
+///
+/// # Errors
+/// When a problem cannot be read, has no plan to begin with, or a plan cannot be made ready.
+pub fn run(
+    experiment: &Experiment,
+    part: Part,
+    observe: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<Results, ExperimentError> {
+    let fillings = experiment.fillings();
+    let columns = 0..experiment.columns.len();
+    let settings: Vec<Setting<'_>> = columns
+        .flat_map(|column| {
+            let numbered = fillings.iter().enumerate();
+            numbered.map(move |(problem, filling)| (column, problem, filling))
+        })
+        .map(|(column, problem, filling)| Setting {
+            experiment,
+            column,
+            problem,
+            filling,
+        })
+        .collect();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(part.jobs)
+        .build()
+        .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
+    let done = AtomicU64::new(0);
+    let told = || observe(done.fetch_add(1, Ordering::Relaxed) + 1);
+    let parts: Vec<Result<Results, ExperimentError>> = pool.install(|| {
+        settings
+            .par_iter()
+            .map(|setting| setting.run(part, &told))
+            .collect()
+    });
+    // In the order of the settings, whichever was ready first.
+    let mut whole = Results::empty(experiment, part);
+    for part in parts {
+        whole.add(&part?);
+    }
+    Ok(whole)
+}

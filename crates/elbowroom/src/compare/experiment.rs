@@ -1,0 +1,273 @@
+//! Experiment files: `docs/formats/experiment.md`.
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom_num::Rational;
+use elbowroom_plan::parametrize::VarySpec;
+use indexmap::IndexMap;
+use serde::Deserialize;
+use toml::Spanned;
+
+/// An experiment, with the texts of all files that it names.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// What it shows.
+    pub title: String,
+    /// The domain, in PDDL.
+    pub domain: String,
+    /// The problem, in PDDL, with blanks: `{name}`.
+    pub problem: String,
+    /// What to fill in: each name takes each of its values, with each value of the others.
+    pub blanks: IndexMap<String, Vec<String>>,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The rows.
+    pub executors: Vec<ExecutorSpec>,
+    /// Whether to add a row for plans that are made knowing what will happen.
+    pub clairvoyant: bool,
+    /// How many trials of each problem in each column.
+    pub trials: u64,
+    /// Where the dice begin.
+    pub seed: u64,
+    /// How to run.
+    pub settings: RunSettings,
+    /// How close to its limit each end of an envelope should come.
+    pub precision: Rational,
+    /// How many states the planner looks at for one plan.
+    pub planner_states: u64,
+    /// Figures to stand beside ours.
+    pub published: Vec<Published>,
+}
+
+/// A column of the table.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its heading.
+    pub name: String,
+    /// The world file.
+    pub world: String,
+    /// What is left open.
+    pub vary: Vec<VarySpec>,
+}
+
+/// Figures of a paper, one for each column.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Which row they belong to.
+    pub executor: String,
+    /// Percentages.
+    pub coverage: Vec<f64>,
+    /// Mean number of new plans in successful runs; NaN where there were none.
+    #[serde(default)]
+    pub replans: Vec<f64>,
+}
+
+/// An experiment that cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExperimentError {
+    /// The file is wrong.
+    #[error("line {line}: {message}")]
+    File {
+        /// The line, from 1 on.
+        line: usize,
+        /// What is wrong.
+        message: String,
+    },
+    /// Something else is.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl ExperimentError {
+    pub(crate) fn other(message: impl Into<String>) -> Self {
+        Self::Other(message.into())
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: Spanned<String>,
+    version: Spanned<i64>,
+    title: String,
+    domain: Spanned<String>,
+    problem: Spanned<String>,
+    trials: u64,
+    #[serde(default)]
+    seed: u64,
+    executors: Vec<Spanned<String>>,
+    #[serde(default)]
+    clairvoyant: bool,
+    running: Option<Spanned<String>>,
+    planning_time: Option<Spanned<toml::Value>>,
+    max_replans: Option<usize>,
+    precision: Option<Spanned<f64>>,
+    planner_states: Option<u64>,
+    #[serde(default)]
+    blanks: IndexMap<String, Vec<toml::Value>>,
+    column: Vec<ColumnFile>,
+    #[serde(default)]
+    published: Vec<Spanned<Published>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ColumnFile {
+    name: String,
+    world: Spanned<String>,
+    #[serde(default)]
+    vary: Vec<Spanned<String>>,
+}
+
+impl Experiment {
+    /// Reads an experiment. `file` gives the text of a file that it names.
+    ///
+    /// # Errors
+    /// The first mistake, with its line.
+    pub fn read(
+        text: &str,
+        file: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ExperimentError> {
+        let wrong = |at: usize, message: String| ExperimentError::File {
+            line: 1 + text.as_bytes()[..at.min(text.len())]
+                .iter()
+                .filter(|byte| **byte == b'\n')
+                .count(),
+            message: message.trim().replace('\n', " "),
+        };
+        let read: File = toml::from_str(text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            wrong(at, error.message().to_owned())
+        })?;
+        if read.format.get_ref() != "elbowroom-experiment" || *read.version.get_ref() != 1 {
+            let message = "this program reads format = \"elbowroom-experiment\", version = 1";
+            return Err(wrong(read.format.span().start, message.to_owned()));
+        }
+        let named = |name: &Spanned<String>| {
+            file(name.get_ref()).map_err(|error| wrong(name.span().start, error))
+        };
+        let mut executors = Vec::new();
+        for name in &read.executors {
+            let spec = name.get_ref().parse::<ExecutorSpec>();
+            executors.push(spec.map_err(|error| wrong(name.span().start, error.to_string()))?);
+        }
+        let mut columns = Vec::new();
+        for column in &read.column {
+            let mut vary = Vec::new();
+            for spec in &column.vary {
+                let read = spec.get_ref().parse::<VarySpec>();
+                vary.push(read.map_err(|error| wrong(spec.span().start, error.to_string()))?);
+            }
+            columns.push(Column {
+                name: column.name.clone(),
+                world: named(&column.world)?,
+                vary,
+            });
+        }
+        for published in &read.published {
+            if published.get_ref().coverage.len() != columns.len() {
+                let message = "write one figure for each column";
+                return Err(wrong(published.span().start, message.to_owned()));
+            }
+        }
+        let settings = read
+            .settings()
+            .map_err(|(at, message)| wrong(at, message))?;
+        let precision = match &read.precision {
+            None => Rational::ONE,
+            Some(given) => exact(*given.get_ref())
+                .filter(Rational::is_positive)
+                .ok_or_else(|| wrong(given.span().start, "it must be positive".to_owned()))?,
+        };
+        Ok(Self {
+            domain: named(&read.domain)?,
+            problem: named(&read.problem)?,
+            title: read.title,
+            blanks: read
+                .blanks
+                .into_iter()
+                .map(|(name, values)| (name, values.iter().map(text_of).collect()))
+                .collect(),
+            columns,
+            executors,
+            clairvoyant: read.clairvoyant,
+            trials: read.trials,
+            seed: read.seed,
+            settings,
+            precision,
+            planner_states: read.planner_states.unwrap_or(20_000),
+            published: read.published.into_iter().map(Spanned::into_inner).collect(),
+        })
+    }
+
+    /// All ways to fill in the blanks; the last blank changes fastest.
+    pub fn fillings(&self) -> Vec<Vec<(String, String)>> {
+        let mut fillings = vec![Vec::new()];
+        for (name, values) in &self.blanks {
+            let longer = |filling: &Vec<(String, String)>, value: &String| {
+                let mut longer = filling.clone();
+                longer.push((name.clone(), value.clone()));
+                longer
+            };
+            fillings = fillings
+                .iter()
+                .flat_map(|filling| values.iter().map(move |value| longer(filling, value)))
+                .collect();
+        }
+        fillings
+    }
+
+    /// The names of the rows.
+    pub fn rows(&self) -> Vec<String> {
+        let rows = self.executors.iter().map(ToString::to_string);
+        let last = self.clairvoyant.then(|| CLAIRVOYANT.to_owned());
+        rows.chain(last).collect()
+    }
+}
+
+/// The row for plans that are made knowing what will happen.
+pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
+
+impl File {
+    fn settings(&self) -> Result<RunSettings, (usize, String)> {
+        let mut settings = RunSettings::default();
+        if let Some(running) = &self.running {
+            let names = RunningRule::NAMES.iter();
+            let found = names.clone().find(|(_, name)| *name == running.get_ref());
+            let known: Vec<&str> = names.map(|(_, name)| *name).collect();
+            settings.running = found
+                .map(|(rule, _)| *rule)
+                .ok_or_else(|| (running.span().start, format!("choose one of {}", known.join(", "))))?;
+        }
+        if let Some(time) = &self.planning_time {
+            let number = match time.get_ref() {
+                toml::Value::Integer(number) => Some(Rational::from(*number)),
+                toml::Value::Float(number) => exact(*number),
+                _ => None,
+            };
+            // Measured times would make a result depend on the machine.
+            let number = number.filter(|number| !number.is_negative());
+            settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
+                (time.span().start, "write a number of seconds, so that results can be repeated".to_owned())
+            })?);
+        } else {
+            settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
+        }
+        if let Some(most) = self.max_replans {
+            settings.most_replans = most;
+        }
+        Ok(settings)
+    }
+}
+
+fn text_of(value: &toml::Value) -> String {
+    match value {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn exact(value: f64) -> Option<Rational> {
+    value.is_finite().then(|| value.to_string().parse().ok())?
+}

@@ -1,0 +1,235 @@
+//! What came of an experiment, or of a part of it.
+
+use std::collections::BTreeMap;
+
+use elbowroom_report::statistics::{Mean, Proportion};
+use elbowroom_report::table::Table;
+use serde::{Deserialize, Serialize};
+
+use super::{Experiment, Part};
+
+/// Counts by row and column. Everything is a sum, so parts add up exactly, in any order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Results {
+    format: String,
+    version: u64,
+    /// What the experiment shows.
+    pub title: String,
+    /// Distinguishes experiments, so that no apples are added to pears.
+    pub fingerprint: String,
+    /// How many trials of each problem and column the whole has.
+    pub trials: u64,
+    /// Into how many parts it was split.
+    pub shards: u64,
+    /// Which parts are in here.
+    pub parts: Vec<u64>,
+    /// The rows: executors.
+    pub rows: Vec<String>,
+    /// The columns.
+    pub columns: Vec<String>,
+    /// By row and column.
+    pub cells: Vec<Vec<Cell>>,
+    /// The rows compared in pairs with the first one, by row and column.
+    pub pairs: Vec<Vec<Pair>>,
+}
+
+/// What came of the runs of one executor in one column.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// How many runs.
+    pub runs: u64,
+    /// How many of them reached the goal.
+    pub successes: u64,
+    /// How many new plans these made.
+    pub replans: u64,
+    /// How the runs ended.
+    pub verdicts: BTreeMap<String, u64>,
+    /// Why plans were given up.
+    pub causes: BTreeMap<String, u64>,
+}
+
+/// Trials in which one of two executors reached the goal and the other did not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pair {
+    /// Only the first row's did.
+    pub only_first: u64,
+    /// Only this row's did.
+    pub only_this: u64,
+}
+
+/// Results that cannot be read, or do not belong together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ResultsError(String);
+
+const FORMAT: &str = "elbowroom-results";
+
+impl Results {
+    /// No trial has been made.
+    pub fn empty(experiment: &Experiment, part: Part) -> Self {
+        let rows = experiment.rows();
+        let columns: Vec<String> = experiment.columns.iter().map(|it| it.name.clone()).collect();
+        Self {
+            format: FORMAT.to_owned(),
+            version: 1,
+            title: experiment.title.clone(),
+            fingerprint: fingerprint(experiment, part.trials),
+            trials: part.trials,
+            shards: part.shards,
+            parts: vec![part.shard],
+            cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
+            pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
+            rows,
+            columns,
+        }
+    }
+
+    /// Reads results as JSON.
+    ///
+    /// # Errors
+    /// When they are none.
+    pub fn read(text: &str) -> Result<Self, ResultsError> {
+        let results: Self =
+            serde_json::from_str(text).map_err(|error| ResultsError(format!("no results: {error}")))?;
+        if results.format != FORMAT || results.version != 1 {
+            return Err(ResultsError("this program reads elbowroom-results, version 1".to_owned()));
+        }
+        let (height, width) = (results.rows.len(), results.columns.len());
+        let cells: Vec<usize> = results.cells.iter().map(Vec::len).collect();
+        let pairs: Vec<usize> = results.pairs.iter().map(Vec::len).collect();
+        if cells != vec![width; height] || pairs != cells {
+            return Err(ResultsError("rows and columns do not fit".to_owned()));
+        }
+        Ok(results)
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Adds the counts of another part.
+    pub(crate) fn add(&mut self, other: &Self) {
+        for (mine, theirs) in self.cells.iter_mut().flatten().zip(other.cells.iter().flatten()) {
+            mine.runs += theirs.runs;
+            mine.successes += theirs.successes;
+            mine.replans += theirs.replans;
+            merge(&mut mine.verdicts, &theirs.verdicts);
+            merge(&mut mine.causes, &theirs.causes);
+        }
+        for (mine, theirs) in self.pairs.iter_mut().flatten().zip(other.pairs.iter().flatten()) {
+            mine.only_first += theirs.only_first;
+            mine.only_this += theirs.only_this;
+        }
+    }
+
+    /// Puts parts of one experiment together.
+    ///
+    /// # Errors
+    /// When they are parts of different ones, or the same part comes twice.
+    pub fn merged(parts: &[Self]) -> Result<Self, ResultsError> {
+        let Some((first, rest)) = parts.split_first() else {
+            return Err(ResultsError("there is nothing to put together".to_owned()));
+        };
+        let mut whole = first.clone();
+        for part in rest {
+            let same = (&part.fingerprint, part.shards) == (&whole.fingerprint, whole.shards)
+                && (&part.rows, &part.columns) == (&whole.rows, &whole.columns);
+            if !same {
+                return Err(ResultsError("these are parts of different experiments".to_owned()));
+            }
+            if let Some(twice) = part.parts.iter().find(|shard| whole.parts.contains(shard)) {
+                return Err(ResultsError(format!("part {twice} is there twice")));
+            }
+            whole.add(part);
+            whole.parts.extend(&part.parts);
+        }
+        whole.parts.sort_unstable();
+        if (0..whole.shards).eq(whole.parts.iter().copied()) {
+            (whole.shards, whole.parts) = (1, vec![0]);
+        }
+        Ok(whole)
+    }
+
+    /// The table: coverage with its 95 % interval, and mean number of new plans of successful
+    /// runs; beside them the published figures.
+    pub fn table(&self, experiment: &Experiment) -> Table {
+        let mut headings = vec!["executor".to_owned()];
+        for column in &self.columns {
+            headings.push(format!("{column}: coverage [95 %]"));
+            headings.push("replans".to_owned());
+            if !experiment.published.is_empty() {
+                headings.push("published".to_owned());
+            }
+        }
+        let rows = self.rows.iter().enumerate().map(|(index, row)| {
+            let mut cells = vec![row.clone()];
+            for (column, cell) in self.cells[index].iter().enumerate() {
+                cells.extend(cell.words());
+                if !experiment.published.is_empty() {
+                    cells.push(experiment.published_words(row, column));
+                }
+            }
+            cells
+        });
+        Table {
+            caption: format!("{} ({} trials of each problem)", self.title, self.trials),
+            rows: rows.collect(),
+            headings,
+        }
+    }
+}
+
+impl Cell {
+    /// Coverage, and mean number of new plans of successful runs.
+    fn words(&self) -> [String; 2] {
+        let coverage = Proportion {
+            successes: self.successes,
+            count: self.runs,
+        };
+        let replans = Mean {
+            sum: self.replans,
+            count: self.successes,
+        };
+        let percent = |share: f64| format!("{:.1}", share * 100.0);
+        let coverage = match (coverage.share(), coverage.wilson()) {
+            (Some(share), Some((lower, upper))) => {
+                format!("{} [{}, {}]", percent(share), percent(lower), percent(upper))
+            }
+            _ => "-".to_owned(),
+        };
+        let replans = replans.value().map_or("-".to_owned(), |mean| format!("{mean:.2}"));
+        [coverage, replans]
+    }
+}
+
+impl Experiment {
+    fn published_words(&self, row: &str, column: usize) -> String {
+        let Some(published) = self.published.iter().find(|it| it.executor == row) else {
+            return "-".to_owned();
+        };
+        let replans = published.replans.get(column).filter(|mean| mean.is_finite());
+        match replans {
+            Some(replans) => format!("{:.1} ({replans:.1})", published.coverage[column]),
+            None => format!("{:.1}", published.coverage[column]),
+        }
+    }
+}
+
+fn merge(mine: &mut BTreeMap<String, u64>, theirs: &BTreeMap<String, u64>) {
+    for (name, count) in theirs {
+        *mine.entry(name.clone()).or_default() += count;
+    }
+}
+
+/// A number that is different for different experiments: FNV-1a over all that they depend on.
+fn fingerprint(experiment: &Experiment, trials: u64) -> String {
+    let everything = format!("{trials} {experiment:?}");
+    let hash = everything.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("{hash:016x}")
+}

@@ -1,0 +1,8 @@
+//! Executing plans: the ports of [`execution`](crate::execution), with everything that is there
+//! behind them.
+
+mod analyst;
+mod planners;
+
+pub use analyst::{Analyst, WholeRegion};
+pub use planners::{Clockless, Embedded};

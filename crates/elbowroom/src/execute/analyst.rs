@@ -1,0 +1,199 @@
+//! Makes plans ready: deordering, parameters, envelopes.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_envelope::{Oracle, irr};
+use elbowroom_execution::{Need, Prepared, Preparer, Region};
+use elbowroom_model::ground::{Body, Condition};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+
+use crate::flow;
+
+/// Makes plans ready with [`flow`], and remembers the last first plan: many runs begin with the
+/// same one.
+#[derive(Clone, Debug)]
+pub struct Analyst {
+    settings: flow::Settings,
+    remembered: Option<Remembered>,
+}
+
+#[derive(Clone, Debug)]
+struct Remembered {
+    task: Arc<Task>,
+    plan: TimeTriggeredPlan,
+    need: Need,
+    prepared: Prepared,
+}
+
+impl Analyst {
+    /// `settings.vary` says what to leave open of each plan; what a plan does not have, it cannot
+    /// leave open.
+    pub fn new(settings: flow::Settings) -> Self {
+        Self {
+            settings,
+            remembered: None,
+        }
+    }
+
+    /// Makes a plan ready, and remembers it for all runs that begin with it.
+    ///
+    /// # Errors
+    /// As [`Preparer::prepare`].
+    pub fn remember(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<(), String> {
+        let prepared = self.prepare(task, plan, need)?;
+        self.remembered = Some(Remembered {
+            task: Arc::clone(task),
+            plan: plan.clone(),
+            need,
+            prepared,
+        });
+        Ok(())
+    }
+
+    /// The specifications that fit something in the plan.
+    fn specs(&self, task: &Task, freed: &flow::Freed) -> Result<Vec<VarySpec>, String> {
+        let mut fitting = Vec::new();
+        for spec in &self.settings.vary {
+            let plan = freed.deordered.plan.clone();
+            let one = std::slice::from_ref(spec);
+            match parametrize(task, plan, &freed.deordered.nominal, one) {
+                Ok(_) => fitting.push(spec.clone()),
+                Err(ParametrizeError::NothingMatches { .. }) => {}
+                Err(ParametrizeError::UnknownName { .. }) if is_about_actions(task, spec) => {}
+                Err(error) => return Err(error.to_string()),
+            }
+        }
+        Ok(fitting)
+    }
+
+    fn open(&self, task: &Task, freed: flow::Freed) -> Result<ParametrizedPlan, String> {
+        let epsilon = &self.settings.epsilon;
+        let specs = self.specs(task, &freed)?;
+        if specs.is_empty() && !self.settings.vary.is_empty() {
+            return Ok(flow::closed(task, freed, epsilon));
+        }
+        flow::open(task, freed, &specs, epsilon).map_err(|error| error.to_string())
+    }
+
+    fn envelope(
+        &self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+    ) -> Result<DecoupledEnvelope, String> {
+        let mut oracle =
+            Oracle::new(task, plan, &self.settings.epsilon).map_err(|error| error.to_string())?;
+        let search = &self.settings.search;
+        let run = irr(&mut oracle, search, &mut |_| ControlFlow::Continue(()));
+        let run = run.map_err(|error| error.to_string())?;
+        run.envelope
+            .map_err(|_| "the plan is not guaranteed to work even if nothing deviates".to_owned())
+    }
+}
+
+impl Preparer for Analyst {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String> {
+        if let Some(known) = &self.remembered
+            && known.need == need
+            && known.task.initial() == task.initial()
+            && known.task.timed() == task.timed()
+            && known.plan == *plan
+        {
+            return Ok(known.prepared.clone());
+        }
+        let epsilon = &self.settings.epsilon;
+        let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
+        let nominal = freed.deordered.nominal.clone();
+        let plan = match need {
+            Need::Network => flow::closed(task, freed, epsilon),
+            Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
+        };
+        let envelope = match need {
+            Need::Envelope => Some(self.envelope(task, &plan)?),
+            Need::Network | Need::OpenNetwork => None,
+        };
+        Ok(Prepared {
+            plan,
+            nominal,
+            envelope,
+        })
+    }
+}
+
+/// The exact envelope, asked point by point.
+#[derive(Clone, Debug)]
+pub struct WholeRegion {
+    /// The least separation of interfering happenings (ε).
+    pub epsilon: Rational,
+}
+
+impl Region for WholeRegion {
+    fn objection(
+        &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+        values: &[Rational],
+    ) -> Option<String> {
+        if !reads_numbers(task, plan) {
+            // What facts need is in the network, whatever the durations; the executor has it.
+            return None;
+        }
+        let mut plan = plan.clone();
+        for (parameter, value) in plan.parameters.iter_mut().zip(values) {
+            parameter.nominal = value.clone();
+        }
+        let mut oracle = match Oracle::new(task, &plan, &self.epsilon) {
+            Ok(oracle) => oracle,
+            Err(refusal) => return Some(refusal.to_string()),
+        };
+        let objection = match oracle.objection(&DecoupledEnvelope::point(values)) {
+            Ok(objection) => objection?,
+            Err(refusal) => return Some(refusal.to_string()),
+        };
+        let explainer = crate::Explainer::new(task, &plan, &self.epsilon);
+        let envelope = DecoupledEnvelope::point(values);
+        Some(explainer.objection(&oracle, &envelope, &objection).reason)
+    }
+}
+
+/// Whether anything that a plan needs depends on numbers.
+fn reads_numbers(task: &Task, plan: &ParametrizedPlan) -> bool {
+    let reads = |condition: &Condition| {
+        let mut reads = false;
+        task.visit_fluents_of(condition, &mut |_| reads = true);
+        reads
+    };
+    let instances = plan.plan.instances.iter();
+    reads(&plan.goal)
+        || instances
+            .map(|instance| &instance.action.body)
+            .any(|body| match body {
+                Body::Instantaneous(snap) => reads(&snap.condition),
+                Body::Durative(body) => {
+                    reads(&body.start.condition)
+                        || reads(&body.over_all)
+                        || reads(&body.end.condition)
+                }
+            })
+}
+
+/// Whether a specification that fits nothing names an action of the domain, which this plan just
+/// does not use.
+fn is_about_actions(task: &Task, spec: &VarySpec) -> bool {
+    let schemas = &task.problem().schemas;
+    let mut words = spec.text.split([' ', '(', ')']);
+    words.any(|word| schemas.iter().any(|schema| schema.name.eq_ignore_ascii_case(word)))
+}

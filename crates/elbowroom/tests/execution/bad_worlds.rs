@@ -1,0 +1,64 @@
+//! Worlds that lose, repeat, delay and contradict their reports.
+
+use elbowroom::execute::Analyst;
+use elbowroom::execution::run::{RunningRule, Verdict};
+use elbowroom::sim::{Distribution, Reports};
+
+use crate::scene::{EXECUTORS, Scene, runs};
+
+/// No panic, no hang, no wrong "goal reached". `ELBOWROOM_BAD_RUNS` says how many runs.
+#[test]
+fn no_report_is_believed_against_reason() {
+    let mut scenes = [
+        Scene::case("delivery"),
+        Scene::case("match"),
+        Scene::two_orders("480", "800"),
+    ];
+    let count = runs("ELBOWROOM_BAD_RUNS", 240);
+    let mut reached = 0;
+    let mut ends = std::collections::BTreeMap::new();
+    for run in 0..count {
+        let which = usize::try_from(run).unwrap() % scenes.len();
+        let scene = &mut scenes[which];
+        let rules = [RunningRule::Cancel, RunningRule::Await, RunningRule::Keep];
+        scene.settings.running = rules[usize::try_from(run / 3).unwrap() % 3];
+        let executor = EXECUTORS[usize::try_from(run / 9).unwrap() % EXECUTORS.len()];
+        let model = scene.world(
+            "[[duration]]\naction = \"*\"\nnormal = { mean = 1, deviation = 0.2, minimum = 0.2 }\n\
+             relative = true\n\
+             [[failure]]\naction = \"*\"\nprobability = 0.03\nwhen = \"midway\"\n\
+             [[delay]]\naction = \"*\"\nvalues = [0, 0, 0, 1.5]\n",
+        );
+        let mut analyst = Analyst::new(scene.flow.clone());
+        let (report, is_goal) = scene.run_badly(executor, &model, &bad(run), run, &mut analyst);
+        if report.verdict == Verdict::GoalReached {
+            assert!(is_goal, "run {run}, {executor}: {report:#?}");
+            reached += 1;
+        }
+        assert!(report.time <= scene.settings.time_limit);
+        *ends.entry(report.verdict.name()).or_insert(0) += 1;
+    }
+    assert!(reached > count / 10, "hardly any run came through: {ends:?}");
+    assert!(ends.len() > 1, "no run was disturbed: {ends:?}");
+}
+
+/// Each kind of mistake by itself, and all of them together.
+fn bad(run: u64) -> Reports {
+    let mut reports = Reports {
+        lateness: Distribution::Uniform { from: 0.0, to: 40.0 },
+        ..Reports::default()
+    };
+    match run % 5 {
+        0 => reports.lost = 0.1,
+        1 => reports.duplicated = 0.5,
+        2 => reports.late = 0.3,
+        3 => reports.contradicted = 0.1,
+        _ => {
+            reports.lost = 0.05;
+            reports.duplicated = 0.1;
+            reports.late = 0.1;
+            reports.contradicted = 0.05;
+        }
+    }
+    reports
+}

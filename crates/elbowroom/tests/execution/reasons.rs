@@ -1,0 +1,153 @@
+//! What executors do, and why they say they do it.
+
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::{RunningRule, Verdict};
+
+use crate::scene::{EXECUTORS, Scene};
+
+#[test]
+fn when_everything_goes_as_planned_so_does_every_executor() {
+    for name in ["delivery", "match", "battery", "tank"] {
+        let scene = Scene::case(name);
+        let model = scene.world("");
+        for executor in EXECUTORS {
+            let report = scene.run(executor, &model, 0);
+            assert_eq!(report.verdict, Verdict::GoalReached, "{name}, {executor}: {report:#?}");
+            assert_eq!(report.replans, 0, "{name}, {executor}: {:?}", report.reasons);
+            let verdict = scene.judged(&report);
+            assert!(verdict.is_valid(), "{name}, {executor}: {verdict:?}");
+        }
+    }
+}
+
+/// The flare burns for 15 instead of 30: the second inspection does not fit in (required
+/// concurrency), and there is no second flare.
+#[test]
+fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
+    let scene = Scene::case("match");
+    let model = scene.world("[[duration]]\naction = \"burn\"\nconstant = 15\n");
+    for executor in EXECUTORS {
+        let report = scene.run(executor, &model, 0);
+        assert_eq!(report.verdict, Verdict::Unsolvable, "{executor}: {report:#?}");
+    }
+}
+
+#[test]
+fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
+    let scene = Scene::case("delivery");
+    let model = scene.world("[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 55\n");
+    let report = scene.run("guarded", &model, 0);
+    let reason = &report.reasons[0];
+    assert_eq!(reason.cause, Cause::Outlived, "{reason}");
+    assert_eq!(reason.action.as_deref(), Some("(drive rover depot shelf)"));
+    let allowed = reason.allowed.as_ref().unwrap();
+    let since = reason.since.as_ref().unwrap();
+    // It started at 0, so it outlived its interval when the interval ended.
+    assert_eq!(Some(since), allowed.upper.value());
+    assert!(report.time < 55.into(), "{report:#?}");
+}
+
+/// Nominally everything after the drive takes 20.003, and the counter closes at 60: until 39.996
+/// the parcel can still be in time, and `live` does not give up before.
+#[test]
+fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
+    let scene = Scene::case("delivery");
+    for (drive, verdict) in [("39.9", Verdict::GoalReached), ("40.1", Verdict::Unsolvable)] {
+        let model = scene.world(&format!(
+            "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = {drive}\n"
+        ));
+        let report = scene.run("live", &model, 0);
+        assert_eq!(report.verdict, verdict, "{drive}: {report:#?}");
+    }
+    let model = scene.world("[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 50\n");
+    let report = scene.run("live", &model, 0);
+    let reason = &report.reasons[0];
+    assert_eq!(reason.cause, Cause::Unreachable, "{reason}");
+    let deadline = "(counter-open office) becomes false at 60";
+    assert!(reason.behind.iter().any(|it| it.contains(deadline)), "{reason}");
+}
+
+#[test]
+fn fixed_replans_when_a_duration_leaves_the_percentage() {
+    let scene = Scene::case("delivery");
+    let late = "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 13\n";
+    let model = scene.world(late);
+    assert_eq!(scene.run("fixed:30", &model, 0).replans, 0);
+    let report = scene.run("fixed:29", &model, 0);
+    assert_eq!(report.replans, 1, "{report:#?}");
+    assert_eq!(report.reasons[0].cause, Cause::Outlived);
+    let early = "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 6.5\n";
+    let report = scene.run("fixed:30", &scene.world(early), 0);
+    assert_eq!(report.reasons[0].cause, Cause::OutsideInterval, "{report:#?}");
+    assert_eq!(report.verdict, Verdict::GoalReached);
+}
+
+#[test]
+fn a_failed_action_is_made_up_for() {
+    let scene = Scene::case("delivery");
+    let model = scene.world("[[failure]]\naction = \"drop\"\nprobability = 1\nwhen = \"start\"\n");
+    let report = scene.run("guarded", &model, 0);
+    // It fails every time, until the counter closes.
+    assert_eq!(report.reasons[0].cause, Cause::Failed);
+    assert_ne!(report.verdict, Verdict::GoalReached);
+    assert!(report.replans > 1, "{report:#?}");
+}
+
+#[test]
+fn what_runs_may_be_cancelled_awaited_or_kept() {
+    let mut scene = Scene::case("delivery");
+    // The drive is late while somebody else unlocks the office, which takes long.
+    let model = scene.world(
+        "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 6\n\
+         [[duration]]\naction = \"unlock\"\nconstant = 7\n",
+    );
+    for (rule, unlocks) in [
+        (RunningRule::Cancel, 2),
+        (RunningRule::Await, 1),
+        (RunningRule::Keep, 1),
+    ] {
+        scene.settings.running = rule;
+        let report = scene.run("fixed:20", &model, 0);
+        assert_eq!(report.verdict, Verdict::GoalReached, "{rule:?}: {report:#?}");
+        let steps = report.executed.iter();
+        let unlocked = steps.filter(|it| it.step.action.name == "(unlock office)").count();
+        assert_eq!(unlocked, unlocks, "{rule:?}: {report:#?}");
+        assert!(scene.judged(&report).is_valid(), "{rule:?}: {:?}", scene.judged(&report));
+    }
+}
+
+/// Someone carries the parcel to the office: nothing is left to do.
+#[test]
+fn what_happens_by_itself_changes_the_plan() {
+    let scene = Scene::case("delivery");
+    let moved = "[[event]]\nfact = \"(lies parcel shelf)\"\nbecomes = false\nconstant = 5\n";
+    let report = scene.run("guarded", &scene.world(moved), 0);
+    assert_eq!(report.reasons[0].cause, Cause::Surprise, "{report:#?}");
+    assert_eq!(report.verdict, Verdict::Unsolvable);
+    let irrelevant = "[[event]]\nfact = \"(unlocked shelf)\"\nbecomes = true\nconstant = 5\n";
+    assert_eq!(scene.run("guarded", &scene.world(irrelevant), 0).replans, 0);
+    let helped = "[[event]]\nfact = \"(lies parcel office)\"\nbecomes = true\nconstant = 5\n\
+                  [[event]]\nfact = \"(lies parcel shelf)\"\nbecomes = false\nconstant = 5\n";
+    let report = scene.run("guarded", &scene.world(helped), 0);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    assert!(report.time < 10.into());
+}
+
+#[test]
+fn planning_takes_time_from_the_deadline() {
+    let mut scene = Scene::case("delivery");
+    let model = scene.world("[[failure]]\naction = \"(drive _ depot _)\"\nprobability = 0.6\nwhen = \"start\"\n");
+    let seeds = 0..40;
+    let reached = |scene: &Scene| {
+        let seeds = seeds.clone();
+        seeds
+            .filter(|seed| scene.run("guarded", &model, *seed).verdict == Verdict::GoalReached)
+            .count()
+    };
+    let at_once = reached(&scene);
+    scene.settings.planning_time =
+        elbowroom::execution::run::PlanningTime::Seconds(elbowroom::num::Rational::from(14));
+    let slowly = reached(&scene);
+    assert!(slowly < at_once, "{slowly} < {at_once}");
+    assert!(slowly > 0);
+}

@@ -1,0 +1,170 @@
+//! A problem, a plan, and how to run it.
+
+use std::sync::Arc;
+
+use elbowroom::execute::{Analyst, Embedded, WholeRegion};
+use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
+use elbowroom::execution::{NoRecord, Planner, Preparer, Prepared, Recorder, World};
+use elbowroom::flow;
+use elbowroom::model::validate::{self, validate};
+use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+use elbowroom::planner::embedded;
+use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
+
+/// The executors that there are, one of each.
+pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live"];
+
+/// A problem with a plan.
+pub(crate) struct Scene {
+    pub(crate) task: Arc<Task>,
+    pub(crate) plan: TimeTriggeredPlan,
+    pub(crate) flow: flow::Settings,
+    pub(crate) settings: RunSettings,
+    pub(crate) states: u64,
+}
+
+impl Scene {
+    /// One of the folders in `cases`.
+    pub(crate) fn case(name: &str) -> Self {
+        let file = |file: &str| read(&format!("cases/{name}/{file}"));
+        Self::new(&file("domain.pddl"), &file("problem.pddl"), Some(&file("plan.plan")))
+    }
+
+    /// The problem of table 1 with these deadlines.
+    pub(crate) fn two_orders(early: &str, late: &str) -> Self {
+        let problem = read("experiments/table1/problem.pddl");
+        let problem = problem.replace("{early}", early).replace("{late}", late);
+        Self::new(&read("experiments/table1/domain.pddl"), &problem, None)
+    }
+
+    /// A problem; without a plan, one is made.
+    pub(crate) fn new(domain: &str, problem: &str, plan: Option<&str>) -> Self {
+        let source = |text: &str| Source::new("test", text);
+        let (problem, _) = pddl::read_problem(&source(domain), &source(problem)).unwrap();
+        let mut task = Task::new(problem);
+        let mut scene = Self {
+            plan: TimeTriggeredPlan::default(),
+            flow: flow::Settings::default(),
+            settings: RunSettings {
+                planning_time: PlanningTime::Seconds(Rational::ZERO),
+                time_limit: Rational::from(100_000),
+                ..RunSettings::default()
+            },
+            task: Arc::new(task.clone()),
+            states: 400,
+        };
+        scene.plan = match plan {
+            Some(text) => pddl::read_plan(&source(text), &mut task).unwrap().0,
+            None => {
+                let situation = Situation::initial(&task);
+                match scene.planner().plan(&mut task, &situation).answer {
+                    elbowroom::execution::PlanAnswer::Plan(plan) => plan,
+                    other => panic!("no plan: {other:?}"),
+                }
+            }
+        };
+        scene.task = Arc::new(task);
+        scene
+    }
+
+    fn planner(&self) -> Embedded<'static> {
+        Embedded {
+            settings: embedded::Settings::default(),
+            most_states: self.states,
+            clock: None,
+        }
+    }
+
+    /// The first plan made ready.
+    pub(crate) fn prepared(&self, executor: &str) -> Prepared {
+        let spec: ExecutorSpec = executor.parse().unwrap();
+        let mut analyst = Analyst::new(self.flow.clone());
+        analyst.prepare(&self.task, &self.plan, spec.registered.need).unwrap()
+    }
+
+    /// Runs with an executor in any world.
+    pub(crate) fn run_in(
+        &self,
+        executor: &str,
+        world: &mut dyn World,
+        analyst: &mut Analyst,
+        recorder: &mut dyn Recorder,
+    ) -> Report {
+        let spec: ExecutorSpec = executor.parse().unwrap();
+        let mut decider = spec.build(Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        }));
+        run::run(
+            Arc::clone(&self.task),
+            Some(&self.plan),
+            &self.settings,
+            Ports {
+                world,
+                planner: &mut self.planner(),
+                preparer: analyst,
+                executor: decider.as_mut(),
+                need: spec.registered.need,
+                recorder,
+            },
+        )
+    }
+
+    /// Runs in a simulated world.
+    pub(crate) fn run(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
+        let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
+        let mut analyst = Analyst::new(self.flow.clone());
+        let report = self.run_in(executor, &mut world, &mut analyst, &mut NoRecord);
+        if report.verdict == Verdict::GoalReached {
+            assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
+        }
+        report
+    }
+
+    /// Runs in a simulated world that reports badly; whether the goal is true in the end.
+    pub(crate) fn run_badly(
+        &self,
+        executor: &str,
+        model: &WorldModel,
+        reports: &Reports,
+        seed: u64,
+        analyst: &mut Analyst,
+    ) -> (Report, bool) {
+        let sim = SimWorld::new(Arc::clone(&self.task), model, seed);
+        let resolution = model.resolution.clone();
+        let mut world = Unreliable::new(sim, reports.clone(), seed, resolution);
+        let report = self.run_in(executor, &mut world, analyst, &mut NoRecord);
+        let is_goal = world.inner().truth().is_goal() == Ok(true);
+        (report, is_goal)
+    }
+
+    /// What the judge says of what was done.
+    pub(crate) fn judged(&self, report: &Report) -> validate::Verdict {
+        let steps = report.executed.iter().map(|executed| executed.step.clone());
+        let plan = TimeTriggeredPlan {
+            steps: steps.collect(),
+        };
+        validate(&self.task, &plan, &validate::Settings::default())
+    }
+
+    pub(crate) fn world(&self, sections: &str) -> WorldModel {
+        let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
+        WorldModel::read(&text, self.task.problem()).unwrap()
+    }
+}
+
+/// A file of the project, by its path from the root.
+pub(crate) fn read(path: &str) -> String {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::fs::read_to_string(root.join(path)).unwrap()
+}
+
+/// How many runs a long test makes: a few, or as many as the variable says.
+pub(crate) fn runs(variable: &str, otherwise: u64) -> u64 {
+    std::env::var(variable)
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(otherwise)
+}

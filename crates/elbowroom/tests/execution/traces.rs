@@ -1,0 +1,78 @@
+//! Traces: the same run, the same lines; and a trace that was cut off can be read.
+
+use std::sync::Arc;
+
+use elbowroom::execute::Analyst;
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
+use elbowroom::sim::SimWorld;
+use serde_json::json;
+
+use crate::scene::{EXECUTORS, Scene};
+
+fn traced(scene: &Scene, executor: &str, seed: u64) -> String {
+    let model = scene.world(
+        "[[duration]]\naction = \"*\"\nnormal = { mean = 1, deviation = 0.3, minimum = 0.2 }\n\
+         relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.1\n",
+    );
+    let mut text = String::new();
+    let mut sink = |line: &str| text.push_str(line);
+    let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
+    writer.header(json!({}));
+    let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
+    let mut analyst = Analyst::new(scene.flow.clone());
+    scene.run_in(executor, &mut world, &mut analyst, &mut writer);
+    text
+}
+
+/// Plays a trace back; how many entries agree.
+fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
+    use elbowroom::execute::WholeRegion;
+    use elbowroom::execution::executors::ExecutorSpec;
+    use elbowroom::execution::run::{self, Ports};
+    let stored = Stored::read(text).unwrap();
+    let spec: ExecutorSpec = executor.parse().unwrap();
+    let mut decider = spec.build(Box::new(WholeRegion {
+        epsilon: scene.settings.epsilon.clone(),
+    }));
+    let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
+    run::run(
+        Arc::clone(&scene.task),
+        Some(&scene.plan),
+        &scene.settings,
+        Ports {
+            world: &mut ReplayWorld::new(&stored, &scene.task),
+            planner: &mut ReplayPlanner::new(&stored),
+            preparer: &mut Analyst::new(scene.flow.clone()),
+            executor: decider.as_mut(),
+            need: spec.registered.need,
+            recorder: &mut replay,
+        },
+    );
+    let (agreed, difference) = replay.outcome();
+    assert_eq!(difference, None);
+    agreed
+}
+
+#[test]
+fn a_run_can_be_played_back_from_its_trace_alone() {
+    for scene in [Scene::case("delivery"), Scene::case("match")] {
+        for executor in EXECUTORS {
+            for seed in 0..5 {
+                let text = traced(&scene, executor, seed);
+                assert_eq!(text, traced(&scene, executor, seed));
+                let agreed = replayed(&scene, executor, &text);
+                assert_eq!(agreed + 1, text.lines().count(), "{executor}, {seed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
+    let scene = Scene::case("delivery");
+    let text = traced(&scene, "guarded", 1);
+    let first = text.find('\n').unwrap() + 1;
+    for cut in (first..text.len()).step_by(997) {
+        replayed(&scene, "guarded", &text[..cut]);
+    }
+}

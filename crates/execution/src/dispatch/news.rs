@@ -1,0 +1,143 @@
+//! Holding what was observed against the network.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, network_node};
+use elbowroom_stn::WindowEnd;
+
+use super::{Dispatch, explain};
+use crate::event::Ending;
+use crate::executor::{Moment, News};
+use crate::horizon::Missed;
+use crate::projection;
+use crate::reason::{Cause, Reason};
+
+impl Dispatch {
+    /// Takes note of what is new. The first thing that the plan does not survive, if there is one.
+    pub(crate) fn take(&mut self, moment: &Moment<'_>) -> Option<Box<Reason>> {
+        let mut trouble = None;
+        let mut is_surprised = None;
+        for news in moment.news {
+            let new = match news {
+                News::Started { step, time, .. } => self.started(InstanceId(step.0), time),
+                News::Ended {
+                    step, time, ending, ..
+                } => self.ended(InstanceId(step.0), time, ending),
+                News::Fact(fact) => {
+                    is_surprised = Some(moment.belief.task().fact_name(*fact));
+                    None
+                }
+                News::Value(fluent) => {
+                    is_surprised = Some(moment.belief.task().fluent_name(*fluent));
+                    None
+                }
+                News::Contradiction { action } => {
+                    Some(Reason::new(Cause::Contradiction).of(action))
+                }
+                News::Silence { action, since } => {
+                    Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
+                }
+            };
+            trouble = trouble.or(new);
+        }
+        let surprise = is_surprised.filter(|_| trouble.is_none());
+        trouble
+            .or_else(|| surprise.and_then(|what| self.surprise(moment, &what)))
+            .map(Box::new)
+    }
+
+    /// Whether the rest of the plan works in the state that is believed now, if nothing deviates
+    /// any more; if not, why not. `what` was not as expected.
+    pub(crate) fn surprise(&self, moment: &Moment<'_>, what: &str) -> Option<Reason> {
+        let failure = projection::failure(self, moment)?;
+        let mut reason = Reason::new(Cause::Surprise).about(what);
+        reason.action = failure.action;
+        reason.behind = vec![failure.condition];
+        reason.since = Some(moment.now.clone());
+        Some(reason)
+    }
+
+    fn started(&mut self, id: InstanceId, time: &Rational) -> Option<Reason> {
+        let [start, end] = self.ends[id.index()];
+        let local = self.local(time);
+        let fixed = self.horizon.fix(network_node(start), &local);
+        self.progress.happen(&self.plan, start, &local);
+        self.progress.ready.remove(&start);
+        if start == end {
+            self.finish(id);
+        }
+        let missed = fixed.err()?;
+        let name = self.action(id).name.clone();
+        let mut reason = Reason::new(Cause::Unreachable).about(format!("the start of {name}"));
+        reason.action = Some(name);
+        reason.observed = Some(time.clone());
+        reason.behind = self.behind(start, missed.end);
+        reason.since = Some(time.clone());
+        reason.by = Some(missed.by);
+        Some(reason)
+    }
+
+    fn ended(&mut self, id: InstanceId, time: &Rational, ending: &Ending) -> Option<Reason> {
+        let [start, end] = self.ends[id.index()];
+        let name = self.action(id).name.clone();
+        match ending {
+            Ending::Succeeded => {}
+            Ending::Failed { why } => {
+                self.finish(id);
+                let reason = Reason::new(Cause::Failed).of(&name).about(why.as_str());
+                return Some(reason.since(time.clone()));
+            }
+            Ending::Cancelled => {
+                self.finish(id);
+                let reason = Reason::new(Cause::Failed).of(&name).about("it was cancelled");
+                return Some(reason.since(time.clone()));
+            }
+        }
+        let local = self.local(time);
+        let is_own = |end| self.is_limited_by_duration(id, end);
+        let (is_own_lower, is_own_upper) = (is_own(WindowEnd::Earliest), is_own(WindowEnd::Latest));
+        let fixed = self.horizon.fix(network_node(end), &local);
+        self.progress.happen(&self.plan, end, &local);
+        self.finish(id);
+        let missed = fixed.err()?;
+        let duration = self.happened(start).map(|start| &local - start);
+        let is_own = match missed.end {
+            WindowEnd::Earliest => is_own_lower,
+            WindowEnd::Latest => is_own_upper,
+        };
+        Some(self.missed_end(id, time, duration, is_own, missed))
+    }
+
+    fn missed_end(
+        &self,
+        id: InstanceId,
+        time: &Rational,
+        duration: Option<Rational>,
+        is_own: bool,
+        missed: Missed,
+    ) -> Reason {
+        let name = self.action(id).name.clone();
+        let mut reason = if is_own {
+            let mut reason = Reason::new(Cause::OutsideInterval).about("duration");
+            reason.observed = duration;
+            reason.allowed = Some(explain::interval(&self.durations[id.index()]));
+            reason
+        } else {
+            let mut reason = Reason::new(Cause::Unreachable).about(format!("the end of {name}"));
+            reason.observed = Some(time.clone());
+            reason
+        };
+        reason.action = Some(name);
+        reason.behind = self.behind(self.ends[id.index()][1], missed.end);
+        reason.since = Some(match missed.end {
+            WindowEnd::Earliest => time.clone(),
+            WindowEnd::Latest => time - &missed.by,
+        });
+        reason.by = Some(missed.by);
+        reason
+    }
+
+    fn finish(&mut self, id: InstanceId) {
+        self.progress.running.remove(&id);
+        self.progress.left = self.progress.left.saturating_sub(1);
+    }
+}

@@ -1,0 +1,201 @@
+//! What to do now, and when to look again.
+
+use elbowroom_model::ground::{Action, Body, Condition};
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId, network_node};
+use elbowroom_stn::WindowEnd;
+
+use super::{Dispatch, explain, is_instantaneous};
+use crate::executor::{Decided, Decision, Moment, Order, StepId};
+use crate::progression::Progression;
+use crate::reason::{Cause, Reason};
+
+impl Dispatch {
+    /// What to do now, when everything new has been taken note of.
+    pub(crate) fn next(&mut self, moment: &Moment<'_>) -> Decided {
+        if self.progress.left == 0 {
+            return at_the_end(moment);
+        }
+        if let Some(reason) = self.overdue(moment).or_else(|| broken(moment)) {
+            return replan(reason);
+        }
+        let now = self.local(moment.now);
+        let mut orders = Vec::new();
+        let mut wake: Option<(Rational, NodeId)> = None;
+        let mut wake_at = |time: Rational, node: NodeId| {
+            if wake.as_ref().is_none_or(|(old, _)| time < *old) {
+                wake = Some((time, node));
+            }
+        };
+        for node in self.progress.ready.iter().copied() {
+            let (earliest, latest) = self.horizon.window(network_node(node));
+            match earliest.filter(|earliest| *earliest > now) {
+                Some(earliest) => wake_at(earliest, node),
+                None => orders.push(node),
+            }
+            if let Some(latest) = latest.filter(|latest| *latest >= now) {
+                wake_at(latest + &self.epsilon, node);
+            }
+        }
+        for &id in &self.progress.running {
+            let node = self.awaited(id);
+            if let Some(latest) = self.horizon.window(network_node(node)).1 {
+                wake_at(latest.max(now.clone()) + &self.epsilon, node);
+            }
+        }
+        if !orders.is_empty() {
+            return self.order(&orders, moment.belief);
+        }
+        let mut reason = Reason::new(Cause::NothingDue);
+        reason.about = Some(match &wake {
+            Some((_, node)) => self.plan.node_words(&self.task, *node),
+            None => "something is observed".to_owned(),
+        });
+        Decided {
+            decision: Decision::Wait {
+                until: wake.map(|(time, _)| self.world(&time)),
+            },
+            reason,
+        }
+    }
+
+    /// Starts these, unless one of them lacks what it needs.
+    fn order(&mut self, nodes: &[NodeId], belief: &Progression) -> Decided {
+        let mut orders = Vec::new();
+        for &node in nodes {
+            let (Node::Start(id) | Node::Instant(id)) = self.plan.nodes[node.index()] else {
+                continue;
+            };
+            let action = self.action(id);
+            let duration = self.nominal_duration(id);
+            if let Some(reason) = unmet(action, &duration, belief) {
+                if orders.is_empty() {
+                    return replan(reason);
+                }
+                break;
+            }
+            orders.push(Order {
+                step: StepId::from(id),
+                duration: (!is_instantaneous(action)).then_some(duration),
+                action: action.clone(),
+                planned: self.planned(StepId::from(id), false).unwrap_or_default(),
+            });
+        }
+        for order in &orders {
+            let id = InstanceId(order.step.0);
+            self.progress.ready.remove(&self.ends[id.index()][0]);
+            self.progress.running.insert(id);
+        }
+        let mut reason = Reason::new(Cause::Due);
+        reason.action = orders.first().map(|order| order.action.name.clone());
+        Decided {
+            decision: Decision::Start(orders),
+            reason,
+        }
+    }
+
+    /// The node of a running instance that is to be observed next: its end, or still its start.
+    fn awaited(&self, id: InstanceId) -> NodeId {
+        let [start, end] = self.ends[id.index()];
+        if self.happened(start).is_some() {
+            end
+        } else {
+            start
+        }
+    }
+
+    /// What should have happened by now and has not.
+    ///
+    /// The windows are exact, so comparing each time point that is awaited with its own window
+    /// finds out whether all of them can still happen now or later. They are not moved on by the
+    /// mere passing of time, because something that has happened may be reported later.
+    fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
+        let now = self.local(moment.now);
+        for &id in &self.progress.running {
+            let node = self.awaited(id);
+            let latest = self.horizon.window(network_node(node)).1;
+            let Some(latest) = latest.filter(|latest| *latest < now) else {
+                continue;
+            };
+            let [start, end] = self.ends[id.index()];
+            let is_own = node == end && self.is_limited_by_duration(id, WindowEnd::Latest);
+            let mut reason = if is_own {
+                let mut reason = Reason::new(Cause::Outlived);
+                reason.observed = self.happened(start).map(|start| &now - start);
+                reason.allowed = Some(explain::interval(&self.durations[id.index()]));
+                reason
+            } else {
+                Reason::new(Cause::Unreachable).about(self.plan.node_words(&self.task, node))
+            };
+            reason.action = Some(self.action(id).name.clone());
+            reason.behind = self.behind(node, WindowEnd::Latest);
+            reason.since = Some(self.world(&latest));
+            reason.by = Some(now - latest);
+            return Some(reason);
+        }
+        for node in self.progress.ready.iter().copied() {
+            let latest = self.horizon.window(network_node(node)).1;
+            if let Some(latest) = latest.filter(|latest| *latest < now) {
+                let about = self.plan.node_words(&self.task, node);
+                let mut reason = Reason::new(Cause::Unreachable).about(about);
+                reason.behind = self.behind(node, WindowEnd::Latest);
+                reason.since = Some(self.world(&latest));
+                reason.by = Some(now - latest);
+                return Some(reason);
+            }
+        }
+        None
+    }
+}
+
+/// The plan is done: is the goal reached?
+fn at_the_end(moment: &Moment<'_>) -> Decided {
+    let belief = moment.belief;
+    if belief.is_goal() == Ok(true) {
+        return Decided {
+            decision: Decision::GoalReached,
+            reason: Reason::new(Cause::GoalReached),
+        };
+    }
+    let task = belief.task();
+    let unmet = belief.unmet(task.goal(), None);
+    replan(Reason::new(Cause::PlanDone).about(in_words(belief, &unmet)))
+}
+
+/// An over-all condition of something running that does not hold.
+fn broken(moment: &Moment<'_>) -> Option<Reason> {
+    let (_, underway) = moment.belief.broken()?;
+    let body = underway.action.durative()?;
+    let unmet = moment.belief.unmet(&body.over_all, Some(&underway.planned));
+    let about = format!("{} throughout", in_words(moment.belief, &unmet));
+    let reason = Reason::new(Cause::Condition).of(&underway.action.name);
+    Some(reason.about(about).since(moment.now.clone()))
+}
+
+/// What an action needs at its start and does not have.
+pub(crate) fn unmet(action: &Action, duration: &Rational, belief: &Progression) -> Option<Reason> {
+    let condition = match &action.body {
+        Body::Instantaneous(snap) => &snap.condition,
+        Body::Durative(body) => &body.start.condition,
+    };
+    if belief.holds(condition, Some(duration)) == Ok(true) {
+        return None;
+    }
+    let unmet = belief.unmet(condition, Some(duration));
+    let reason = Reason::new(Cause::Condition).of(&action.name);
+    Some(reason.about(in_words(belief, &unmet)))
+}
+
+pub(crate) fn in_words(belief: &Progression, conditions: &[&Condition]) -> String {
+    let words = conditions
+        .iter()
+        .map(|condition| belief.task().describe_condition(condition));
+    words.collect::<Vec<_>>().join(" and ")
+}
+
+pub(crate) fn replan(reason: Reason) -> Decided {
+    Decided {
+        decision: Decision::Replan,
+        reason,
+    }
+}

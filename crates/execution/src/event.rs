@@ -1,0 +1,118 @@
+//! What passes between an executor's side and the world: commands and observations.
+
+use std::fmt;
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, FactId, FluentId};
+use elbowroom_num::Rational;
+
+/// One start of one action, numbered from 0 within a run.
+///
+/// Numbers are never used again, so that a late report of an earlier plan cannot be taken for one
+/// of the present plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket(pub u64);
+
+impl fmt::Display for Ticket {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "#{}", self.0)
+    }
+}
+
+/// What the world is told to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Start an action now.
+    Start {
+        /// By which the world's reports refer to it.
+        ticket: Ticket,
+        /// What to do.
+        action: Arc<Action>,
+        /// How long the plan has it take; `None` for an instantaneous action.
+        duration: Option<Rational>,
+    },
+    /// Stop an action. What it did at its start stays done; its end does not happen.
+    Cancel {
+        /// Which start.
+        ticket: Ticket,
+    },
+}
+
+/// Something the world reports.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation {
+    /// When it happened, by the world's clock. It may be reported later.
+    pub time: Rational,
+    /// What happened.
+    pub event: Event,
+}
+
+/// What can be observed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// An action has started.
+    Started {
+        /// Which.
+        ticket: Ticket,
+        /// By how much its start really changed fluents, where that was measured.
+        measured: Vec<Measured>,
+    },
+    /// An action has ended.
+    Ended {
+        /// Which.
+        ticket: Ticket,
+        /// How.
+        ending: Ending,
+        /// By how much its end really changed fluents, where that was measured.
+        measured: Vec<Measured>,
+    },
+    /// A fact is seen to be true or false.
+    Fact {
+        /// Which.
+        fact: FactId,
+        /// Whether it is true.
+        truth: bool,
+    },
+    /// A fluent is seen to have a value.
+    Value {
+        /// Which.
+        fluent: FluentId,
+        /// Its value.
+        value: Rational,
+    },
+}
+
+/// How an action ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// As the domain says.
+    Succeeded,
+    /// Its end effects did not happen.
+    Failed {
+        /// Why, in words; may be empty.
+        why: String,
+    },
+    /// It was cancelled; its end effects did not happen.
+    Cancelled,
+}
+
+/// The amount by which an action's effect changed a fluent: what stands behind the operator in
+/// `(increase fluent amount)`, `(decrease fluent amount)`, `(assign fluent amount)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// The fluent.
+    pub fluent: FluentId,
+    /// The amount.
+    pub amount: Rational,
+}
+
+impl Ending {
+    /// One word for it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Succeeded => "succeeded",
+            Self::Failed { .. } => "failed",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! The port through which a run asks what to do next.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, FactId, FluentId};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, Schedule};
+
+use crate::event::{Ending, Measured, Ticket};
+use crate::progression::Progression;
+use crate::reason::Reason;
+
+/// An action of the present plan, by a number that the executor chooses.
+///
+/// Executors that go by an STN plan use the position of the action instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct StepId(pub u32);
+
+impl From<InstanceId> for StepId {
+    fn from(id: InstanceId) -> Self {
+        Self(id.0)
+    }
+}
+
+/// Chooses what to do next. No clock, no input or output, no randomness: the same history leads to
+/// the same decisions.
+pub trait Executor {
+    /// Takes up a plan, and forgets the one before.
+    ///
+    /// # Errors
+    /// When the plan cannot be executed (any more): why.
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>>;
+
+    /// Says what to do. It is asked again until it says [`Decision::Wait`]; what is new is told
+    /// only once.
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided;
+
+    /// The window of a time point of a step at present, for the record; in the world's time.
+    fn window(&self, _step: StepId, _is_end: bool) -> Option<Planned> {
+        None
+    }
+}
+
+/// When a happening is planned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Planned {
+    /// Not before.
+    pub earliest: Option<Rational>,
+    /// Not after.
+    pub latest: Option<Rational>,
+}
+
+/// A plan made ready to be executed.
+#[derive(Clone, Debug)]
+pub struct Mission {
+    /// What is left to do, with a clock of its own.
+    pub task: Arc<Task>,
+    /// What the world's clock reads when the task's reads 0.
+    pub origin: Rational,
+    /// What the world's clock reads now; the plan cannot begin earlier.
+    pub now: Rational,
+    /// The plan as the planner made it, on the task's clock.
+    pub time_triggered: TimeTriggeredPlan,
+    /// The plan with room, and with quantities left open.
+    pub plan: ParametrizedPlan,
+    /// When everything happens if nothing deviates, on the task's clock.
+    pub nominal: Schedule,
+    /// In which values of the open quantities the plan is guaranteed to work.
+    pub envelope: Option<DecoupledEnvelope>,
+    /// The plan's first steps that are running already.
+    pub running: BTreeMap<StepId, Ticket>,
+    /// The least separation of interfering happenings (ε).
+    pub epsilon: Rational,
+}
+
+/// A moment at which to decide.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// What time it is, by the world's clock.
+    pub now: &'a Rational,
+    /// What has been observed since the last decision.
+    pub news: &'a [News],
+    /// What holds, as far as is known.
+    pub belief: &'a Progression,
+}
+
+/// Something observed that concerns the present plan, already checked: each start and end is told
+/// once.
+#[derive(Clone, Debug, PartialEq)]
+pub enum News {
+    /// An action has started.
+    Started {
+        /// Which.
+        step: StepId,
+        /// When.
+        time: Rational,
+        /// Amounts measured.
+        measured: Vec<Measured>,
+    },
+    /// An action has ended.
+    Ended {
+        /// Which.
+        step: StepId,
+        /// When.
+        time: Rational,
+        /// How.
+        ending: Ending,
+        /// Amounts measured.
+        measured: Vec<Measured>,
+    },
+    /// A fact is not as believed.
+    Fact(FactId),
+    /// A value is not as believed.
+    Value(FluentId),
+    /// Reports on an action contradict each other.
+    Contradiction {
+        /// Which.
+        action: String,
+    },
+    /// Nothing has been heard of an action for longer than the run's patience.
+    Silence {
+        /// Which.
+        action: String,
+        /// Since when it should have ended.
+        since: Rational,
+    },
+}
+
+/// What to do, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decided {
+    /// What to do.
+    pub decision: Decision,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// What to do next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Decision {
+    /// Start these actions now.
+    Start(Vec<Order>),
+    /// Nothing before `until`, unless something is observed earlier; `None`: whenever that is.
+    Wait {
+        /// By the world's clock.
+        until: Option<Rational>,
+    },
+    /// Stop these.
+    Cancel(Vec<StepId>),
+    /// Give up the plan, and make another one.
+    Replan,
+    /// The goal is reached.
+    GoalReached,
+}
+
+/// An action to start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// By which news refer to it.
+    pub step: StepId,
+    /// What to do.
+    pub action: Arc<Action>,
+    /// How long it is planned to take; `None` for an instantaneous action.
+    pub duration: Option<Rational>,
+    /// When it may start.
+    pub planned: Planned,
+}
+
+impl Decision {
+    /// The word by which traces name it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Start(_) => "start",
+            Self::Wait { .. } => "wait",
+            Self::Cancel(_) => "cancel",
+            Self::Replan => "replan",
+            Self::GoalReached => "goal-reached",
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The executors: one file each, and one list of them all.
+//!
+//! To add one: a file with its [`Executor`] and its [`Registered`] entry, and a line in
+//! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
+//! made from that list.
+
+mod fixed;
+mod guarded;
+mod live;
+mod stn;
+
+use std::fmt;
+use std::str::FromStr;
+
+use elbowroom_num::Rational;
+
+use crate::executor::{Decided, Decision, Executor};
+use crate::preparation::{Need, Region};
+use crate::reason::{Cause, Reason};
+
+/// Every executor, in the order in which help and reports list them.
+pub const EXECUTORS: &[Registered] = &[
+    fixed::REGISTERED,
+    stn::REGISTERED,
+    guarded::REGISTERED,
+    live::REGISTERED,
+];
+
+/// What there is to know of an executor before there is one.
+#[derive(Clone, Copy, Debug)]
+pub struct Registered {
+    /// Its name.
+    pub name: &'static str,
+    /// What the number after its name and a colon means, if it takes one.
+    pub argument: Option<&'static str>,
+    /// What it does, in one sentence.
+    pub summary: &'static str,
+    /// Where it comes from.
+    pub paper: &'static str,
+    /// What it needs to know of a plan.
+    pub need: Need,
+    /// Makes one.
+    make: fn(&Rational, Box<dyn Region>) -> Box<dyn Executor>,
+}
+
+/// An executor as one asks for it: `guarded`, `fixed:30`.
+#[derive(Clone, Debug)]
+pub struct ExecutorSpec {
+    /// Which.
+    pub registered: &'static Registered,
+    /// The number after the colon.
+    pub argument: Option<Rational>,
+}
+
+/// There is no such executor.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownExecutor {
+    /// The name is none of the list.
+    #[error("there is no executor `{name}`; choose one of {known}")]
+    Name {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// The number is missing, superfluous, or none.
+    #[error("`{text}`: {problem}")]
+    Argument {
+        /// What was asked for.
+        text: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl ExecutorSpec {
+    /// Makes the executor. `region` is asked by those that look at the whole envelope.
+    pub fn build(&self, region: Box<dyn Region>) -> Box<dyn Executor> {
+        let zero = Rational::ZERO;
+        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), region)
+    }
+}
+
+impl fmt::Display for ExecutorSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.registered.name)?;
+        match &self.argument {
+            Some(argument) => write!(f, ":{argument}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl FromStr for ExecutorSpec {
+    type Err = UnknownExecutor;
+
+    /// `NAME`, `NAME:NUMBER` or `NAME(NUMBER)`.
+    fn from_str(text: &str) -> Result<Self, UnknownExecutor> {
+        let (name, argument) = match text.trim().split_once([':', '(']) {
+            Some((name, argument)) => (name, Some(argument.trim_end_matches(')').trim())),
+            None => (text.trim(), None),
+        };
+        let registered = EXECUTORS.iter().find(|known| known.name == name.trim());
+        let Some(registered) = registered else {
+            let known: Vec<String> = EXECUTORS.iter().map(Registered::usage).collect();
+            return Err(UnknownExecutor::Name {
+                name: name.to_owned(),
+                known: known.join(", "),
+            });
+        };
+        let wrong = |problem: String| UnknownExecutor::Argument {
+            text: text.to_owned(),
+            problem,
+        };
+        let argument = match (registered.argument, argument) {
+            (None, None) => None,
+            (None, Some(_)) => return Err(wrong(format!("`{name}` takes no number"))),
+            (Some(meaning), None) => {
+                return Err(wrong(format!(
+                    "say which {meaning}, as in `{}`",
+                    registered.usage().replace(['X'], "30")
+                )));
+            }
+            (Some(meaning), Some(argument)) => {
+                let number = argument.trim_end_matches('%').parse::<Rational>();
+                let number = number.map_err(|error| wrong(format!("{meaning}: {error}")))?;
+                if number.is_negative() {
+                    return Err(wrong(format!("{meaning} must not be negative")));
+                }
+                Some(number)
+            }
+        };
+        Ok(Self {
+            registered,
+            argument,
+        })
+    }
+}
+
+impl Registered {
+    /// How one asks for it: `guarded`, `fixed:X`.
+    pub fn usage(&self) -> String {
+        match self.argument {
+            Some(_) => format!("{}:X", self.name),
+            None => self.name.to_owned(),
+        }
+    }
+}
+
+/// What an executor says that has no plan.
+fn without_plan() -> Decided {
+    Decided {
+        decision: Decision::Replan,
+        reason: Reason::new(Cause::PlanDone).about("there is no plan"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EXECUTORS, ExecutorSpec};
+
+    #[test]
+    fn names_are_read_as_they_are_written() {
+        for text in ["fixed:0", "fixed:30", "fixed:5/2", "stn", "guarded", "live"] {
+            let spec: ExecutorSpec = text.parse().unwrap();
+            assert_eq!(spec.to_string(), text);
+        }
+        assert_eq!("fixed(30%)".parse::<ExecutorSpec>().unwrap().to_string(), "fixed:30");
+    }
+
+    #[test]
+    fn a_wrong_name_is_told_the_right_ones() {
+        let error = "gaurded".parse::<ExecutorSpec>().unwrap_err().to_string();
+        for known in EXECUTORS {
+            assert!(error.contains(&known.usage()), "{error}");
+        }
+        for wrong in ["fixed", "fixed:-1", "fixed:much", "stn:3"] {
+            assert!(wrong.parse::<ExecutorSpec>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! `fixed:X`: paper 1's baseline BLEX(X).
+
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::Constraint;
+
+use super::Registered;
+use crate::dispatch::{Bounds, Dispatch, Sight, duration_of, given, replan};
+use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
+use crate::preparation::Need;
+use crate::quantities::amounts;
+use crate::reason::{Cause, Reason};
+
+pub(super) const REGISTERED: Registered = Registered {
+    name: "fixed",
+    argument: Some("percentage of the planned value"),
+    summary: "Dispatches the plan and replans when a duration or an amount leaves the planned \
+              value by more than X %. It looks no further than the constraints at each time \
+              point, and notices a missed deadline only there.",
+    paper: "BLEX(X) in Cashmore et al. (2020), section 5",
+    need: Need::Network,
+    make: |percentage, _| Box::new(Fixed::new(percentage)),
+};
+
+/// See [`REGISTERED`].
+#[derive(Debug)]
+struct Fixed {
+    /// X / 100.
+    share: Rational,
+    state: Option<(Dispatch, Mission)>,
+}
+
+impl Fixed {
+    fn new(percentage: &Rational) -> Self {
+        Self {
+            share: percentage / Rational::from(100),
+            state: None,
+        }
+    }
+
+    /// The values that are close enough to a nominal one.
+    fn around(&self, nominal: &Rational) -> Interval {
+        let room = nominal.abs() * &self.share;
+        Interval::closed(nominal - &room, nominal + &room)
+    }
+}
+
+impl Executor for Fixed {
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let plan = &mission.plan.plan;
+        let bounds = |constraint: &Constraint| -> Bounds {
+            if duration_of(plan, constraint).is_none() {
+                return given(constraint);
+            }
+            let time = |node: elbowroom_plan::NodeId| &mission.nominal[node.index()];
+            let room = self.around(&(time(constraint.to) - time(constraint.from)));
+            (room.lower.value().cloned(), room.upper.value().cloned())
+        };
+        let dispatch = Dispatch::new(mission, Sight::OneHop, &bounds)?;
+        self.state = Some((dispatch, mission.clone()));
+        Ok(())
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let share = self.share.clone();
+        let Some((dispatch, mission)) = &mut self.state else {
+            return super::without_plan();
+        };
+        if let Some(reason) = dispatch.take(moment) {
+            return replan(*reason);
+        }
+        for deviation in amounts(&mission.plan, moment).deviations {
+            let room = deviation.expected.abs() * &share;
+            let distance = (&deviation.observed - &deviation.expected).abs();
+            if distance > room {
+                let about = format!("change of {}", deviation.fluent);
+                let mut reason = Reason::new(Cause::OutsideInterval).about(about);
+                reason.action = Some(deviation.action);
+                reason.observed = Some(deviation.observed);
+                reason.allowed = Some(Interval::closed(
+                    &deviation.expected - &room,
+                    &deviation.expected + &room,
+                ));
+                reason.by = Some(distance - room);
+                return replan(reason.since(moment.now.clone()));
+            }
+        }
+        dispatch.next(moment)
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        self.state.as_ref()?.0.planned(step, is_end)
+    }
+}

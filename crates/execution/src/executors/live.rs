@@ -1,0 +1,172 @@
+//! `live`: the envelope after each observation, with what was observed fixed.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{
+    Bound, Constraint, InstanceId, NodeId, ParameterKind, ParametrizedPlan, Valuation,
+};
+
+use super::Registered;
+use crate::dispatch::{Bounds, Dispatch, Sight, replan};
+use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
+use crate::preparation::{Need, Region};
+use crate::quantities::{amounts, duration_parameters};
+use crate::reason::{Cause, Reason};
+
+pub(super) const REGISTERED: Registered = Registered {
+    name: "live",
+    argument: None,
+    summary: "Holds the rest of the plan against its whole envelope after every observation, with \
+              the observed values fixed, and replans only when the rest is no longer guaranteed \
+              even if nothing deviates any more.",
+    paper: "goes beyond Cashmore et al. (2020)",
+    need: Need::OpenNetwork,
+    make: |_, region| Box::new(Live { region, state: None }),
+};
+
+/// See [`REGISTERED`].
+struct Live {
+    region: Box<dyn Region>,
+    state: Option<Rest>,
+}
+
+/// A plan, and what is known of its open quantities.
+struct Rest {
+    dispatch: Dispatch,
+    mission: Mission,
+    /// What was observed, and for the rest what is planned.
+    values: Valuation,
+}
+
+impl Executor for Live {
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let values = mission.plan.nominal();
+        let bounds = |constraint: &Constraint| nominal_bounds(constraint, &values);
+        let mut rest = Rest {
+            dispatch: Dispatch::new(mission, Sight::Whole, &bounds)?,
+            mission: mission.clone(),
+            values: values.clone(),
+        };
+        // With more freedom for what runs already, there still are times that satisfy everything.
+        let _ = rest.rebound();
+        self.state = Some(rest);
+        Ok(())
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let Some(rest) = &mut self.state else {
+            return super::without_plan();
+        };
+        if !moment.news.is_empty()
+            && let Some(reason) = rest.learn(moment, self.region.as_mut())
+        {
+            return replan(*reason);
+        }
+        rest.dispatch.next(moment)
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        self.state.as_ref()?.dispatch.planned(step, is_end)
+    }
+}
+
+impl Rest {
+    /// Takes note of what is new, and asks whether the rest is still guaranteed.
+    fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
+        if let Some(reason) = self.dispatch.take(moment) {
+            return Some(reason);
+        }
+        self.observe(moment);
+        if let Err(behind) = self.rebound() {
+            let mut reason = Reason::new(Cause::GuaranteeLost)
+                .about("even if nothing deviates any more, too little time is left");
+            reason.behind = behind;
+            return Some(Box::new(reason.since(moment.now.clone())));
+        }
+        // Only ends and amounts can move the rest out of its envelope.
+        let is_end = |news: &News| matches!(news, News::Ended { .. });
+        if !moment.news.iter().any(is_end) {
+            return None;
+        }
+        let (plan, values) = self.remainder(moment.now);
+        let why = region.objection(&self.mission.task, &plan, &values)?;
+        let reason = Reason::new(Cause::GuaranteeLost).about(why);
+        Some(Box::new(reason.since(moment.now.clone())))
+    }
+
+    /// Goes by the present values: what runs may take as long as it likes, what is to come takes
+    /// as long as planned.
+    fn rebound(&mut self) -> Result<(), Vec<String>> {
+        let nodes = |id: &InstanceId| self.dispatch.nodes_of(*id);
+        let running: Vec<[NodeId; 2]> = self.dispatch.running().iter().map(nodes).collect();
+        let (plan, values) = (&self.mission.plan, &self.values);
+        let bounds = |constraint: &Constraint| -> Bounds {
+            match &constraint.lower {
+                Bound::Parameter(id) if running.contains(&[constraint.from, constraint.to]) => {
+                    let range = &plan.parameter(*id).range;
+                    (range.lower.value().cloned(), range.upper.value().cloned())
+                }
+                _ => nominal_bounds(constraint, values),
+            }
+        };
+        self.dispatch.rebound(&bounds)
+    }
+
+    /// Puts observed values in place of planned ones.
+    fn observe(&mut self, moment: &Moment<'_>) {
+        for (parameter, instance) in duration_parameters(&self.mission.plan) {
+            let [start, end] = self.dispatch.nodes_of(instance);
+            let happened = |node| self.dispatch.happened(node);
+            if let (Some(start), Some(end)) = (happened(start), happened(end)) {
+                self.values[parameter.index()] = end - start;
+            }
+        }
+        for reading in amounts(&self.mission.plan, moment).readings {
+            self.values[reading.parameter.index()] = reading.value;
+        }
+    }
+
+    /// The plan with what has happened fixed and the rest not before now, and the values at which
+    /// nothing deviates any more.
+    fn remainder(&self, now: &Rational) -> (ParametrizedPlan, Valuation) {
+        let mut plan = self.mission.plan.clone();
+        let mut values = self.values.clone();
+        let now = self.dispatch.local(now);
+        let nodes: Vec<_> = plan.plan.nodes().skip(1).collect();
+        for (node, what) in nodes {
+            let (lower, upper) = match (self.dispatch.happened(node), what) {
+                (_, elbowroom_plan::Node::Timed(_)) => continue,
+                (Some(time), _) => (time.clone(), Bound::Finite(time.clone())),
+                (None, _) => (now.clone(), Bound::Infinite),
+            };
+            plan.plan.constraints.push(Constraint {
+                from: NodeId::ZERO,
+                to: node,
+                lower: Bound::Finite(lower),
+                upper,
+                reason: elbowroom_plan::Reason::Given,
+            });
+        }
+        for (index, parameter) in self.mission.plan.parameters.iter().enumerate() {
+            let ParameterKind::Duration(instance) = parameter.kind else {
+                continue;
+            };
+            let [start, end] = self.dispatch.nodes_of(instance);
+            if let (Some(start), None) = (self.dispatch.happened(start), self.dispatch.happened(end))
+            {
+                let elapsed = &now - start;
+                values[index] = elapsed.max(values[index].clone());
+            }
+        }
+        (plan, values)
+    }
+}
+
+/// Every parameter has its value.
+fn nominal_bounds(constraint: &Constraint, values: &[Rational]) -> Bounds {
+    let value = |bound: &Bound| match bound {
+        Bound::Infinite => None,
+        Bound::Finite(value) => Some(value.clone()),
+        Bound::Parameter(id) => Some(values[id.index()].clone()),
+    };
+    (value(&constraint.lower), value(&constraint.upper))
+}

@@ -1,0 +1,50 @@
+//! Where plans come from: a port.
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+/// Makes plans.
+pub trait Planner {
+    /// A plan from here. See [`Situation`] for what such a plan looks like.
+    ///
+    /// The plan's facts and fluents are those of `task`, whose table may grow for that.
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned;
+}
+
+/// What a planner answers, and how long it took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// The answer.
+    pub answer: PlanAnswer,
+    /// How long it took, in seconds, if somebody looked at a clock.
+    pub seconds: Option<Rational>,
+}
+
+/// What a planner answers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlanAnswer {
+    /// A plan.
+    Plan(TimeTriggeredPlan),
+    /// There is no plan.
+    Unsolvable,
+    /// No plan has been found; there may be one.
+    NotFound {
+        /// Why not.
+        why: String,
+    },
+}
+
+/// Answers that there is no plan to be had: for runs of a single given plan.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoPlanner;
+
+impl Planner for NoPlanner {
+    fn plan(&mut self, _task: &mut Task, _situation: &Situation) -> Planned {
+        Planned {
+            answer: PlanAnswer::NotFound {
+                why: "there is no planner in this run".to_owned(),
+            },
+            seconds: None,
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Ports through which plans are made ready, and asked what they survive.
+//!
+//! What executes needs no solver; what stands behind these traits may have one.
+
+use std::sync::Arc;
+
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Schedule};
+
+/// What an executor needs to know of a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// Which orderings matter. Nothing is left open.
+    Network,
+    /// The same, with quantities left open.
+    OpenNetwork,
+    /// The same, and for which values the plan is guaranteed to work.
+    Envelope,
+}
+
+/// A plan made ready to be executed.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The plan with room.
+    pub plan: ParametrizedPlan,
+    /// When everything happens if nothing deviates.
+    pub nominal: Schedule,
+    /// For which values it is guaranteed to work, if that was asked for.
+    pub envelope: Option<DecoupledEnvelope>,
+}
+
+/// Makes plans ready.
+pub trait Preparer {
+    /// Frees a plan from the order that it does not need, and finds out what was asked for.
+    ///
+    /// # Errors
+    /// When the plan does not work: why.
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String>;
+}
+
+/// Knows which values a plan survives.
+pub trait Region {
+    /// Why the plan is not guaranteed to work for these values; `None` if it is.
+    fn objection(
+        &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+        values: &[Rational],
+    ) -> Option<String>;
+}

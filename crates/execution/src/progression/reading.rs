@@ -1,0 +1,136 @@
+//! Reading conditions and expressions in a state.
+
+use elbowroom_model::derivation::{Moment, holds};
+use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
+
+use super::Progression;
+
+/// Why a condition or an expression says nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unreadable {
+    /// The fluent has no value.
+    Undefined(FluentId),
+    /// Reports contradict each other about the fact.
+    DoubtfulFact(FactId),
+    /// Reports contradict each other about the fluent.
+    DoubtfulValue(FluentId),
+    /// Something is divided by zero.
+    DivisionByZero,
+    /// A rate is divided by something that moves.
+    Quotient,
+    /// The rates of change depend on each other in a circle.
+    Circular(FluentId),
+    /// A number is left open.
+    Open,
+}
+
+/// The state, for conditions in which `?duration` may stand.
+struct Reading<'a> {
+    state: &'a Progression,
+    duration: Option<&'a Rational>,
+}
+
+impl Moment<Unreadable> for Reading<'_> {
+    fn fact(&self, fact: FactId) -> Result<bool, Unreadable> {
+        if self.state.doubtful_facts.contains(&fact) {
+            return Err(Unreadable::DoubtfulFact(fact));
+        }
+        Ok(self.state.fact(fact))
+    }
+
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, Unreadable> {
+        let value = |expression: &Expression| {
+            if let Some(fluent) = self.state.doubtful_fluent(expression) {
+                return Err(Unreadable::DoubtfulValue(fluent));
+            }
+            evaluate(expression, self.duration, &self.state.values)
+        };
+        Ok(comparison.holds(&value(left)?, &value(right)?))
+    }
+}
+
+impl Progression {
+    /// Whether a condition holds now; `duration` is what `?duration` stands for.
+    ///
+    /// # Errors
+    /// When that cannot be said.
+    pub fn holds(
+        &self,
+        condition: &Condition,
+        duration: Option<&Rational>,
+    ) -> Result<bool, Unreadable> {
+        let basic = Reading {
+            state: self,
+            duration,
+        };
+        match self.task.derivation() {
+            Some(derivation) if derivation.is_read_by(condition) => {
+                let derived = derivation.derive(&basic);
+                holds(condition, &derivation.on_top_of(&basic, &derived))
+            }
+            _ => holds(condition, &basic),
+        }
+    }
+
+    /// Whether the task's goal holds now.
+    ///
+    /// # Errors
+    /// When that cannot be said.
+    pub fn is_goal(&self) -> Result<bool, Unreadable> {
+        self.holds(self.task.goal(), None)
+    }
+
+    /// The parts of a condition that do not hold, or say nothing.
+    pub fn unmet<'c>(
+        &self,
+        condition: &'c Condition,
+        duration: Option<&Rational>,
+    ) -> Vec<&'c Condition> {
+        let mut parts = condition.conjuncts();
+        parts.retain(|part| self.holds(part, duration) != Ok(true));
+        parts
+    }
+
+    fn doubtful_fluent(&self, expression: &Expression) -> Option<FluentId> {
+        let mut found = None;
+        if !self.doubtful_values.is_empty() {
+            expression.visit_fluents(&mut |fluent| {
+                if self.doubtful_values.contains(&fluent) {
+                    found = Some(fluent);
+                }
+            });
+        }
+        found
+    }
+}
+
+/// The value of an expression.
+pub(super) fn evaluate(
+    expression: &Expression,
+    duration: Option<&Rational>,
+    values: &[Option<Rational>],
+) -> Result<Rational, Unreadable> {
+    let mut fault = None;
+    let value = expression.evaluate(&mut |leaf| match leaf {
+        Expression::Fluent(fluent) => {
+            let value = values.get(fluent.index()).cloned().flatten();
+            if value.is_none() {
+                fault = Some(Unreadable::Undefined(*fluent));
+            }
+            value
+        }
+        Expression::Duration if duration.is_some() => duration.cloned(),
+        _ => {
+            fault = Some(Unreadable::Open);
+            None
+        }
+    });
+    value.ok_or(fault.unwrap_or(Unreadable::DivisionByZero))
+}

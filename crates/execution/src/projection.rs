@@ -1,0 +1,125 @@
+//! The rest of a plan played through in the state that is believed.
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::Action;
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use crate::dispatch::{Dispatch, in_words, is_instantaneous};
+use crate::event::Ticket;
+use crate::executor::Moment;
+use crate::progression::Progression;
+
+/// Something that would go wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Failure {
+    /// The action that needs it; `None` for the goal.
+    pub(crate) action: Option<String>,
+    /// What would not hold.
+    pub(crate) condition: String,
+}
+
+/// Tickets of actions that are only imagined to start.
+const IMAGINED: u64 = 1 << 63;
+
+/// Plays the rest of the plan through, everything as planned from now on. The first condition
+/// that would not hold.
+pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failure> {
+    let mut state = moment.belief.clone();
+    let mut running: Vec<(InstanceId, Ticket)> = Vec::new();
+    for (time, node) in expected(dispatch, moment.now) {
+        // What cannot be computed shows as a condition that says nothing.
+        let _ = state.advance(&time.max(state.time().clone()));
+        if let Some(failure) = broken(&state) {
+            return Some(failure);
+        }
+        match dispatch.plan().nodes[node.index()] {
+            Node::Start(id) | Node::Instant(id) => {
+                let action = dispatch.action(id);
+                let duration = dispatch.nominal_duration(id);
+                if let Some(reason) = crate::dispatch::unmet(action, &duration, &state) {
+                    return Some(Failure {
+                        action: reason.action,
+                        condition: reason.about.unwrap_or_default(),
+                    });
+                }
+                let ticket = Ticket(IMAGINED + u64::from(id.0));
+                let _ = state.start(ticket, action, &duration, &[]);
+                if !is_instantaneous(action) {
+                    running.push((id, ticket));
+                }
+            }
+            Node::End(id) => {
+                let ticket = ticket_of(&state, dispatch.action(id), &running, id)?;
+                if let Some(failure) = at_end(&state, ticket) {
+                    return Some(failure);
+                }
+                let _ = state.end(ticket, &[]);
+            }
+            Node::Zero | Node::Timed(_) => {}
+        }
+    }
+    let goal = state.task().goal().clone();
+    let unmet = state.unmet(&goal, None);
+    (!unmet.is_empty()).then(|| Failure {
+        action: None,
+        condition: in_words(&state, &unmet),
+    })
+}
+
+/// What has not happened, with the times at which it would, in order.
+fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
+    let plan = dispatch.plan();
+    let is_open = |node: &NodeId| {
+        let happens = !matches!(plan.nodes[node.index()], Node::Zero | Node::Timed(_));
+        happens && dispatch.happened(*node).is_none()
+    };
+    let mut nodes: Vec<NodeId> = plan.nodes().map(|(node, _)| node).filter(is_open).collect();
+    nodes.sort_by_key(|node| dispatch.nominal_time(*node));
+    let mut latest = now.clone();
+    let mut times = Vec::with_capacity(nodes.len());
+    for node in nodes {
+        let (earliest, _) = dispatch.window_of(node);
+        let nominal = dispatch.world(dispatch.nominal_time(node));
+        let earliest = earliest.map_or(nominal.clone(), |earliest| earliest.max(nominal));
+        latest = latest.max(earliest);
+        times.push((latest.clone(), node));
+    }
+    times
+}
+
+fn ticket_of(
+    state: &Progression,
+    action: &Arc<Action>,
+    running: &[(InstanceId, Ticket)],
+    id: InstanceId,
+) -> Option<Ticket> {
+    if let Some((_, ticket)) = running.iter().find(|(instance, _)| *instance == id) {
+        return Some(*ticket);
+    }
+    let mut underway = state.running().iter();
+    underway
+        .find(|(_, underway)| underway.action.name == action.name)
+        .map(|(ticket, _)| *ticket)
+}
+
+fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
+    let underway = state.running().get(&ticket)?;
+    let body = underway.action.durative()?;
+    let unmet = state.unmet(&body.end.condition, Some(&underway.planned));
+    (!unmet.is_empty()).then(|| Failure {
+        action: Some(underway.action.name.clone()),
+        condition: in_words(state, &unmet),
+    })
+}
+
+fn broken(state: &Progression) -> Option<Failure> {
+    let (_, underway) = state.broken()?;
+    let body = underway.action.durative()?;
+    let unmet = state.unmet(&body.over_all, Some(&underway.planned));
+    Some(Failure {
+        action: Some(underway.action.name.clone()),
+        condition: in_words(state, &unmet),
+    })
+}

@@ -1,0 +1,184 @@
+//! Why an executor decides as it does.
+
+use std::fmt;
+
+use elbowroom_num::{Interval, Rational};
+
+/// Why an executor decides as it does: what was observed or not, what was allowed, what stands
+/// behind that, by how much it was missed, and since when. Times are the world's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reason {
+    /// What kind of reason.
+    pub cause: Cause,
+    /// The action it is about.
+    pub action: Option<String>,
+    /// The quantity, condition or moment it is about, in words.
+    pub about: Option<String>,
+    /// What was observed: a duration, an amount, or the time of a happening.
+    pub observed: Option<Rational>,
+    /// What is allowed.
+    pub allowed: Option<Interval>,
+    /// The constraints behind that, in words; the one it begins with comes first.
+    pub behind: Vec<String>,
+    /// By how much it was missed.
+    pub by: Option<Rational>,
+    /// Since when this has been so.
+    pub since: Option<Rational>,
+}
+
+/// Kinds of [`Reason`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Cause {
+    /// All that comes before has happened, and the window is open.
+    Due,
+    /// Something must happen first.
+    NothingDue,
+    /// An observed quantity is not in its interval.
+    OutsideInterval,
+    /// A running action has not ended by the upper end of its interval.
+    Outlived,
+    /// Too little time is left for something to happen.
+    Unreachable,
+    /// A condition that is needed does not hold.
+    Condition,
+    /// An action failed.
+    Failed,
+    /// An action was said to have ended in two ways.
+    Contradiction,
+    /// Something else than believed was seen, and the plan does not work with it.
+    Surprise,
+    /// Nothing has been heard of an action for too long.
+    Silence,
+    /// What is left of the plan is no longer guaranteed to work.
+    GuaranteeLost,
+    /// The plan came too late to be started.
+    Late,
+    /// The plan is done, but the goal is not reached.
+    PlanDone,
+    /// The goal is reached.
+    GoalReached,
+    /// A plan has been made.
+    NewPlan,
+}
+
+impl Cause {
+    /// All of them, with the words by which traces name them.
+    pub const NAMES: &[(Self, &str)] = &[
+        (Self::Due, "due"),
+        (Self::NothingDue, "nothing-due"),
+        (Self::OutsideInterval, "outside-interval"),
+        (Self::Outlived, "outlived"),
+        (Self::Unreachable, "unreachable"),
+        (Self::Condition, "condition"),
+        (Self::Failed, "failed"),
+        (Self::Contradiction, "contradiction"),
+        (Self::Surprise, "surprise"),
+        (Self::Silence, "silence"),
+        (Self::GuaranteeLost, "guarantee-lost"),
+        (Self::Late, "late"),
+        (Self::PlanDone, "plan-done"),
+        (Self::GoalReached, "goal-reached"),
+        (Self::NewPlan, "new-plan"),
+    ];
+
+    /// The word by which traces name it.
+    pub fn name(self) -> &'static str {
+        let found = Self::NAMES.iter().find(|(cause, _)| *cause == self);
+        found.map_or("unknown", |(_, name)| name)
+    }
+}
+
+impl Reason {
+    /// A reason that says no more than its kind.
+    pub fn new(cause: Cause) -> Self {
+        Self {
+            cause,
+            action: None,
+            about: None,
+            observed: None,
+            allowed: None,
+            behind: Vec::new(),
+            by: None,
+            since: None,
+        }
+    }
+
+    /// About which action.
+    #[must_use]
+    pub fn of(mut self, action: &str) -> Self {
+        self.action = Some(action.to_owned());
+        self
+    }
+
+    /// About what.
+    #[must_use]
+    pub fn about(mut self, about: impl Into<String>) -> Self {
+        self.about = Some(about.into());
+        self
+    }
+
+    /// Since when.
+    #[must_use]
+    pub fn since(mut self, time: Rational) -> Self {
+        self.since = Some(time);
+        self
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let action = self.action.as_deref().unwrap_or("the plan");
+        let about = self.about.as_deref().unwrap_or("something");
+        match self.cause {
+            Cause::Due => write!(f, "{action} is due")?,
+            Cause::NothingDue => write!(f, "nothing is due before {about}")?,
+            Cause::OutsideInterval => write!(f, "the {about} of {action} is not in its interval")?,
+            Cause::Outlived => write!(f, "{action} has not ended in time")?,
+            Cause::Unreachable => write!(f, "too little time is left for {about}")?,
+            Cause::Condition => write!(f, "{action} needs {about}, which does not hold")?,
+            Cause::Failed => {
+                write!(f, "{action} failed")?;
+                if let Some(why) = self.about.as_deref().filter(|why| !why.is_empty()) {
+                    write!(f, ": {why}")?;
+                }
+            }
+            Cause::Contradiction => write!(f, "reports on {action} contradict each other")?,
+            Cause::Surprise => write!(f, "{about} was not expected, and {action} needs it to be otherwise")?,
+            Cause::Silence => write!(f, "nothing has been heard of {action} for too long")?,
+            Cause::GuaranteeLost => write!(f, "the rest of the plan is no longer guaranteed: {about}")?,
+            Cause::Late => write!(f, "the plan came too late: {about}")?,
+            Cause::PlanDone => write!(f, "the plan is done, but the goal is not reached: {about}")?,
+            Cause::GoalReached => write!(f, "the goal is reached")?,
+            Cause::NewPlan => write!(f, "there is a new plan")?,
+        }
+        if let Some(observed) = &self.observed {
+            write!(f, "; observed {}", observed.to_decimal(3))?;
+        }
+        if let Some(allowed) = &self.allowed {
+            write!(f, ", allowed {}", short(allowed))?;
+        }
+        if let Some(by) = &self.by {
+            write!(f, ", missed by {}", by.to_decimal(3))?;
+        }
+        if let Some(since) = &self.since {
+            write!(f, ", since {}", since.to_decimal(3))?;
+        }
+        if !self.behind.is_empty() {
+            write!(f, " (behind it: {})", self.behind.join("; "))?;
+        }
+        Ok(())
+    }
+}
+
+/// An interval with three digits.
+fn short(interval: &Interval) -> String {
+    let end = |value: Option<&Rational>, infinity: &str| match value {
+        Some(value) => value.to_decimal(3),
+        None => infinity.to_owned(),
+    };
+    format!(
+        "[{}, {}]",
+        end(interval.lower.value(), "-inf"),
+        end(interval.upper.value(), "inf")
+    )
+}

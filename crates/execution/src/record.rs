@@ -1,0 +1,103 @@
+//! The record of a run: everything that came in and went out, in order.
+
+use std::sync::Arc;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use crate::event::{Command, Observation};
+use crate::executor::{Decided, Mission, Planned};
+use crate::reason::Reason;
+use crate::run::Report;
+
+/// Takes the record of a run as it comes about.
+pub trait Recorder {
+    /// One entry. What is kept must be kept before this returns, so that a run that is cut short
+    /// leaves its record.
+    fn record(&mut self, entry: &Entry<'_>);
+
+    /// The table of facts and fluents has grown; those known keep their numbers.
+    fn know(&mut self, _task: &Arc<Task>) {}
+}
+
+/// Keeps nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoRecord;
+
+impl Recorder for NoRecord {
+    fn record(&mut self, _entry: &Entry<'_>) {}
+}
+
+/// One entry of a run's record. All times are the world's, except in plans, where it is said.
+#[derive(Clone, Copy, Debug)]
+pub enum Entry<'a> {
+    /// A plan is taken up; its times are those of [`Mission::origin`].
+    Mission(&'a Mission),
+    /// The executor decided.
+    Decided {
+        /// When.
+        now: &'a Rational,
+        /// What and why.
+        decided: &'a Decided,
+    },
+    /// The world was given a command.
+    Command {
+        /// When.
+        now: &'a Rational,
+        /// Which.
+        command: &'a Command,
+        /// When that was planned.
+        planned: &'a Planned,
+    },
+    /// Time has passed, up to `now`, which `until` would have been the end of.
+    Passed {
+        /// Until when the world was asked to wait at most.
+        until: &'a Rational,
+        /// What time it is now.
+        now: &'a Rational,
+        /// What the world reported.
+        observations: &'a [Observation],
+    },
+    /// What the world reported when asked to look at the goal.
+    Looked {
+        /// When.
+        now: &'a Rational,
+        /// What it reported.
+        observations: &'a [Observation],
+    },
+    /// An observation, and what was made of it.
+    Taken {
+        /// When it was reported.
+        now: &'a Rational,
+        /// The observation.
+        observation: &'a Observation,
+        /// When that was planned.
+        planned: &'a Planned,
+        /// What is wrong with it, if it was not taken at its word.
+        remark: Option<&'a str>,
+    },
+    /// A plan is being made.
+    Planning {
+        /// When.
+        now: &'a Rational,
+        /// Why.
+        reason: &'a Reason,
+        /// From where.
+        situation: &'a Situation,
+    },
+    /// A plan has been made, or not.
+    Planned {
+        /// When, with the time that it took.
+        now: &'a Rational,
+        /// How long it took in the world's time.
+        took: &'a Rational,
+        /// The plan, on the task's clock.
+        plan: Option<&'a TimeTriggeredPlan>,
+        /// Why there is none.
+        why_not: Option<&'a str>,
+        /// Whether it is certain that there is none.
+        is_unsolvable: bool,
+    },
+    /// The run is over.
+    Over(&'a Report),
+}

@@ -1,0 +1,213 @@
+//! What was started in a run, and what became of it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::Step;
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, DurativeBody, Effect, Expression, SnapAction,
+};
+use elbowroom_num::Rational;
+
+use super::Patience;
+use crate::event::{Ending, Measured, Ticket};
+use crate::executor::{Order, StepId};
+use crate::progression::Progression;
+
+/// Everything that was started.
+#[derive(Clone, Debug, Default)]
+pub struct Account {
+    /// By ticket.
+    entries: Vec<Opened>,
+    /// The steps of the present plan.
+    steps: BTreeMap<StepId, Ticket>,
+    /// Those that have not ended.
+    open: BTreeMap<Ticket, ()>,
+}
+
+/// One start.
+#[derive(Clone, Debug)]
+pub(super) struct Opened {
+    pub(super) action: Arc<Action>,
+    pub(super) planned: Option<Rational>,
+    /// The step of the present plan that it is.
+    pub(super) step: Option<StepId>,
+    pub(super) ordered: Rational,
+    pub(super) started: Option<Rational>,
+    pub(super) ended: Option<(Rational, Ending)>,
+    cancelled: Option<Rational>,
+    measured: [Vec<Measured>; 2],
+}
+
+/// Something that was done, as a step of a plan that the judge can look at.
+///
+/// Its action has the amounts that were measured in place of those that the domain has, and no
+/// duration constraints. Of an action that was stopped only the start is left, and what it changed
+/// meanwhile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExecutedStep {
+    /// Which start it was.
+    pub ticket: Ticket,
+    /// How it ended; `None` if it had not.
+    pub ending: Option<Ending>,
+    /// The step.
+    pub step: Step,
+}
+
+impl Account {
+    /// How many actions were started.
+    pub fn started(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// What has not ended.
+    pub fn open_tickets(&self) -> impl Iterator<Item = Ticket> + '_ {
+        self.open.keys().copied()
+    }
+
+    pub(super) fn open(&mut self, order: &Order, now: &Rational) -> Ticket {
+        let ticket = Ticket(self.entries.len() as u64);
+        self.entries.push(Opened {
+            action: Arc::clone(&order.action),
+            planned: order.duration.clone(),
+            step: Some(order.step),
+            ordered: now.clone(),
+            started: None,
+            ended: None,
+            cancelled: None,
+            measured: [Vec::new(), Vec::new()],
+        });
+        self.steps.insert(order.step, ticket);
+        self.open.insert(ticket, ());
+        ticket
+    }
+
+    /// The steps of earlier plans no longer mean anything, but for those that go on.
+    pub(super) fn begin_plan(&mut self, running: &BTreeMap<StepId, Ticket>) {
+        for ticket in std::mem::take(&mut self.steps).into_values() {
+            self.entries[index(ticket)].step = None;
+        }
+        for (step, ticket) in running {
+            self.entries[index(*ticket)].step = Some(*step);
+            self.steps.insert(*step, *ticket);
+        }
+    }
+
+    pub(super) fn ticket(&self, step: StepId) -> Option<Ticket> {
+        self.steps.get(&step).copied()
+    }
+
+    pub(super) fn get(&self, ticket: Ticket) -> Option<&Opened> {
+        self.entries.get(index(ticket))
+    }
+
+    pub(super) fn note_start(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
+        let entry = &mut self.entries[index(ticket)];
+        entry.started = Some(time.clone());
+        entry.measured[0] = measured.to_vec();
+        if entry.planned.is_none() {
+            entry.ended = Some((time.clone(), Ending::Succeeded));
+            self.open.remove(&ticket);
+        }
+    }
+
+    pub(super) fn note_end(
+        &mut self,
+        ticket: Ticket,
+        time: &Rational,
+        ending: &Ending,
+        measured: &[Measured],
+    ) {
+        let entry = &mut self.entries[index(ticket)];
+        entry.ended = Some((time.clone(), ending.clone()));
+        entry.measured[1] = measured.to_vec();
+        self.open.remove(&ticket);
+    }
+
+    pub(super) fn note_cancel(&mut self, ticket: Ticket, time: &Rational) {
+        self.entries[index(ticket)].cancelled = Some(time.clone());
+    }
+
+    /// Since when an action is overdue at `now` beyond what patience allows.
+    pub(super) fn silent(&self, patience: &Patience, now: &Rational) -> Vec<(Ticket, Rational)> {
+        let open = self.open.keys().map(|ticket| (*ticket, self.limit(*ticket, patience)));
+        open.filter(|(_, limit)| limit <= now).collect()
+    }
+
+    pub(super) fn next_silence(&self, patience: &Patience) -> Option<Rational> {
+        self.open.keys().map(|ticket| self.limit(*ticket, patience)).min()
+    }
+
+    /// Until when to wait for a word of an action.
+    fn limit(&self, ticket: Ticket, patience: &Patience) -> Rational {
+        let entry = &self.entries[index(ticket)];
+        let planned = entry.planned.clone().unwrap_or_default();
+        let wait = (planned * &patience.factor).max(patience.at_least.clone());
+        match &entry.cancelled {
+            Some(cancelled) => cancelled + &patience.at_least,
+            None => entry.started.as_ref().unwrap_or(&entry.ordered) + wait,
+        }
+    }
+
+    /// All that was started and did start, as steps for the judge.
+    pub(super) fn executed(&self, belief: &Progression, now: &Rational) -> Vec<ExecutedStep> {
+        let numbered = self.entries.iter().enumerate();
+        let steps = numbered.filter_map(|(index, entry)| {
+            let start = entry.started.clone()?;
+            let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
+            let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
+            let is_whole = ending == Some(Ending::Succeeded);
+            let duration = entry.planned.as_ref().map(|_| (end - &start).max(Rational::ZERO));
+            Some(ExecutedStep {
+                ticket: Ticket(index as u64),
+                ending,
+                step: Step {
+                    action: as_it_was(entry, is_whole, belief),
+                    start,
+                    duration,
+                },
+            })
+        });
+        steps.collect()
+    }
+}
+
+/// The action with what was measured, and without what did not happen.
+fn as_it_was(entry: &Opened, is_whole: bool, _belief: &Progression) -> Action {
+    let mut action = Action::clone(&entry.action);
+    match &mut action.body {
+        Body::Instantaneous(snap) => put_in(snap, &entry.measured[0]),
+        Body::Durative(body) => {
+            body.duration.clear();
+            put_in(&mut body.start, &entry.measured[0]);
+            put_in(&mut body.end, &entry.measured[1]);
+            if !is_whole {
+                cut_off(body);
+            }
+        }
+    }
+    action
+}
+
+fn put_in(snap: &mut SnapAction, measured: &[Measured]) {
+    for Effect { change, .. } in &mut snap.effects {
+        if let Change::Update { fluent, value, .. } = change
+            && let Some(measured) = measured.iter().find(|measured| measured.fluent == *fluent)
+        {
+            *value = Expression::Constant(measured.amount.clone());
+        }
+    }
+}
+
+/// What has been stopped has no end, and what it needed for going on does not matter.
+fn cut_off(body: &mut DurativeBody) {
+    body.over_all = Condition::TRUE;
+    body.end = SnapAction {
+        condition: Condition::TRUE,
+        effects: Vec::new(),
+    };
+}
+
+fn index(ticket: Ticket) -> usize {
+    usize::try_from(ticket.0).unwrap_or(usize::MAX)
+}

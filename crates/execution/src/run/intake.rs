@@ -1,0 +1,236 @@
+//! Taking in what the world reports: each report once, and no report against reason.
+
+use elbowroom_model::ground::Body;
+use elbowroom_num::Rational;
+
+use super::{Run, Stop};
+use crate::event::{Ending, Event, Measured, Observation, Ticket};
+use crate::executor::{News, Planned};
+use crate::record::Entry;
+
+/// What is wrong with a report that is not taken at its word.
+type Remark = Option<&'static str>;
+
+impl Run<'_> {
+    /// Believes what is reported, as far as it can be believed, and notes what is new.
+    pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
+        for observation in observations {
+            let planned = self.planned(&observation.event);
+            let remark = self.take(&observation);
+            self.ports.recorder.record(&Entry::Taken {
+                now: &self.now,
+                observation: &observation,
+                planned: &planned,
+                remark,
+            });
+        }
+        // Time passes for the belief when everything that happened in it is known.
+        let now = self.now.clone();
+        let _ = self.belief.advance(&now);
+    }
+
+    fn planned(&self, event: &Event) -> Planned {
+        let (ticket, is_end) = match event {
+            Event::Started { ticket, .. } => (*ticket, false),
+            Event::Ended { ticket, .. } => (*ticket, true),
+            Event::Fact { .. } | Event::Value { .. } => return Planned::default(),
+        };
+        let step = self.account.get(ticket).and_then(|entry| entry.step);
+        let window = step.and_then(|step| self.ports.executor.window(step, is_end));
+        window.unwrap_or_default()
+    }
+
+    fn take(&mut self, observation: &Observation) -> Remark {
+        let is_early = observation.time > self.now;
+        let time = observation.time.clone().min(self.now.clone());
+        let remark = match &observation.event {
+            Event::Started { ticket, measured } => self.started(*ticket, &time, measured),
+            Event::Ended {
+                ticket,
+                ending,
+                measured,
+            } => self.ended(*ticket, &time, ending, measured),
+            Event::Fact { fact, truth } => {
+                self.believe_until(&time);
+                if self.task.is_derived(*fact) {
+                    return Some("follows from other facts, and is not believed by itself");
+                }
+                if self.belief.see_fact(*fact, *truth) {
+                    self.news.push(News::Fact(*fact));
+                }
+                None
+            }
+            Event::Value { fluent, value } => {
+                self.believe_until(&time);
+                if self.belief.see_value(*fluent, value) {
+                    self.news.push(News::Value(*fluent));
+                }
+                None
+            }
+        };
+        remark.or(is_early.then_some("its time is in the future; taken as now"))
+    }
+
+    /// The belief is never taken back in time, so a late report changes the present state.
+    fn believe_until(&mut self, time: &Rational) {
+        let _ = self.belief.advance(&time.max(self.belief.time()).clone());
+    }
+
+    fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
+        let Some(entry) = self.account.get(ticket) else {
+            return Some("nothing of that number was started");
+        };
+        if entry.started.is_some() {
+            return Some("it had started already");
+        }
+        if entry.ended.is_some() {
+            return Some("it had ended already");
+        }
+        let is_too_early = *time < entry.ordered;
+        let time = time.clone().max(entry.ordered.clone());
+        self.begin(ticket, &time, measured);
+        is_too_early.then_some("its time is before the command; taken as then")
+    }
+
+    /// An action has started, or happened.
+    fn begin(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) {
+        let Some(entry) = self.account.get(ticket) else {
+            return;
+        };
+        let (action, step) = (entry.action.clone(), entry.step);
+        let planned = entry.planned.clone().unwrap_or_default();
+        self.believe_until(time);
+        // An effect that cannot be computed leaves its fluent as it was.
+        let _ = self.belief.start(ticket, &action, &planned, measured);
+        self.account.note_start(ticket, time, measured);
+        match step {
+            Some(step) => self.news.push(News::Started {
+                step,
+                time: time.clone(),
+                measured: measured.to_vec(),
+            }),
+            None => self.tell_effects(ticket, false),
+        }
+    }
+
+    fn ended(
+        &mut self,
+        ticket: Ticket,
+        time: &Rational,
+        ending: &Ending,
+        measured: &[Measured],
+    ) -> Remark {
+        let Some(entry) = self.account.get(ticket) else {
+            return Some("nothing of that number was started");
+        };
+        if let Some((_, earlier)) = &entry.ended {
+            let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);
+            let are_both_without_end = *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
+            if is_same || are_both_without_end {
+                return Some("it had ended already");
+            }
+            self.contradict(ticket);
+            return Some("it had ended otherwise; what it wrote is unknown now");
+        }
+        let is_refused = entry.started.is_none() && *ending != Ending::Succeeded;
+        let was_silent = entry.started.is_none() && !is_refused;
+        let earliest = entry.started.as_ref().unwrap_or(&entry.ordered).clone();
+        let is_too_early = *time < earliest;
+        let time = time.clone().max(earliest.clone());
+        if was_silent {
+            self.begin(ticket, &earliest, &[]);
+        }
+        let step = self.account.get(ticket).and_then(|entry| entry.step);
+        self.believe_until(&time);
+        if *ending == Ending::Succeeded {
+            let _ = self.belief.end(ticket, measured);
+        } else {
+            self.belief.stop(ticket);
+        }
+        // An instantaneous action is over when it has started; what follows says nothing new.
+        let is_over = self
+            .account
+            .get(ticket)
+            .is_some_and(|entry| entry.ended.is_some());
+        if is_over {
+            return was_silent.then_some("its start was not reported");
+        }
+        self.account.note_end(ticket, &time, ending, measured);
+        match step {
+            Some(step) => self.news.push(News::Ended {
+                step,
+                time,
+                ending: ending.clone(),
+                measured: measured.to_vec(),
+            }),
+            None if *ending == Ending::Succeeded => self.tell_effects(ticket, true),
+            None => {}
+        }
+        match () {
+            () if was_silent => Some("its start was not reported; taken as when it was told to"),
+            () if is_too_early => Some("its time is before its start; taken as then"),
+            () => None,
+        }
+    }
+
+    /// Two reports exclude each other: nobody knows what the action's end has done.
+    fn contradict(&mut self, ticket: Ticket) {
+        let Some(entry) = self.account.get(ticket) else {
+            return;
+        };
+        let action = entry.action.clone();
+        match &action.body {
+            Body::Instantaneous(snap) => self.belief.doubt(snap),
+            Body::Durative(body) => self.belief.doubt(&body.end),
+        }
+        self.news.push(News::Contradiction {
+            action: action.name.clone(),
+        });
+    }
+
+    /// The present plan does not know of an action of an earlier one, but may read what it wrote.
+    fn tell_effects(&mut self, ticket: Ticket, is_end: bool) {
+        let Some(entry) = self.account.get(ticket) else {
+            return;
+        };
+        let effects = match &entry.action.body {
+            Body::Instantaneous(snap) => &snap.effects,
+            Body::Durative(body) if is_end => &body.end.effects,
+            Body::Durative(body) => &body.start.effects,
+        };
+        use elbowroom_model::ground::Change;
+        for effect in effects {
+            self.news.push(match &effect.change {
+                Change::Add(fact) | Change::Delete(fact) => News::Fact(*fact),
+                Change::Update { fluent, .. } => News::Value(*fluent),
+            });
+        }
+    }
+
+    /// Gives up the actions of which nothing has been heard for too long.
+    pub(super) fn give_up_the_silent(&mut self) -> Result<(), Stop> {
+        for (ticket, since) in self.account.silent(&self.settings.patience, &self.now) {
+            self.cancel(ticket)?;
+            let entry = self.account.get(ticket);
+            let Some((action, step)) = entry.map(|entry| (entry.action.clone(), entry.step)) else {
+                continue;
+            };
+            self.belief.stop(ticket);
+            // Whether its end took place is not known.
+            if let Body::Durative(body) = &action.body {
+                self.belief.doubt(&body.end);
+            }
+            let why = "nothing was heard of it".to_owned();
+            let now = self.now.clone();
+            self.account
+                .note_end(ticket, &now, &Ending::Failed { why }, &[]);
+            if step.is_some() {
+                self.news.push(News::Silence {
+                    action: action.name.clone(),
+                    since,
+                });
+            }
+        }
+        Ok(())
+    }
+}

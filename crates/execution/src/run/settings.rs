@@ -1,0 +1,151 @@
+//! How to run, and how a run ended.
+
+use elbowroom_num::Rational;
+
+use super::account::ExecutedStep;
+use crate::reason::Reason;
+
+/// How to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSettings {
+    /// The least separation of interfering happenings (ε).
+    pub epsilon: Rational,
+    /// What becomes of running actions when a new plan is made.
+    pub running: RunningRule,
+    /// How long making a plan takes in the world.
+    pub planning_time: PlanningTime,
+    /// How often a new plan may be made.
+    pub most_replans: usize,
+    /// When an action that is silent is given up.
+    pub patience: Patience,
+    /// When the run ends in any case, by the world's clock.
+    pub time_limit: Rational,
+}
+
+impl Default for RunSettings {
+    /// ε = 0.001; running actions are cancelled; planning takes as long as it takes; at most 10
+    /// new plans, as in paper 1's experiments; a million seconds.
+    fn default() -> Self {
+        Self {
+            epsilon: Rational::new(1, 1000),
+            running: RunningRule::Cancel,
+            planning_time: PlanningTime::Measured,
+            most_replans: 10,
+            patience: Patience::default(),
+            time_limit: Rational::from(1_000_000),
+        }
+    }
+}
+
+/// What becomes of running actions when a new plan is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RunningRule {
+    /// They are cancelled, and the plan begins when they have stopped. What `ROSPlan` does.
+    #[default]
+    Cancel,
+    /// They are awaited, and the plan begins when they have ended.
+    Await,
+    /// They go on, and the plan goes on with them: it takes them to last as long as they were
+    /// planned to, or, if they are overdue, to end at once.
+    Keep,
+}
+
+impl RunningRule {
+    /// All of them, with their names.
+    pub const NAMES: &[(Self, &str)] = &[
+        (Self::Cancel, "cancel"),
+        (Self::Await, "await"),
+        (Self::Keep, "keep"),
+    ];
+}
+
+/// How long making a plan takes in the world.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PlanningTime {
+    /// As long as the planner says it took.
+    Measured,
+    /// Always so many seconds.
+    Seconds(Rational),
+}
+
+/// An action is given up when it is silent for longer than `factor` times its planned duration,
+/// and for at least `at_least`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// How many times as long as planned.
+    pub factor: Rational,
+    /// In any case so long.
+    pub at_least: Rational,
+}
+
+impl Default for Patience {
+    /// Ten times as long as planned, at least ten minutes.
+    fn default() -> Self {
+        Self {
+            factor: Rational::from(10),
+            at_least: Rational::from(600),
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The goal is reached.
+    GoalReached,
+    /// No plan reaches the goal from where the run ended.
+    Unsolvable,
+    /// There may be a plan, but there is none to go on with.
+    NoPlan {
+        /// Why.
+        why: String,
+    },
+    /// One more new plan would have been one too many.
+    ReplanLimit,
+    /// The time was up.
+    TimeLimit,
+    /// The outside world failed.
+    WorldFailed {
+        /// How.
+        why: String,
+    },
+}
+
+impl Verdict {
+    /// The word by which traces and tables name it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::GoalReached => "goal-reached",
+            Self::Unsolvable => "unsolvable-from-here",
+            Self::NoPlan { .. } => "no-plan",
+            Self::ReplanLimit => "replan-limit",
+            Self::TimeLimit => "time-limit",
+            Self::WorldFailed { .. } => "world-failed",
+        }
+    }
+
+    /// What there is to add.
+    pub fn why(&self) -> Option<&str> {
+        match self {
+            Self::NoPlan { why } | Self::WorldFailed { why } => Some(why),
+            _ => None,
+        }
+    }
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// How it ended.
+    pub verdict: Verdict,
+    /// When, by the world's clock.
+    pub time: Rational,
+    /// How many new plans were made, or asked for.
+    pub replans: usize,
+    /// Why.
+    pub reasons: Vec<Reason>,
+    /// How many actions were started.
+    pub starts: usize,
+    /// What was done, with the times and amounts observed: a plan for the judge.
+    pub executed: Vec<ExecutedStep>,
+}

@@ -1,0 +1,80 @@
+//! Where plans are executed: a port.
+
+use std::sync::Arc;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_num::Rational;
+
+use crate::event::{Command, Observation};
+
+/// A world in which actions are started and things are observed: a simulation, a robot, a stored
+/// trace.
+///
+/// The contract:
+///
+/// - Each [`Command::Start`] is answered by a `Started`, and, if it takes time, later by one
+///   `Ended`. An instantaneous action is answered by `Started` alone, or by `Ended` with a failure.
+/// - A start that is refused is an `Ended` with a failure, at once.
+/// - Each [`Command::Cancel`] of a running action is answered by an `Ended`; if the action had
+///   ended before the command came, that `Ended` is the answer.
+/// - Time never goes back.
+///
+/// Worlds break contracts. What happens then is defined in [`Run`](crate::run::Run): nothing
+/// hangs, and no report is believed twice.
+pub trait World {
+    /// Gives a command. Returns at once; what comes of it is observed later.
+    ///
+    /// # Errors
+    /// When the world is gone, or does not understand.
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError>;
+
+    /// Lets time pass until something is observed, but not beyond `until`.
+    ///
+    /// # Errors
+    /// When the world is gone, or says what cannot be understood.
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError>;
+
+    /// Looks at facts and fluents on purpose, before the goal is taken as reached. A world that
+    /// cannot look, says nothing.
+    ///
+    /// # Errors
+    /// As [`World::wait`].
+    fn look(
+        &mut self,
+        _facts: &[FactId],
+        _fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        Ok(Vec::new())
+    }
+
+    /// The table of facts and fluents has grown, because a plan mentions new ones. Those known
+    /// keep their numbers.
+    fn know(&mut self, _task: &Arc<Task>) {}
+}
+
+/// Time that has passed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Passage {
+    /// What time it is.
+    pub now: Rational,
+    /// What has been observed meanwhile, in the order in which it was reported.
+    pub observations: Vec<Observation>,
+}
+
+/// The outside world failed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct WorldError {
+    /// What went wrong and what to do about it.
+    pub message: String,
+}
+
+impl WorldError {
+    /// The error with that message.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What is left of a task in mid-execution, as a task of its own.
+
+use elbowroom_num::{End, Interval, Rational};
+
+use crate::ground::{
+    Action, Body, Condition, DurationConstraint, DurativeBody, Expression, SnapAction,
+};
+use crate::plan::{Step, TimeTriggeredPlan};
+use crate::problem::Comparison;
+use crate::situation::{RunningAction, Situation};
+use crate::task::{Task, TimedHappening};
+
+impl Situation {
+    /// The rest of `task`, with a clock of its own that reads 0 at [`Situation::time`].
+    ///
+    /// It begins in the situation's state, and its timed initials are those to come, moved. Facts
+    /// and fluents keep their numbers. What is running is no part of it; a plan takes that along,
+    /// see [`Situation::rest_of_plan`]. [`Task::problem`] still is the whole problem: its initial
+    /// facts and times are those of the beginning.
+    #[must_use]
+    pub fn rest_of_task(&self, task: &Task) -> Task {
+        let to_come = |timed: &&TimedHappening| timed.time > self.time;
+        let moved = |timed: &TimedHappening| TimedHappening {
+            time: &timed.time - &self.time,
+            changes: timed.changes.clone(),
+        };
+        let mut rest = task.clone();
+        rest.timed = task.timed.iter().filter(to_come).map(moved).collect();
+        rest.initial = self.state.clone();
+        rest
+    }
+
+    /// A plan from here as a plan of [`Situation::rest_of_task`].
+    ///
+    /// Each running action becomes one that starts at 0, needs and changes nothing then, takes
+    /// what is left of its duration, and ends as the running one does.
+    #[must_use]
+    pub fn rest_of_plan(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+        let continued = self.running.iter().zip(&plan.steps).map(|(running, step)| Step {
+            start: Rational::ZERO,
+            duration: step
+                .duration
+                .as_ref()
+                .map(|duration| &running.start + duration - &self.time),
+            action: running.rest(&self.time),
+        });
+        let new = plan.new_steps(self).iter().map(|step| Step {
+            start: &step.start - &self.time,
+            ..step.clone()
+        });
+        TimeTriggeredPlan {
+            steps: continued.chain(new).collect(),
+        }
+    }
+}
+
+impl RunningAction {
+    /// What is left of the action at `now`, as an action.
+    #[must_use]
+    pub fn rest(&self, now: &Rational) -> Action {
+        let elapsed = now - &self.start;
+        let mut whole_duration = |leaf: &Expression| match leaf {
+            Expression::Duration => Some(Expression::Add(vec![
+                Expression::Duration,
+                Expression::Constant(elapsed.clone()),
+            ])),
+            _ => None,
+        };
+        let action = self.action.map_leaves(&mut whole_duration);
+        let Body::Durative(body) = action.body else {
+            return action;
+        };
+        Action {
+            body: Body::Durative(DurativeBody {
+                duration: bounds(&self.duration, &elapsed),
+                start: SnapAction {
+                    condition: Condition::TRUE,
+                    effects: Vec::new(),
+                },
+                over_all: body.over_all,
+                end: body.end,
+                continuous: body.continuous,
+            }),
+            ..action
+        }
+    }
+}
+
+/// What is left of the durations that are possible, as duration constraints.
+fn bounds(possible: &Interval, elapsed: &Rational) -> Vec<DurationConstraint> {
+    let bound = |end: &End, closed, open| {
+        let comparison = match end {
+            End::Infinite => return None,
+            End::Closed(_) => closed,
+            End::Open(_) => open,
+        };
+        Some(DurationConstraint {
+            comparison,
+            bound: Expression::Constant((end.value()? - elapsed).max(Rational::ZERO)),
+            at_end: false,
+        })
+    };
+    let lower = bound(&possible.lower, Comparison::AtLeast, Comparison::Greater);
+    let upper = bound(&possible.upper, Comparison::AtMost, Comparison::Less);
+    lower.into_iter().chain(upper).collect()
+}

@@ -1,0 +1,92 @@
+//! Proportions and means of many runs.
+
+/// So many of so many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Proportion {
+    /// How many succeeded.
+    pub successes: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+/// The quantile of the normal distribution that leaves 2.5 % on each side.
+const NORMAL_975: f64 = 1.959_963_984_540_054;
+
+impl Proportion {
+    /// The share, between 0 and 1; `None` of nothing.
+    pub fn share(self) -> Option<f64> {
+        (self.count > 0).then(|| float(self.successes) / float(self.count))
+    }
+
+    /// Wilson's 95 % interval for the probability behind it (Wilson 1927). Unlike the textbook
+    /// interval it makes sense for 0 of n and n of n.
+    pub fn wilson(self) -> Option<(f64, f64)> {
+        let share = self.share()?;
+        let (n, z) = (float(self.count), NORMAL_975);
+        let middle = share + z * z / (2.0 * n);
+        let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
+        let scale = 1.0 + z * z / n;
+        let clamp = |value: f64| value.clamp(0.0, 1.0);
+        Some((clamp((middle - half) / scale), clamp((middle + half) / scale)))
+    }
+
+    /// One more.
+    pub fn add(&mut self, is_success: bool) {
+        self.count += 1;
+        self.successes += u64::from(is_success);
+    }
+
+    /// All of both.
+    pub fn merge(&mut self, other: Self) {
+        self.successes += other.successes;
+        self.count += other.count;
+    }
+}
+
+/// A mean of whole numbers, kept exactly, so that parts add up to the whole in any order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mean {
+    /// The sum.
+    pub sum: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl Mean {
+    /// One more.
+    pub fn add(&mut self, value: u64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    /// The mean; `None` of nothing.
+    pub fn value(self) -> Option<f64> {
+        (self.count > 0).then(|| float(self.sum) / float(self.count))
+    }
+
+    /// All of both.
+    pub fn merge(&mut self, other: Self) {
+        self.sum += other.sum;
+        self.count += other.count;
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "counts of runs are far below 2^52")]
+fn float(count: u64) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Proportion;
+
+    #[test]
+    fn wilsons_interval_is_that_of_the_books() {
+        // Newcombe (1998), table I: 81 of 263, and 0 of 20, without continuity correction.
+        let (lower, upper) = Proportion { successes: 81, count: 263 }.wilson().unwrap();
+        assert!((lower - 0.2553).abs() < 5e-5 && (upper - 0.3662).abs() < 5e-5);
+        let (lower, upper) = Proportion { successes: 0, count: 20 }.wilson().unwrap();
+        assert!(lower.abs() < 1e-12 && (upper - 0.1611).abs() < 5e-5);
+        assert_eq!(Proportion::default().wilson(), None);
+    }
+}

@@ -1,0 +1,206 @@
+//! Random numbers with a key, and the distributions they follow.
+
+use elbowroom_num::Rational;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution as _, LogNormal, Normal, Triangular};
+
+/// What a random number is for.
+///
+/// Part of its key; the numbers must never change, or else old seeds mean new worlds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Purpose {
+    /// How long an action takes.
+    Duration = 1,
+    /// How long after the command an action starts.
+    Delay = 2,
+    /// Whether an action fails.
+    Failure = 3,
+    /// When something happens by itself.
+    Exogenous = 4,
+    /// What happens to a report.
+    Report = 5,
+    /// By how much an action changes a fluent; the fluent is part of the instance.
+    Amount = 6,
+}
+
+/// A source of random numbers that depends on these four and on nothing else.
+///
+/// `instance` is the name of an action, fact or fluent, and `occurrence` counts from 0.
+pub fn keyed(seed: u64, instance: &str, occurrence: u64, purpose: Purpose) -> ChaCha8Rng {
+    let mut key = [0; 32];
+    let parts = [seed, stable_hash(instance), occurrence, purpose as u64];
+    for (bytes, part) in key.chunks_exact_mut(8).zip(parts) {
+        bytes.copy_from_slice(&part.to_le_bytes());
+    }
+    ChaCha8Rng::from_seed(key)
+}
+
+/// FNV-1a, 64 bits: the same on every machine and in every version, which a hasher of the
+/// standard library does not promise.
+fn stable_hash(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte.to_ascii_lowercase())).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// How a quantity is distributed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Distribution {
+    /// Always the same.
+    Constant(f64),
+    /// Bell-shaped.
+    Normal {
+        /// Before it is cut.
+        mean: f64,
+        /// Standard deviation, before it is cut.
+        deviation: f64,
+    },
+    /// The logarithm is normal. Mean and deviation are those of the quantity itself.
+    LogNormal {
+        /// The mean.
+        mean: f64,
+        /// The standard deviation.
+        deviation: f64,
+    },
+    /// All values alike.
+    Uniform {
+        /// From here.
+        from: f64,
+        /// To here.
+        to: f64,
+    },
+    /// Rises to the mode and falls after it.
+    Triangular {
+        /// From here.
+        from: f64,
+        /// The likeliest value.
+        mode: f64,
+        /// To here.
+        to: f64,
+    },
+    /// One of these, all alike: values that were measured.
+    Empirical(Vec<f64>),
+}
+
+impl Distribution {
+    /// What is wrong with its numbers, if something is.
+    pub fn problem(&self) -> Option<String> {
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        let problem = match self {
+            Self::Constant(value) if !finite(&[*value]) => "the value must be finite",
+            Self::Normal { mean, deviation } if !finite(&[*mean, *deviation]) => {
+                "mean and deviation must be finite"
+            }
+            Self::Normal { deviation, .. } if *deviation < 0.0 => {
+                "the deviation must not be negative"
+            }
+            Self::LogNormal { mean, deviation }
+                if !finite(&[*mean, *deviation]) || *mean <= 0.0 || *deviation < 0.0 =>
+            {
+                "the mean must be greater than 0 and the deviation not negative"
+            }
+            Self::Uniform { from, to } if !finite(&[*from, *to]) || from > to => {
+                "`from` must not be greater than `to`"
+            }
+            Self::Triangular { from, mode, to }
+                if !finite(&[*from, *mode, *to]) || from > mode || mode > to =>
+            {
+                "it must be that from <= mode <= to"
+            }
+            Self::Empirical(values) if values.is_empty() || !finite(values) => {
+                "the list must have at least one value, and finite ones only"
+            }
+            _ => return None,
+        };
+        Some(problem.to_owned())
+    }
+
+    /// A value. The numbers of the distribution make sense ([`Distribution::problem`]).
+    pub fn draw(&self, rng: &mut impl Rng) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Normal { mean, deviation } => {
+                Normal::new(*mean, *deviation).map_or(*mean, |normal| normal.sample(rng))
+            }
+            Self::LogNormal { mean, deviation } => {
+                let variance = (deviation / mean).powi(2).ln_1p();
+                let location = mean.ln() - variance / 2.0;
+                LogNormal::new(location, variance.sqrt()).map_or(*mean, |it| it.sample(rng))
+            }
+            Self::Uniform { from, to } => from + (to - from) * rng.random::<f64>(),
+            Self::Triangular { from, mode, to } => {
+                Triangular::new(*from, *to, *mode).map_or(*mode, |it| it.sample(rng))
+            }
+            Self::Empirical(values) => values[rng.random_range(0..values.len())],
+        }
+    }
+}
+
+/// The nearest multiple of `resolution`.
+pub fn rounded(value: f64, resolution: &Rational) -> Rational {
+    let steps = (value / resolution.to_f64()).round();
+    // Beyond that, 64 bits no longer count single steps, and nobody means such a number.
+    let bounded = steps.clamp(-9e15, 9e15);
+    #[allow(clippy::cast_possible_truncation, reason = "just bounded, and whole")]
+    let steps = bounded as i64;
+    Rational::from(steps) * resolution
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Distribution, Purpose, keyed, rounded};
+    use elbowroom_num::Rational;
+    use rand::Rng;
+
+    #[test]
+    fn each_part_of_the_key_matters_and_nothing_else() {
+        let number = |seed, name: &str, occurrence, purpose| {
+            keyed(seed, name, occurrence, purpose).random::<u64>()
+        };
+        let first = number(1, "(pick a)", 0, Purpose::Duration);
+        assert_eq!(first, number(1, "(PICK A)", 0, Purpose::Duration));
+        assert_ne!(first, number(2, "(pick a)", 0, Purpose::Duration));
+        assert_ne!(first, number(1, "(pick b)", 0, Purpose::Duration));
+        assert_ne!(first, number(1, "(pick a)", 1, Purpose::Duration));
+        assert_ne!(first, number(1, "(pick a)", 0, Purpose::Delay));
+    }
+
+    #[test]
+    fn old_seeds_mean_the_worlds_they_always_meant() {
+        let number = keyed(7, "(drive rover depot shelf)", 0, Purpose::Duration).random::<u32>();
+        insta::assert_snapshot!(number);
+    }
+
+    #[test]
+    fn means_and_spreads_are_as_stated() {
+        let cases = [
+            (Distribution::Normal { mean: 170.0, deviation: 70.0 }, 170.0, 70.0),
+            (Distribution::LogNormal { mean: 20.0, deviation: 5.0 }, 20.0, 5.0),
+            (Distribution::Uniform { from: 2.0, to: 8.0 }, 5.0, 3.0_f64.sqrt()),
+            (Distribution::Triangular { from: 0.0, mode: 3.0, to: 6.0 }, 3.0, 1.5_f64.sqrt()),
+            (Distribution::Empirical(vec![1.0, 3.0]), 2.0, 1.0),
+            (Distribution::Constant(4.0), 4.0, 0.0),
+        ];
+        for (distribution, mean, deviation) in cases {
+            assert_eq!(distribution.problem(), None);
+            let mut rng = keyed(3, "test", 0, Purpose::Duration);
+            let values: Vec<f64> = (0..40_000).map(|_| distribution.draw(&mut rng)).collect();
+            let count = 40_000.0;
+            let found = values.iter().sum::<f64>() / count;
+            let spread = values.iter().map(|v| (v - found).powi(2)).sum::<f64>() / count;
+            assert!((found - mean).abs() < 0.03 * mean.max(1.0), "{distribution:?}: {found}");
+            let difference = (spread.sqrt() - deviation).abs();
+            assert!(difference < 0.03 * deviation.max(1.0), "{distribution:?}: {spread}");
+        }
+    }
+
+    #[test]
+    fn values_are_multiples_of_the_resolution() {
+        let thousandth = Rational::new(1, 1000);
+        assert_eq!(rounded(2.000_49, &thousandth), Rational::from(2));
+        assert_eq!(rounded(-1.5, &thousandth), Rational::new(-3, 2));
+        assert!(rounded(1e300, &thousandth).is_positive());
+    }
+}

@@ -1,0 +1,219 @@
+//! What a world file says: `docs/formats/world.md`.
+
+mod text;
+
+use elbowroom_model::Problem;
+use elbowroom_num::Rational;
+use rand::Rng;
+
+use crate::draw::{Distribution, rounded};
+use crate::pattern::ActionPattern;
+
+/// A world, before it has a seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorldModel {
+    /// Times and amounts are multiples of this.
+    pub resolution: Rational,
+    /// How long actions take. The last rule that matches counts; without any, as long as planned.
+    pub durations: Vec<(ActionPattern, Rule)>,
+    /// How long after its command an action starts; without a rule, at once.
+    pub delays: Vec<(ActionPattern, Rule)>,
+    /// By how much actions change fluents; without a rule, as the domain says.
+    pub amounts: Vec<Amount>,
+    /// How often actions fail; without a rule, never.
+    pub failures: Vec<Failing>,
+    /// What happens by itself, apart from the problem's timed initials.
+    pub exogenous: Vec<Exogenous>,
+    /// How well the world reports.
+    pub reports: Reports,
+}
+
+/// A distribution, cut and scaled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rule {
+    /// How the quantity is distributed.
+    pub distribution: Distribution,
+    /// What is less becomes this.
+    pub minimum: Option<f64>,
+    /// What is more becomes this.
+    pub maximum: Option<f64>,
+    /// Whether it is a multiple of the planned value, rather than the value itself.
+    pub is_relative: bool,
+}
+
+/// By how much an action changes a fluent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Amount {
+    /// Which actions.
+    pub action: ActionPattern,
+    /// Which fluents.
+    pub fluent: ActionPattern,
+    /// By how much.
+    pub rule: Rule,
+}
+
+/// How often actions fail.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failing {
+    /// Which.
+    pub action: ActionPattern,
+    /// How often.
+    pub probability: f64,
+    /// When.
+    pub when: Failure,
+}
+
+/// When an action fails, if it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// It does not start at all.
+    AtStart,
+    /// At a moment of its duration, all alike.
+    Midway,
+    /// When it would have ended.
+    AtEnd,
+}
+
+/// Something that happens by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exogenous {
+    /// When.
+    pub time: Rule,
+    /// How likely it happens at all.
+    pub probability: f64,
+    /// What happens.
+    pub change: ExogenousChange,
+    /// Whether the world says so. If not, it shows only where somebody looks, or stumbles over it.
+    pub is_reported: bool,
+}
+
+/// What happens by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExogenousChange {
+    /// The fact, `(predicate object …)`, becomes true or false.
+    Fact(String, bool),
+    /// The fluent, `(function object …)`, gets a value.
+    Value(String, Rational),
+}
+
+/// How well the world reports. Each probability is that of a single report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reports {
+    /// It never comes.
+    pub lost: f64,
+    /// It comes twice.
+    pub duplicated: f64,
+    /// It comes late.
+    pub late: f64,
+    /// By how much.
+    pub lateness: Distribution,
+    /// Before or after it comes one that says the opposite.
+    pub contradicted: f64,
+}
+
+/// A world file that cannot be understood.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {message}")]
+pub struct WorldFileError {
+    /// The line, from 1 on.
+    pub line: usize,
+    /// What is wrong, and what to write instead.
+    pub message: String,
+}
+
+impl WorldModel {
+    /// The world in which everything happens as planned.
+    pub fn as_planned() -> Self {
+        Self {
+            resolution: Rational::new(1, 1000),
+            durations: Vec::new(),
+            delays: Vec::new(),
+            amounts: Vec::new(),
+            failures: Vec::new(),
+            exogenous: Vec::new(),
+            reports: Reports::default(),
+        }
+    }
+
+    /// Reads a world file for a problem.
+    ///
+    /// # Errors
+    /// The first mistake, with its line.
+    pub fn read(text: &str, problem: &Problem) -> Result<Self, WorldFileError> {
+        text::read(text, problem)
+    }
+
+    /// How long an action takes that is planned to take `planned`.
+    pub fn duration(&self, action: &str, planned: &Rational, rng: &mut impl Rng) -> Rational {
+        let duration = match last(&self.durations, action) {
+            Some(rule) => rule.draw(planned, &self.resolution, rng),
+            None => planned.clone(),
+        };
+        // An action that takes time takes some.
+        duration.max(self.resolution.clone())
+    }
+
+    /// How long after its command an action starts.
+    pub fn delay(&self, action: &str, rng: &mut impl Rng) -> Rational {
+        let rule = last(&self.delays, action);
+        let delay = rule.map(|rule| rule.draw(&Rational::ZERO, &self.resolution, rng));
+        delay.unwrap_or_default().max(Rational::ZERO)
+    }
+
+    /// How the amount by which an action changes a fluent is distributed.
+    pub fn amount(&self, action: &str, fluent: &str) -> Option<&Rule> {
+        let matching = |amount: &&Amount| amount.action.matches(action) && amount.fluent.matches(fluent);
+        self.amounts.iter().rev().find(matching).map(|amount| &amount.rule)
+    }
+
+    /// How often an action fails.
+    pub fn failing(&self, action: &str) -> Option<&Failing> {
+        let mut rules = self.failures.iter().rev();
+        rules.find(|rule| rule.action.matches(action))
+    }
+}
+
+impl Rule {
+    /// A value, when the planned one is `planned`.
+    pub fn draw(&self, planned: &Rational, resolution: &Rational, rng: &mut impl Rng) -> Rational {
+        let mut value = self.distribution.draw(rng);
+        if let Some(minimum) = self.minimum {
+            value = value.max(minimum);
+        }
+        if let Some(maximum) = self.maximum {
+            value = value.min(maximum);
+        }
+        if self.is_relative {
+            value *= planned.to_f64();
+        }
+        rounded(value, resolution)
+    }
+}
+
+impl Default for Reports {
+    /// Every report comes at once, once, and is true.
+    fn default() -> Self {
+        Self {
+            lost: 0.0,
+            duplicated: 0.0,
+            late: 0.0,
+            lateness: Distribution::Constant(0.0),
+            contradicted: 0.0,
+        }
+    }
+}
+
+impl Reports {
+    /// Whether every report comes at once, once, and is true.
+    pub fn is_perfect(&self) -> bool {
+        let all = [self.lost, self.duplicated, self.late, self.contradicted];
+        all.iter().all(|probability| *probability <= 0.0)
+    }
+}
+
+fn last<'a>(rules: &'a [(ActionPattern, Rule)], action: &str) -> Option<&'a Rule> {
+    let mut rules = rules.iter().rev();
+    rules
+        .find(|(pattern, _)| pattern.matches(action))
+        .map(|(_, rule)| rule)
+}

@@ -1,0 +1,107 @@
+//! Which actions, or which fluents, a rule is about.
+
+use elbowroom_model::Problem;
+
+/// `*`, a name, or `(name object _ …)`, where `_` stands for any object.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ActionPattern {
+    /// `None`: any.
+    name: Option<String>,
+    /// `None`: any arguments at all.
+    arguments: Option<Vec<Option<String>>>,
+}
+
+/// What a pattern may name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Names {
+    Actions,
+    Functions,
+    Predicates,
+}
+
+impl ActionPattern {
+    /// Reads a pattern, and checks that what it names is there.
+    pub(crate) fn read(text: &str, names: Names, problem: &Problem) -> Result<Self, String> {
+        let text = text.trim();
+        if text == "*" {
+            return Ok(Self {
+                name: None,
+                arguments: None,
+            });
+        }
+        let (inner, has_arguments) = match text.strip_prefix('(').and_then(|t| t.strip_suffix(')')) {
+            Some(inner) => (inner, true),
+            None => (text, false),
+        };
+        let mut words = inner.split_whitespace().map(str::to_ascii_lowercase);
+        let name = words
+            .next()
+            .ok_or_else(|| format!("`{text}` names nothing; write a name, `(name _ object)` or `*`"))?;
+        let arguments: Vec<Option<String>> = words.map(|word| (word != "_").then_some(word)).collect();
+        if !has_arguments && !arguments.is_empty() {
+            return Err(format!("write `({text})` with parentheses"));
+        }
+        let expected = names.arity(&name, problem)?;
+        if has_arguments && arguments.len() != expected {
+            return Err(format!(
+                "`{name}` takes {expected} arguments, not {}",
+                arguments.len()
+            ));
+        }
+        if let Some(unknown) = arguments
+            .iter()
+            .flatten()
+            .find(|object| problem.object(object).is_none())
+        {
+            return Err(format!("there is no object `{unknown}`"));
+        }
+        Ok(Self {
+            name: Some(name),
+            arguments: has_arguments.then_some(arguments),
+        })
+    }
+
+    /// Whether a ground name, `(name object …)`, is meant.
+    pub fn matches(&self, ground: &str) -> bool {
+        let Some(name) = &self.name else {
+            return true;
+        };
+        let mut words = ground.trim_matches(['(', ')']).split_whitespace();
+        if !words.next().is_some_and(|word| word.eq_ignore_ascii_case(name)) {
+            return false;
+        }
+        self.arguments.as_ref().is_none_or(|arguments| {
+            arguments.iter().zip(words).all(|(asked, word)| {
+                asked
+                    .as_ref()
+                    .is_none_or(|asked| asked.eq_ignore_ascii_case(word))
+            })
+        })
+    }
+}
+
+impl Names {
+    fn arity(self, name: &str, problem: &Problem) -> Result<usize, String> {
+        let same = |other: &str| other.eq_ignore_ascii_case(name);
+        let (what, found, all): (_, _, Vec<&str>) = match self {
+            Self::Actions => (
+                "action",
+                problem.schemas.iter().find(|s| same(&s.name)).map(|s| s.parameters.len()),
+                problem.schemas.iter().map(|s| s.name.as_str()).collect(),
+            ),
+            Self::Functions => (
+                "function",
+                problem.functions.iter().find(|f| same(&f.name)).map(|f| f.parameters.len()),
+                problem.functions.iter().map(|f| f.name.as_str()).collect(),
+            ),
+            Self::Predicates => (
+                "predicate",
+                problem.predicates.iter().find(|p| same(&p.name)).map(|p| p.parameters.len()),
+                problem.predicates.iter().map(|p| p.name.as_str()).collect(),
+            ),
+        };
+        found.ok_or_else(|| {
+            format!("the domain has no {what} `{name}`; it has {}", all.join(", "))
+        })
+    }
+}

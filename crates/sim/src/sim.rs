@@ -1,0 +1,390 @@
+//! One trajectory of a world.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_execution::{
+    Command, Ending, Event, Measured, Observation, Passage, Progression, Ticket, World, WorldError,
+};
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, Effect, FactId, FluentId, SnapAction};
+use elbowroom_num::Rational;
+use rand::Rng;
+
+use crate::draw::{Purpose, keyed};
+use crate::model::{ExogenousChange, Failure, WorldModel};
+
+/// A simulated world: true state, and what is going to happen.
+///
+/// It is PDDL that happens. An action whose start condition does not hold does not start; one
+/// whose over-all or end condition does not hold when something happens, fails then. (An over-all
+/// condition on a number that moves is looked at whenever something happens, and at the end.)
+#[derive(Debug)]
+pub struct SimWorld<'a> {
+    model: &'a WorldModel,
+    seed: u64,
+    truth: Progression,
+    now: Rational,
+    /// What is going to happen, by time, and then in the order in which it was decided.
+    agenda: BTreeMap<(Rational, u64), Coming>,
+    /// How many things were put on the agenda.
+    decided: u64,
+    /// What has happened and has not been told.
+    untold: Vec<Observation>,
+    /// How often each action was started.
+    occurrences: BTreeMap<String, u64>,
+    /// What was started, until it has ended.
+    actions: BTreeMap<Ticket, Commanded>,
+}
+
+#[derive(Clone, Debug)]
+struct Commanded {
+    action: Arc<Action>,
+    planned: Option<Rational>,
+    occurrence: u64,
+    has_started: bool,
+}
+
+#[derive(Clone, Debug)]
+enum Coming {
+    Start(Ticket),
+    End(Ticket),
+    Fail(Ticket),
+    Exogenous(usize),
+}
+
+impl<'a> SimWorld<'a> {
+    /// The world of that seed, at time 0.
+    pub fn new(task: Arc<Task>, model: &'a WorldModel, seed: u64) -> Self {
+        let mut world = Self {
+            truth: Progression::new(task),
+            model,
+            seed,
+            now: Rational::ZERO,
+            agenda: BTreeMap::new(),
+            decided: 0,
+            untold: Vec::new(),
+            occurrences: BTreeMap::new(),
+            actions: BTreeMap::new(),
+        };
+        for (index, exogenous) in model.exogenous.iter().enumerate() {
+            let name = match &exogenous.change {
+                ExogenousChange::Fact(name, _) | ExogenousChange::Value(name, _) => name,
+            };
+            let mut rng = keyed(seed, name, index as u64, Purpose::Exogenous);
+            let happens = rng.random::<f64>() < exogenous.probability;
+            let time = exogenous.time.draw(&Rational::ZERO, &model.resolution, &mut rng);
+            if happens {
+                world.put(time.max(Rational::ZERO), Coming::Exogenous(index));
+            }
+        }
+        world
+    }
+
+    /// What is true.
+    pub fn truth(&self) -> &Progression {
+        &self.truth
+    }
+
+    fn put(&mut self, time: Rational, coming: Coming) {
+        self.agenda.insert((time, self.decided), coming);
+        self.decided += 1;
+    }
+
+    fn tell(&mut self, event: Event) {
+        self.untold.push(Observation {
+            time: self.now.clone(),
+            event,
+        });
+    }
+
+    /// Something happens at `time`; conditions over intervals are looked at before and after.
+    fn happen(&mut self, time: Rational, coming: Option<Coming>) {
+        // A fluent without a value that should move stays without.
+        let _ = self.truth.advance(&time);
+        self.now = time;
+        self.fail_broken();
+        match coming {
+            None => {}
+            Some(Coming::Start(ticket)) => self.start(ticket),
+            Some(Coming::End(ticket)) => self.end(ticket),
+            Some(Coming::Fail(ticket)) => self.fail(ticket, "it broke down"),
+            Some(Coming::Exogenous(index)) => self.change(index),
+        }
+        self.fail_broken();
+    }
+
+    fn fail_broken(&mut self) {
+        while let Some((ticket, underway)) = self.truth.broken() {
+            let body = underway.action.durative();
+            let why = body.map_or_else(String::new, |body| {
+                let unmet = self.truth.unmet(&body.over_all, Some(&underway.planned));
+                let words = unmet
+                    .iter()
+                    .map(|condition| self.truth.task().describe_condition(condition));
+                format!("{} no longer held", words.collect::<Vec<_>>().join(" and "))
+            });
+            self.fail(ticket, &why);
+        }
+    }
+
+    fn start(&mut self, ticket: Ticket) {
+        let Some(commanded) = self.actions.get(&ticket).cloned() else {
+            return;
+        };
+        let action = &commanded.action;
+        let planned = commanded.planned.clone().unwrap_or_default();
+        let snap = match &action.body {
+            Body::Instantaneous(snap) => snap,
+            Body::Durative(body) => &body.start,
+        };
+        let mut failure = keyed(self.seed, &action.name, commanded.occurrence, Purpose::Failure);
+        let fails = self
+            .model
+            .failing(&action.name)
+            .filter(|failing| failure.random::<f64>() < failing.probability)
+            .map(|failing| failing.when);
+        let unmet = self.truth.unmet(&snap.condition, Some(&planned));
+        if !unmet.is_empty() {
+            let words = unmet
+                .iter()
+                .map(|condition| self.truth.task().describe_condition(condition));
+            let why = format!("it needs {}", words.collect::<Vec<_>>().join(" and "));
+            return self.fail(ticket, &why);
+        }
+        let is_instantaneous = matches!(action.body, Body::Instantaneous(_));
+        if fails == Some(Failure::AtStart) || (is_instantaneous && fails.is_some()) {
+            return self.fail(ticket, "it did not start");
+        }
+        let measured = self.measured(&commanded, snap, 0);
+        let _ = self.truth.start(ticket, action, &planned, &measured);
+        self.tell(Event::Started { ticket, measured });
+        if is_instantaneous {
+            self.actions.remove(&ticket);
+            return;
+        }
+        if let Some(commanded) = self.actions.get_mut(&ticket) {
+            commanded.has_started = true;
+        }
+        let mut rng = keyed(self.seed, &action.name, commanded.occurrence, Purpose::Duration);
+        let duration = self.model.duration(&action.name, &planned, &mut rng);
+        let end = &self.now + &duration;
+        match fails {
+            Some(Failure::AtEnd) => self.put(end, Coming::Fail(ticket)),
+            Some(Failure::Midway) => {
+                let share = crate::draw::rounded(failure.random(), &self.model.resolution);
+                let time = &self.now + duration * share;
+                self.put(time, Coming::Fail(ticket));
+            }
+            _ => self.put(end, Coming::End(ticket)),
+        }
+    }
+
+    fn end(&mut self, ticket: Ticket) {
+        let Some(commanded) = self.actions.get(&ticket).cloned() else {
+            return;
+        };
+        let Some(body) = commanded.action.durative() else {
+            return;
+        };
+        let started = self.truth.running().get(&ticket).map(|underway| underway.start.clone());
+        let duration = &self.now - started.unwrap_or_default();
+        let unmet = self.truth.unmet(&body.end.condition, Some(&duration));
+        if !unmet.is_empty() {
+            let words = unmet
+                .iter()
+                .map(|condition| self.truth.task().describe_condition(condition));
+            let why = format!("its end needs {}", words.collect::<Vec<_>>().join(" and "));
+            return self.fail(ticket, &why);
+        }
+        let measured = self.measured(&commanded, &body.end, 1);
+        let _ = self.truth.end(ticket, &measured);
+        self.actions.remove(&ticket);
+        self.tell(Event::Ended {
+            ticket,
+            ending: Ending::Succeeded,
+            measured,
+        });
+    }
+
+    fn fail(&mut self, ticket: Ticket, why: &str) {
+        self.truth.stop(ticket);
+        if self.actions.remove(&ticket).is_some() {
+            self.tell(Event::Ended {
+                ticket,
+                ending: Ending::Failed {
+                    why: why.to_owned(),
+                },
+                measured: Vec::new(),
+            });
+        }
+    }
+
+    /// The amounts that the world file has for a happening; the others are the domain's.
+    fn measured(&self, commanded: &Commanded, snap: &SnapAction, place: u64) -> Vec<Measured> {
+        let action = &commanded.action.name;
+        let update = |effect: &Effect| match &effect.change {
+            Change::Update { fluent, value, .. } => Some((*fluent, value.clone())),
+            _ => None,
+        };
+        let updates = snap.effects.iter().filter_map(update);
+        let measured = updates.filter_map(|(fluent, value)| {
+            let name = self.truth.task().fluent_name(fluent);
+            let rule = self.model.amount(action, &name)?;
+            let nominal = value.evaluate(&mut |leaf| match leaf {
+                elbowroom_model::ground::Expression::Fluent(fluent) => {
+                    self.truth.value(*fluent).cloned()
+                }
+                elbowroom_model::ground::Expression::Duration => commanded.planned.clone(),
+                _ => None,
+            });
+            let instance = format!("{action} {name} {place}");
+            let mut rng = keyed(self.seed, &instance, commanded.occurrence, Purpose::Amount);
+            let amount =
+                rule.draw(&nominal.unwrap_or_default(), &self.model.resolution, &mut rng);
+            Some(Measured { fluent, amount })
+        });
+        measured.collect()
+    }
+
+    fn change(&mut self, index: usize) {
+        let exogenous = &self.model.exogenous[index];
+        let task = Arc::clone(self.truth.task());
+        let event = match &exogenous.change {
+            ExogenousChange::Fact(name, truth) => {
+                // What nothing in the problem mentions cannot matter.
+                let Some(fact) = fact_named(&task, name) else {
+                    return;
+                };
+                self.truth.see_fact(fact, *truth);
+                Event::Fact {
+                    fact,
+                    truth: *truth,
+                }
+            }
+            ExogenousChange::Value(name, value) => {
+                let Some(fluent) = fluent_named(&task, name) else {
+                    return;
+                };
+                self.truth.see_value(fluent, value);
+                Event::Value {
+                    fluent,
+                    value: value.clone(),
+                }
+            }
+        };
+        if exogenous.is_reported {
+            self.tell(event);
+        }
+    }
+}
+
+impl World for SimWorld<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.now = now.clone().max(self.now.clone());
+        let _ = self.truth.advance(&self.now.clone());
+        match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => {
+                let count = self.occurrences.entry(action.name.clone()).or_default();
+                let occurrence = *count;
+                *count += 1;
+                self.actions.insert(
+                    *ticket,
+                    Commanded {
+                        action: Arc::clone(action),
+                        planned: duration.clone(),
+                        occurrence,
+                        has_started: false,
+                    },
+                );
+                let mut rng = keyed(self.seed, &action.name, occurrence, Purpose::Delay);
+                let delay = self.model.delay(&action.name, &mut rng);
+                if delay.is_positive() {
+                    self.put(&self.now + delay, Coming::Start(*ticket));
+                } else {
+                    self.happen(self.now.clone(), Some(Coming::Start(*ticket)));
+                }
+            }
+            Command::Cancel { ticket } => {
+                if self.actions.remove(ticket).is_some() {
+                    self.truth.stop(*ticket);
+                    self.tell(Event::Ended {
+                        ticket: *ticket,
+                        ending: Ending::Cancelled,
+                        measured: Vec::new(),
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        while self.untold.is_empty() {
+            let first = self.agenda.keys().next().map(|(time, _)| time.clone());
+            // Timed initials can break what is under way.
+            let timed = self.truth.next_timed().cloned();
+            let is_timed = timed.as_ref().is_some_and(|timed| {
+                first.as_ref().is_none_or(|first| timed < first)
+            });
+            let next = if is_timed { timed } else { first };
+            let Some(time) = next.filter(|time| time <= until) else {
+                let _ = self.truth.advance(until);
+                self.now = until.clone().max(self.now.clone());
+                break;
+            };
+            let coming = if is_timed {
+                None
+            } else {
+                self.agenda.pop_first().map(|(_, coming)| coming)
+            };
+            self.happen(time.max(self.now.clone()), coming);
+        }
+        Ok(Passage {
+            now: self.now.clone(),
+            observations: std::mem::take(&mut self.untold),
+        })
+    }
+
+    fn know(&mut self, task: &Arc<Task>) {
+        self.truth.know(Arc::clone(task));
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        let facts = facts.iter().map(|&fact| Event::Fact {
+            fact,
+            truth: self.truth.fact(fact),
+        });
+        let values = fluents.iter().filter_map(|&fluent| {
+            Some(Event::Value {
+                fluent,
+                value: self.truth.value(fluent)?.clone(),
+            })
+        });
+        let events = facts.chain(values).map(|event| Observation {
+            time: self.now.clone(),
+            event,
+        });
+        Ok(events.collect())
+    }
+}
+
+fn fact_named(task: &Task, name: &str) -> Option<FactId> {
+    let count = u32::try_from(task.fact_count()).unwrap_or(u32::MAX);
+    let mut facts = (0..count).map(FactId);
+    facts.find(|fact| task.fact_name(*fact).eq_ignore_ascii_case(name))
+}
+
+fn fluent_named(task: &Task, name: &str) -> Option<FluentId> {
+    let count = u32::try_from(task.fluent_count()).unwrap_or(u32::MAX);
+    let mut fluents = (0..count).map(FluentId);
+    fluents.find(|fluent| task.fluent_name(*fluent).eq_ignore_ascii_case(name))
+}

@@ -1,0 +1,158 @@
+//! A world whose reports cannot be relied on.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_execution::{
+    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
+};
+use elbowroom_model::Task;
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_num::Rational;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::draw::{Purpose, keyed, rounded};
+use crate::model::Reports;
+
+/// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
+/// purpose ([`World::look`]) is seen as it is.
+#[derive(Debug)]
+pub struct Unreliable<W> {
+    inner: W,
+    reports: Reports,
+    rng: ChaCha8Rng,
+    resolution: Rational,
+    now: Rational,
+    /// Reports on their way, by the time of their arrival.
+    coming: BTreeMap<(Rational, u64), Observation>,
+    count: u64,
+}
+
+impl<W: World> Unreliable<W> {
+    /// The world `inner`, seen through `reports`.
+    pub fn new(inner: W, reports: Reports, seed: u64, resolution: Rational) -> Self {
+        Self {
+            inner,
+            reports,
+            rng: keyed(seed, "", 0, Purpose::Report),
+            resolution,
+            now: Rational::ZERO,
+            coming: BTreeMap::new(),
+            count: 0,
+        }
+    }
+
+    /// The world as it is.
+    pub fn inner(&self) -> &W {
+        &self.inner
+    }
+
+    fn chance(&mut self, probability: f64) -> bool {
+        self.rng.random::<f64>() < probability
+    }
+
+    /// Sends a report on its way.
+    fn send(&mut self, observation: Observation) {
+        let mut arrival = self.now.clone();
+        if self.chance(self.reports.late) {
+            let lateness = self.reports.lateness.draw(&mut self.rng);
+            arrival += &rounded(lateness, &self.resolution).max(Rational::ZERO);
+        }
+        self.coming.insert((arrival, self.count), observation);
+        self.count += 1;
+    }
+
+    fn report(&mut self, observation: &Observation) {
+        if self.chance(self.reports.contradicted) {
+            self.send(Observation {
+                time: observation.time.clone(),
+                event: opposite(&observation.event),
+            });
+        }
+        if self.chance(self.reports.lost) {
+            return;
+        }
+        let copies = if self.chance(self.reports.duplicated) { 2 } else { 1 };
+        for _ in 0..copies {
+            self.send(observation.clone());
+        }
+    }
+}
+
+impl<W: World> World for Unreliable<W> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.inner.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let mut told = Vec::new();
+        while told.is_empty() {
+            let arrival = self.coming.keys().next().map(|(time, _)| time.clone());
+            let target = arrival.into_iter().chain([until.clone()]).min();
+            let target = target.unwrap_or_default().max(self.now.clone());
+            let passage = self.inner.wait(&target)?;
+            self.now = passage.now.max(self.now.clone());
+            for observation in &passage.observations {
+                self.report(observation);
+            }
+            while let Some(entry) = self.coming.first_entry() {
+                if entry.key().0 > self.now {
+                    break;
+                }
+                told.push(entry.remove());
+            }
+            if self.now >= *until && passage.observations.is_empty() {
+                break;
+            }
+        }
+        Ok(Passage {
+            now: self.now.clone(),
+            observations: told,
+        })
+    }
+
+    fn know(&mut self, task: &Arc<Task>) {
+        self.inner.know(task);
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.inner.look(facts, fluents)
+    }
+}
+
+/// A report that cannot be true together with this one.
+fn opposite(event: &Event) -> Event {
+    let failed = |ticket: Ticket| Event::Ended {
+        ticket,
+        ending: Ending::Failed {
+            why: "so it is said".to_owned(),
+        },
+        measured: Vec::new(),
+    };
+    match event {
+        Event::Started { ticket, .. } => failed(*ticket),
+        Event::Ended {
+            ticket,
+            ending: Ending::Succeeded,
+            ..
+        } => failed(*ticket),
+        Event::Ended { ticket, .. } => Event::Ended {
+            ticket: *ticket,
+            ending: Ending::Succeeded,
+            measured: Vec::new(),
+        },
+        Event::Fact { fact, truth } => Event::Fact {
+            fact: *fact,
+            truth: !truth,
+        },
+        Event::Value { fluent, value } => Event::Value {
+            fluent: *fluent,
+            value: -value - Rational::ONE,
+        },
+    }
+}

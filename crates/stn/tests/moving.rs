@@ -1,0 +1,103 @@
+//! Windows that move, against windows computed from scratch.
+
+use elbowroom_num::Rational;
+use elbowroom_stn::testing::consistent_networks;
+use elbowroom_stn::{
+    ConsistentNetwork, Constraint, ConstraintId, MovingWindows, NodeId, WindowEnd,
+};
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+/// What a test asks of one node.
+#[derive(Clone, Copy, Debug)]
+enum Limit {
+    Fix,
+    NotBefore,
+    NotAfter,
+}
+
+fn limits() -> impl Strategy<Value = Vec<(Limit, Index, i64)>> {
+    let limit = prop_oneof![Just(Limit::Fix), Just(Limit::NotBefore), Just(Limit::NotAfter)];
+    prop::collection::vec((limit, any::<Index>(), -25..25_i64), 1..20)
+}
+
+/// The plainly right way: the limit as a constraint, or two, and everything from scratch.
+fn plainly(
+    network: &ConsistentNetwork,
+    limit: Limit,
+    node: NodeId,
+    time: &Rational,
+) -> Option<ConsistentNetwork> {
+    let origin = NodeId(0);
+    let mut network = network.clone();
+    if matches!(limit, Limit::Fix | Limit::NotBefore) {
+        network
+            .add(Constraint::at_least(origin, node, time.clone()))
+            .ok()?;
+    }
+    if matches!(limit, Limit::Fix | Limit::NotAfter) {
+        network
+            .add(Constraint::at_most(origin, node, time.clone()))
+            .ok()?;
+    }
+    Some(network)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn moving_windows_are_those_of_the_tightened_network(
+        (network, _) in consistent_networks(),
+        limits in limits(),
+    ) {
+        let mut plain = ConsistentNetwork::try_from(network).expect("consistent by construction");
+        let mut moving = MovingWindows::new(plain.clone(), NodeId(0));
+        let count = plain.network().node_count();
+        for (limit, node, time) in limits {
+            let node = NodeId(u32::try_from(node.index(count)).expect("few nodes"));
+            let time = Rational::new(time, 2);
+            let answer = match limit {
+                Limit::Fix => moving.fix(node, &time),
+                Limit::NotBefore => moving.not_before(node, &time),
+                Limit::NotAfter => moving.not_after(node, &time),
+            };
+            let tightened = plainly(&plain, limit, node, &time);
+            prop_assert_eq!(answer.is_ok(), tightened.is_some(), "{:?}", answer);
+            if let Err(out) = &answer {
+                prop_assert!(out.by.is_positive());
+                prop_assert_eq!(out.node, node);
+            }
+            plain = tightened.unwrap_or(plain);
+            let windows = plain.windows(NodeId(0));
+            for (node, window) in windows.iter() {
+                prop_assert_eq!(moving.window(node), window, "{:?} after {:?}", node, limit);
+            }
+            every_end_has_its_grounds(&moving)?;
+        }
+    }
+}
+
+/// Along the constraints named, the bounds add up from the root's own end to the node's.
+fn every_end_has_its_grounds(moving: &MovingWindows) -> Result<(), TestCaseError> {
+    let bound = |id: &ConstraintId| moving.network().constraint(*id).bound.clone();
+    for node in moving.network().nodes() {
+        for end in [WindowEnd::Earliest, WindowEnd::Latest] {
+            let value = |node| match end {
+                WindowEnd::Earliest => moving.window(node).earliest.clone(),
+                WindowEnd::Latest => moving.window(node).latest.clone(),
+            };
+            let grounds = moving.grounds(node, end);
+            prop_assert_eq!(grounds.is_some(), value(node).is_some());
+            let Some(grounds) = grounds else { continue };
+            let sum: Rational = grounds.constraints.iter().map(bound).sum();
+            let sum = match end {
+                WindowEnd::Earliest => -sum,
+                WindowEnd::Latest => sum,
+            };
+            let root = value(grounds.root).expect("roots have a value");
+            prop_assert_eq!(Some(root + sum), value(node));
+        }
+    }
+    Ok(())
+}
