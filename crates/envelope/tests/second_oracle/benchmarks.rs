@@ -1,9 +1,10 @@
 //! The boxes that our search finds on the paper's instances, as Z3 sees them through the authors'
 //! encoding.
 //!
-//! Z3 has a time limit for each question. Plans with many time points take it minutes, so that only
-//! those of up to `ELBOWROOM_NODES` time points are asked about, and
-//! only the smallest also whether their boxes can grow.
+//! Z3 has a time limit for each question (`ELBOWROOM_Z3_MILLISECONDS`). The generators, whose
+//! numbers change continuously, take it up to half a minute, so that only those of up to
+//! `ELBOWROOM_NODES` time points are asked about, and only the smallest also whether their boxes can
+//! grow. `ELBOWROOM_INSTANCES` is how the names of the instances begin.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,7 +22,7 @@ use crate::setting;
 use crate::smt::contained;
 use crate::z3::Z3;
 
-/// The most time points of a plan that is asked about, if nothing else is said.
+/// The most time points of a generator plan that is asked about, if nothing else is said.
 const MOST_NODES: u64 = 12;
 
 #[test]
@@ -38,11 +39,17 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
     let most_nodes = setting("ELBOWROOM_NODES", MOST_NODES);
     let epsilon = Rational::new(1, 1000);
     let mut tally = Tally::default();
+    let wanted = std::env::var("ELBOWROOM_INSTANCES").unwrap_or_default();
     for instance in figure_3(&data).into_iter().chain(figure_4(&data)) {
+        if !instance.name.starts_with(&wanted) {
+            continue;
+        }
         let Some((task, plan)) = read(&instance) else {
             continue;
         };
-        if plan.plan.nodes.len() as u64 > most_nodes {
+        let nodes = plan.plan.nodes.len() as u64;
+        let is_generator = instance.name.starts_with("generator");
+        if is_generator && nodes > most_nodes {
             continue;
         }
         let mut oracle = Oracle::new(&task, &plan, &epsilon).expect("within reach");
@@ -67,7 +74,7 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
             "{}: {inside} of {boxes} boxes inside ({time:.1} s)",
             instance.name
         );
-        if plan.plan.nodes.len() as u64 > MOST_NODES {
+        if is_generator && nodes > MOST_NODES {
             continue;
         }
         for index in 0..plan.parameters.len() {
@@ -95,7 +102,11 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
         }
     }
     println!("{tally:?}");
-    assert!(tally.inside >= 10 && tally.outside >= 15, "{tally:?}");
+    let is_whole = wanted.is_empty();
+    assert!(
+        !is_whole || (tally.inside >= 10 && tally.outside >= 15),
+        "{tally:?}"
+    );
 }
 
 /// What Z3 says of our boxes.

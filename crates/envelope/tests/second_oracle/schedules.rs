@@ -1,6 +1,7 @@
 //! Values in a box for which there is no schedule, by branching.
 //!
-//! Each bound is first taken at its worst, whatever the others of its parameter say. If there is no
+//! Each bound is first taken at its worst, whatever the others of its parameter say, except that no
+//! path goes from a time point to another and straight back by the same parameter. If there is no
 //! cycle of negative weight even so, all values have a schedule. If there is one that no parameter
 //! is on in both directions, its bounds are at their worst all at once, for some values. Else one
 //! such parameter is set to one end, then to the other: the values with a schedule form a convex
@@ -45,7 +46,7 @@ pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope)
                 None => least(&envelope.intervals[*index], *sign),
             },
         };
-        let Some(cycle) = negative_cycle(plan.plan.nodes.len(), &edges, &worst) else {
+        let Some(cycle) = negative_cycle(&edges, &worst) else {
             continue;
         };
         let mut weight = (0, Rational::ZERO);
@@ -133,37 +134,54 @@ fn plus(a: &Extended, b: &Extended) -> Extended {
     (a.0 + b.0, &a.1 + &b.1)
 }
 
-/// The edges of a cycle of negative weight, by Bellman and Ford's algorithm.
-fn negative_cycle(
-    nodes: usize,
-    edges: &[Edge],
-    weight: &dyn Fn(&Edge) -> Extended,
-) -> Option<Vec<usize>> {
+/// Whether a path may go over both edges, one after the other.
+fn may_follow(first: &Edge, second: &Edge) -> bool {
+    let goes_back = match (&first.bound, &second.bound) {
+        (Limit::Parameter(a, _), Limit::Parameter(b, _)) => a == b && second.to == first.from,
+        _ => false,
+    };
+    first.to == second.from && !goes_back
+}
+
+/// The edges of a cycle of negative weight, by Bellman and Ford's algorithm on paths by their last
+/// edge.
+fn negative_cycle(edges: &[Edge], weight: &dyn Fn(&Edge) -> Extended) -> Option<Vec<usize>> {
     let weights: Vec<_> = edges.iter().map(weight).collect();
-    let mut distance = vec![(0, Rational::ZERO); nodes];
-    let mut arrived_by: Vec<Option<usize>> = vec![None; nodes];
+    let followers: Vec<Vec<usize>> = edges
+        .iter()
+        .map(|first| {
+            let all = 0..edges.len();
+            all.filter(|&second| may_follow(first, &edges[second]))
+                .collect()
+        })
+        .collect();
+    let mut distance = weights.clone();
+    let mut before: Vec<Option<usize>> = vec![None; edges.len()];
     let mut last = None;
-    for _ in 0..nodes {
+    for _ in 0..=edges.len() {
         last = None;
-        for (index, edge) in edges.iter().enumerate() {
-            let here = plus(&distance[edge.from], &weights[index]);
-            if here < distance[edge.to] {
-                distance[edge.to] = here;
-                arrived_by[edge.to] = Some(index);
-                last = Some(edge.to);
+        for first in 0..edges.len() {
+            for &second in &followers[first] {
+                let here = plus(&distance[first], &weights[second]);
+                if here < distance[second] {
+                    distance[second] = here;
+                    before[second] = Some(first);
+                    last = Some(second);
+                }
             }
         }
         last?;
     }
-    let mut node = last?;
-    let back = |node: usize| arrived_by[node].expect("it was reached over an edge");
-    for _ in 0..nodes {
-        node = edges[back(node)].from;
+    let back = |edge: usize| before[edge].expect("its distance has been shortened");
+    let mut edge = last?;
+    for _ in 0..edges.len() {
+        edge = back(edge);
     }
-    let mut cycle = vec![back(node)];
-    while edges[cycle[cycle.len() - 1]].from != node {
-        let from = edges[cycle[cycle.len() - 1]].from;
-        cycle.push(back(from));
+    let mut cycle = vec![edge];
+    let mut earlier = back(edge);
+    while earlier != edge {
+        cycle.push(earlier);
+        earlier = back(earlier);
     }
     Some(cycle)
 }

@@ -65,7 +65,7 @@ impl Encoder<'_> {
         }
         let first = self.holds(condition, Moment::After(start))?;
         self.violations
-            .push(and(&[format!("(< t{start} t{end})"), not(&first)]));
+            .push(and(&[self.places.is_before(start, end), not(&first)]));
         let mut facts = Vec::new();
         condition.visit_facts(&mut |fact| facts.push(fact));
         for node in self.nodes() {
@@ -74,8 +74,12 @@ impl Encoder<'_> {
                 continue;
             }
             let holds = self.holds(condition, Moment::After(node))?;
-            let inside = format!("(< t{start} t{node} t{end})");
-            self.violations.push(and(&[inside, not(&holds)]));
+            let parts = [
+                self.places.is_before(start, node),
+                self.places.is_before(node, end),
+                not(&holds),
+            ];
+            self.violations.push(and(&parts));
         }
         Ok(())
     }
@@ -158,7 +162,7 @@ impl Encoder<'_> {
         for adder in setters(true) {
             let mut parts = vec![has_happened(adder)];
             parts.extend(setters(false).map(|deleter| {
-                let is_over = format!("(< t{deleter} t{adder})");
+                let is_over = self.places.is_before(deleter, adder);
                 or(&[is_over, not(&has_happened(deleter))])
             }));
             ways.push(and(&parts));
@@ -170,15 +174,15 @@ impl Encoder<'_> {
         match moment {
             Moment::Arrival(here) if node == here => "false".to_owned(),
             Moment::After(here) if node == here => "true".to_owned(),
-            Moment::Arrival(here) => format!("(< t{node} t{here})"),
-            Moment::After(here) => format!("(<= t{node} t{here})"),
+            Moment::Arrival(here) => self.places.is_before(node, here),
+            Moment::After(here) => not(&self.places.is_before(here, node)),
             Moment::Last => match self.node(node) {
                 Node::Timed(_) => {
                     let actions = self
                         .nodes()
                         .filter(|&other| !matches!(self.node(other), Node::Timed(_)));
                     let later: Vec<_> = actions
-                        .map(|action| format!("(<= t{node} t{action})"))
+                        .map(|action| not(&self.places.is_before(action, node)))
                         .collect();
                     or(&later)
                 }

@@ -35,6 +35,13 @@ impl Encoder<'_> {
                 if are_timed && !self.is_open(node) && !self.is_open(other) {
                     continue;
                 }
+                let is_far = |first, second| {
+                    let gap = self.places.least_gap(first, second);
+                    gap.is_some_and(|gap| gap >= *self.epsilon)
+                };
+                if is_far(node, other) || is_far(other, node) {
+                    continue;
+                }
                 self.violations.push(format!(
                     "(and (< (- t{node} t{other}) {epsilon}) (< (- t{other} t{node}) {epsilon}))"
                 ));

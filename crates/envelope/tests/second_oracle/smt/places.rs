@@ -8,6 +8,8 @@ use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan};
 /// For each time point but zero, the positions it may have; the first is 1.
 pub(crate) struct Places {
     ranges: Vec<RangeInclusive<usize>>,
+    /// `[i][j]`: the most that time point `j` can come after `i`.
+    farthest: Vec<Vec<Option<Rational>>>,
 }
 
 impl Places {
@@ -16,6 +18,7 @@ impl Places {
         let count = plan.plan.nodes.len() - 1;
         Self {
             ranges: vec![1..=count; count],
+            farthest: vec![vec![None; count + 1]; count + 1],
         }
     }
 
@@ -43,7 +46,29 @@ impl Places {
                 before + 1..=count - 1 - after
             })
             .collect();
-        Some(Self { ranges })
+        Some(Self { ranges, farthest })
+    }
+
+    /// `t_first < t_second` as text; less than that, where the network knows.
+    pub(super) fn is_before(&self, first: usize, second: usize) -> String {
+        if self
+            .least_gap(first, second)
+            .is_some_and(|gap| gap > Rational::ZERO)
+        {
+            "true".to_owned()
+        } else if self.farthest[first][second]
+            .as_ref()
+            .is_some_and(|gap| *gap <= Rational::ZERO)
+        {
+            "false".to_owned()
+        } else {
+            format!("(< t{first} t{second})")
+        }
+    }
+
+    /// How much later `second` is than `first`, at least.
+    pub(super) fn least_gap(&self, first: usize, second: usize) -> Option<Rational> {
+        self.farthest[second][first].as_ref().map(|most| -most)
     }
 
     pub(super) fn of(&self, node: usize) -> RangeInclusive<usize> {
