@@ -96,6 +96,15 @@ impl<'m> Perturbed<'m> {
             sweeps: 0,
         };
         self.reward(&mut optimum.values);
+        // Letting go takes no step, so it can be done when none is left.
+        for set in 1..self.sets.len() {
+            for state in (0..states).filter(|state| self.goal[*state]) {
+                if let Some(id) = self.members(set).next() {
+                    optimum.values[set][state] = 1.0;
+                    optimum.moves[set][state] = Move::Abandon(id);
+                }
+            }
+        }
         loop {
             if matches!(self.settings.horizon, Horizon::Steps(most) if optimum.sweeps >= most) {
                 return optimum;
@@ -154,6 +163,13 @@ impl<'m> Perturbed<'m> {
         }
         let mut values = vec![vec![0.0; states]; self.sets.len()];
         self.reward(&mut values);
+        for set in 1..self.sets.len() {
+            for state in 0..states {
+                if let Move::Abandon(id) = moves[set][state] {
+                    values[set][state] = values[self.without(set, id)][state];
+                }
+            }
+        }
         let mut sweeps = 0;
         loop {
             if matches!(self.settings.horizon, Horizon::Steps(most) if sweeps >= most) {
@@ -234,6 +250,10 @@ impl<'m> Perturbed<'m> {
         ids.filter(move |id| bits & (1 << id.0) != 0)
     }
 
+    fn without(&self, set: usize, id: InstanceId) -> usize {
+        self.place[(self.sets[set] & !(1 << id.0)) as usize]
+    }
+
     /// What can be done, in the order of the plan.
     fn options(&self, set: usize, state: usize) -> Vec<Move> {
         let mut options = Vec::new();
@@ -275,7 +295,7 @@ impl<'m> Perturbed<'m> {
     ) -> f64 {
         match option {
             Move::Stop => 0.0,
-            Move::Abandon(id) => values[self.place[(self.sets[set] & !(1 << id.0)) as usize]][state],
+            Move::Abandon(id) => values[self.without(set, id)][state],
             Move::Do(node) => {
                 let event = self.model.event(node);
                 let after = &flipped[self.set_after(set, node)];
@@ -355,10 +375,7 @@ impl<'m> Perturbed<'m> {
                             let after = self.nominal(self.model.event(node), state);
                             solvable[self.set_after(set, node)][after]
                         }
-                        Move::Abandon(id) => {
-                            let fewer = self.sets[set] & !(1 << id.0);
-                            solvable[self.place[fewer as usize]][state]
-                        }
+                        Move::Abandon(id) => solvable[self.without(set, id)][state],
                         Move::Stop => false,
                     });
                     solvable[set][state] = leads_on;
