@@ -10,8 +10,8 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
-use facts::{Facts, Outcome, Pending};
 pub(crate) use facts::Snapshot;
+use facts::{Facts, Outcome, Pending};
 pub(crate) use numbers::Number;
 use numbers::Numbers;
 
@@ -372,8 +372,9 @@ impl<'m> PrunedNetwork<'m> {
         }
         // Effects on one fact go together, whether or not they are certain.
         let is_open = |fact: usize| uncertain.iter().any(|(_, outcome)| outcome.fact == fact);
-        let (joint, apart): (Vec<_>, Vec<_>) =
-            certain.into_iter().partition(|outcome| is_open(outcome.fact));
+        let (joint, apart): (Vec<_>, Vec<_>) = certain
+            .into_iter()
+            .partition(|outcome| is_open(outcome.fact));
         uncertain.extend(joint.into_iter().map(|outcome| (None, outcome)));
         let pending = Pending {
             apart,
@@ -447,7 +448,10 @@ const UNKNOWN: elbowroom_model::problem::UpdateOperator =
 
 fn present(after: &[(usize, Number)], numbers: &Numbers, fluent: usize) -> Number {
     let found = after.iter().find(|(other, _)| *other == fluent);
-    found.map_or_else(|| numbers.changing[fluent].clone(), |(_, number)| number.clone())
+    found.map_or_else(
+        || numbers.changing[fluent].clone(),
+        |(_, number)| number.clone(),
+    )
 }
 
 fn put(after: &mut Vec<(usize, Number)>, fluent: usize, number: Number) {

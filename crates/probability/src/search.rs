@@ -372,9 +372,8 @@ impl Run<'_, '_> {
     /// Keeps the sequence so far, if it is an order and better than the best.
     fn consider(&mut self) -> Result<(), TooCoupled> {
         let last = self.network.sequence().last();
-        let is_timed = |node: &NodeId| {
-            matches!(self.model.plan().nodes[node.index()], Node::Timed(_))
-        };
+        let is_timed =
+            |node: &NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
         if !self.network.running().is_empty() || last.is_some_and(is_timed) {
             return Ok(());
         }
@@ -406,10 +405,7 @@ impl Run<'_, '_> {
         let separations = &self.search.separations;
         let mut next = Vec::new();
         for (id, _) in self.model.plan().instances() {
-            let (start, end) = (
-                separations.starts[id.index()],
-                separations.ends[id.index()],
-            );
+            let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             let node = if !self.is_used[id.index()] {
                 start
             } else if start != end && self.network.running().contains(&id) {
@@ -421,7 +417,12 @@ impl Run<'_, '_> {
                 next.push(node);
             }
         }
-        next.extend(separations.timed.get(self.next_timed).map(|(node, _)| *node));
+        next.extend(
+            separations
+                .timed
+                .get(self.next_timed)
+                .map(|(node, _)| *node),
+        );
         next
     }
 
@@ -446,8 +447,7 @@ impl Run<'_, '_> {
                 return Err(error);
             }
         };
-        let works = !self.must_work
-            || self.nominal.apply(model, event, self.network.running());
+        let works = !self.must_work || self.nominal.apply(model, event, self.network.running());
         let bound = if works && probability > 0.0 {
             self.bound()
         } else {

@@ -100,7 +100,8 @@ impl Layer {
     /// Whether what is believed fits: whether each fact is more likely to be as required than not,
     /// all conditions hold of what is more likely, and the same actions are under way.
     pub fn fits(&self, model: &Model, circumstances: &Circumstances) -> bool {
-        let mut running: Vec<InstanceId> = circumstances.running.iter().map(|r| r.instance).collect();
+        let mut running: Vec<InstanceId> =
+            circumstances.running.iter().map(|r| r.instance).collect();
         running.sort_unstable();
         running == self.running && self.holds(model, circumstances)
     }
@@ -113,7 +114,9 @@ impl Layer {
             _ => None,
         };
         let task = model.task();
-        self.literals.iter().all(|&(fact, truth)| is_likely(fact) == truth)
+        self.literals
+            .iter()
+            .all(|&(fact, truth)| is_likely(fact) == truth)
             && self.conditions.iter().all(|condition| {
                 // A number that is not known now cannot speak against it.
                 evaluate(task, condition, &is_likely, &value).unwrap_or(true)

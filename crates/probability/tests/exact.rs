@@ -21,7 +21,12 @@ const FACTORED: Taste = Taste {
 
 /// Pushes random orders, taking back some happenings on the way, and compares at each step.
 fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
-    let model = Model::new(case.task.clone(), case.plan.clone(), &case.likelihoods, semantics);
+    let model = Model::new(
+        case.task.clone(),
+        case.plan.clone(),
+        &case.likelihoods,
+        semantics,
+    );
     let model = model.unwrap();
     let mut network = PrunedNetwork::new(&model, &case.circumstances).unwrap();
     let mut possible = 0;
@@ -46,10 +51,18 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
                 let order = order[..=at].iter().map(|&node| model.node_words(node));
                 format!("{}\n{:?}", case.text, order.collect::<Vec<_>>())
             };
-            assert!((pushed - actions).abs() < 1e-12, "{pushed} {actions} {}", words());
+            assert!(
+                (pushed - actions).abs() < 1e-12,
+                "{pushed} {actions} {}",
+                words()
+            );
             let success = network.success_probability().unwrap();
             let expected = worlds.success_probability();
-            assert!((success - expected).abs() < 1e-12, "{success} {expected} {}", words());
+            assert!(
+                (success - expected).abs() < 1e-12,
+                "{success} {expected} {}",
+                words()
+            );
             possible += usize::from(actions > 0.0);
         }
         while !network.sequence().is_empty() {

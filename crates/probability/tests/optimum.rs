@@ -11,7 +11,7 @@ use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
 use elbowroom_probability::optimum::{Horizon, Move, Perturbed, Settings};
 use elbowroom_probability::{
-    Choice, Circumstances, LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider,
+    Choice, Circumstances, LayerDispatch, Likelihoods, Lookahead, Model, OrderSearch, Reconsider,
     SearchSettings, Semantics,
 };
 use rand::SeedableRng;
@@ -38,7 +38,7 @@ fn a_lone_action_is_tried_until_the_steps_run_out() {
     let initial = Circumstances::initial(&task);
     let model = Model::new(task, plan, &likelihoods, Semantics::World).unwrap();
     let value = |settings| {
-        let process = Perturbed::new(&model, settings).unwrap();
+        let process = Perturbed::new(model.clone(), settings).unwrap();
         process.optimum().value(&process, &initial)
     };
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
@@ -76,13 +76,17 @@ fn the_optimum_is_that_of_a_plain_recursion() {
         );
         let model = model.unwrap();
         for count in 0..4 {
-            let process = Perturbed::new(&model, steps(count)).unwrap();
+            let process = Perturbed::new(model.clone(), steps(count)).unwrap();
             let optimum = process.optimum().value(&process, &case.circumstances);
             let state: Vec<bool> = (0..case.task.fact_count())
                 .map(|at| case.circumstances.belief.probability(fact(at)) > 0.5)
                 .collect();
             let expected = best(&case, &state, &[], count);
-            assert!((optimum - expected).abs() < 1e-12, "{optimum} {expected} {}", case.text);
+            assert!(
+                (optimum - expected).abs() < 1e-12,
+                "{optimum} {expected} {}",
+                case.text
+            );
             between += usize::from(optimum > 0.0 && optimum < 1.0);
         }
     }
@@ -100,7 +104,11 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -> f64
     }
     let mut most: f64 = 0.0;
     for &id in running {
-        let fewer: Vec<_> = running.iter().copied().filter(|other| *other != id).collect();
+        let fewer: Vec<_> = running
+            .iter()
+            .copied()
+            .filter(|other| *other != id)
+            .collect();
         most = most.max(best(case, state, &fewer, left));
     }
     if left == 0 {
@@ -111,16 +119,22 @@ fn best(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -> f64
         let is_running = running.contains(&id);
         let (snap, success, next): (&SnapAction, f64, Vec<InstanceId>) = match &action.body {
             Body::Durative(body) if is_running => {
-                let fewer = running.iter().copied().filter(|other| *other != id).collect();
+                let fewer = running
+                    .iter()
+                    .copied()
+                    .filter(|other| *other != id)
+                    .collect();
                 (&body.end, 1.0, fewer)
             }
             Body::Durative(body) => {
                 let more = running.iter().copied().chain([id]).collect();
                 (&body.start, case.likelihoods.start(action).unwrap(), more)
             }
-            Body::Instantaneous(snap) => {
-                (snap, case.likelihoods.start(action).unwrap(), running.to_vec())
-            }
+            Body::Instantaneous(snap) => (
+                snap,
+                case.likelihoods.start(action).unwrap(),
+                running.to_vec(),
+            ),
         };
         if !holds(&snap.condition, state) {
             continue;
@@ -144,15 +158,16 @@ fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -
         worlds = worlds
             .into_iter()
             .flat_map(|(facts, weight): (Vec<bool>, f64)| {
-                [(true, p), (false, 1.0 - p)].map(|(truth, p)| {
-                    ([facts.clone(), vec![truth]].concat(), weight * p)
-                })
+                [(true, p), (false, 1.0 - p)]
+                    .map(|(truth, p)| ([facts.clone(), vec![truth]].concat(), weight * p))
             })
             .filter(|(_, weight)| *weight > 0.0)
             .collect();
     }
     let worlds = worlds.iter();
-    worlds.map(|(state, weight)| weight * best(case, state, running, left)).sum()
+    worlds
+        .map(|(state, weight)| weight * best(case, state, running, left))
+        .sum()
 }
 
 fn effects(
@@ -174,7 +189,9 @@ fn effects(
                 continue;
             }
             done.push((fact, makes_true));
-            let chance = case.likelihoods.effect(&case.task, action, fact, makes_true);
+            let chance = case
+                .likelihoods
+                .effect(&case.task, action, fact, makes_true);
             let p = chance.unwrap();
             outcomes = outcomes
                 .into_iter()
@@ -213,8 +230,13 @@ fn everything(task: &Arc<Task>, likelihoods: &Likelihoods) -> (Arc<Task>, Partia
 
 /// What an agent does that asks for the best order before each happening.
 fn adaptable(dispatch: &mut LayerDispatch, circumstances: &Circumstances) -> Move {
-    match dispatch.choose(circumstances, &mut patient).unwrap() {
+    as_move(&dispatch.choose(circumstances, &mut patient).unwrap())
+}
+
+fn as_move(choice: &Choice) -> Move {
+    match choice {
         Choice::Next(next) => Move::Do(next.node),
+        Choice::Abandon(id) => Move::Abandon(*id),
         Choice::GoalReached | Choice::Replan => Move::Stop,
     }
 }
@@ -228,19 +250,40 @@ fn no_executor_beats_the_optimum_of_the_authors_worlds() {
             most_running: 1,
             ..Settings::default()
         };
-        let process = Perturbed::new(&model, settings).unwrap();
+        let process = Perturbed::new(model.clone(), settings).unwrap();
         let initial = Circumstances::initial(&world.task);
         let optimum = process.optimum();
         let best = optimum.value(&process, &initial);
         let followed = process.success_of(&initial, &mut |now| optimum.choose(&process, now));
-        assert!((best - followed).abs() < 1e-9, "{}: {best} {followed}", world.name);
+        assert!(
+            (best - followed).abs() < 1e-9,
+            "{}: {best} {followed}",
+            world.name
+        );
         for semantics in [Semantics::Paper, Semantics::World] {
-            let model = Model::new(model.task().clone(), plan.clone(), &world.likelihoods, semantics);
+            let model = Model::new(
+                model.task().clone(),
+                plan.clone(),
+                &world.likelihoods,
+                semantics,
+            );
             let search = OrderSearch::new(model.unwrap(), SearchSettings::default());
             let mut dispatch = LayerDispatch::new(search, Reconsider::Always);
             let p = process.success_of(&initial, &mut |now| adaptable(&mut dispatch, now));
             assert!(p <= best + 1e-9, "{}: {p} {best}", world.name);
             assert!(p > 0.8 * best, "{}: {p} {best}", world.name);
+            let mut lookahead = Lookahead::new(dispatch, process.settings().clone());
+            let p = process.success_of(&initial, &mut |now| {
+                let choice = lookahead.choose(now, &mut patient).unwrap();
+                as_move(&choice)
+            });
+            // Where the network is the paper's there is no table, and it does what it did before.
+            let expected = if semantics == Semantics::World {
+                best
+            } else {
+                0.0
+            };
+            assert!(p >= expected - 1e-9, "{}: {p} {best}", world.name);
         }
     }
 }

@@ -53,8 +53,16 @@ fn the_best_order_is_found_also_where_the_published_search_missed_it() {
             .best_order(&Circumstances::initial(&world.task), &mut patient)
             .unwrap();
         let order = found.order.unwrap();
-        println!("{} {:?} {} {}", world.name, order.sequence, order.probability, found.sequences);
-        assert!((order.probability - best).abs() < 5e-5, "{}: {}", world.name, order.probability);
+        println!(
+            "{} {:?} {} {}",
+            world.name, order.sequence, order.probability, found.sequences
+        );
+        assert!(
+            (order.probability - best).abs() < 5e-5,
+            "{}: {}",
+            world.name,
+            order.probability
+        );
     }
     const BEST_AF3: [f64; 8] = [
         0.0201, 0.0125, 0.0079, 0.0052, 0.0159, 0.0092, 0.0071, 0.0051,
@@ -66,7 +74,15 @@ fn the_best_order_is_found_also_where_the_published_search_missed_it() {
             .best_order(&Circumstances::initial(&world.task), &mut patient)
             .unwrap();
         let order = found.order.unwrap();
-        println!("{} {:?} {} {}", world.name, order.sequence, order.probability, found.sequences);
-        assert!((order.probability - best).abs() < 6e-5, "{}: {}", world.name, order.probability);
+        println!(
+            "{} {:?} {} {}",
+            world.name, order.sequence, order.probability, found.sequences
+        );
+        assert!(
+            (order.probability - best).abs() < 6e-5,
+            "{}: {}",
+            world.name,
+            order.probability
+        );
     }
 }

@@ -61,7 +61,9 @@ impl Reader<'_> {
     }
 
     fn document(&mut self, document: &DeTable<'_>) {
-        const SECTIONS: [&str; 6] = ["format", "version", "defaults", "facts", "actions", "beliefs"];
+        const SECTIONS: [&str; 6] = [
+            "format", "version", "defaults", "facts", "actions", "beliefs",
+        ];
         self.header(document);
         for (key, value) in document {
             match key.get_ref().as_ref() {
@@ -128,7 +130,10 @@ impl Reader<'_> {
     ) {
         match value.get_ref() {
             DeValue::Table(table) => {
-                for (key, value) in table {
+                // In the order of the file, so that of two mistakes the second is the mistake.
+                let mut entries: Vec<_> = table.iter().collect();
+                entries.sort_by_key(|(key, _)| key.span().start);
+                for (key, value) in entries {
                     entry(self, key, value);
                 }
             }
@@ -163,19 +168,25 @@ impl Reader<'_> {
             return;
         };
         let mut flip = PartialFlip::default();
-        self.each(key, value, &mut |reader, key, value| {
-            match key.get_ref().as_ref() {
+        self.each(
+            key,
+            value,
+            &mut |reader, key, value| match key.get_ref().as_ref() {
                 "becomes_true" => flip.becomes_true = reader.probability(value),
                 "becomes_false" => flip.becomes_false = reader.probability(value),
                 _ => reader.unknown(key, &["becomes_true", "becomes_false"]),
-            }
-        });
+            },
+        );
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (predicate, arguments);
                 self.likelihoods.facts.insert(key, flip).is_none()
             }
-            None => self.likelihoods.predicates.insert(predicate, flip).is_none(),
+            None => self
+                .likelihoods
+                .predicates
+                .insert(predicate, flip)
+                .is_none(),
         };
         self.check_new(is_new, key);
     }
@@ -192,15 +203,17 @@ impl Reader<'_> {
             return;
         };
         let mut success = Success::default();
-        self.each(key, value, &mut |reader, key, value| {
-            match key.get_ref().as_ref() {
+        self.each(
+            key,
+            value,
+            &mut |reader, key, value| match key.get_ref().as_ref() {
                 "start" => success.start = reader.probability(value),
                 "effects" => reader.each(key, value, &mut |reader, key, value| {
                     reader.effect(schema, key, value, &mut success);
                 }),
                 _ => reader.unknown(key, &["start", "effects"]),
-            }
-        });
+            },
+        );
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (schema, arguments);
@@ -393,7 +406,7 @@ impl Reader<'_> {
             }
             for &(predicate, makes_true) in &affected {
                 let effect = self.likelihoods.effect_of(id, tuple, predicate, makes_true);
-                if effect.is_none() {
+                if missing.is_none() && effect.is_none() {
                     let name = self.problem.apply_name(&schema.name, tuple);
                     let predicate = &self.problem.predicates[predicate.index()].name;
                     missing = Some(format!("how likely the effect of {name} on {predicate} is"));

@@ -153,13 +153,7 @@ impl Facts {
         mass
     }
 
-    fn require_in_cluster(
-        &mut self,
-        model: &Model,
-        slot: u32,
-        fact: usize,
-        truth: bool,
-    ) -> f64 {
+    fn require_in_cluster(&mut self, model: &Model, slot: u32, fact: usize, truth: bool) -> f64 {
         let mut cluster = self.cluster(model, slot).clone();
         let bit = 1 << cluster.place(fact);
         let mass = cluster.condition(|index| (index & bit != 0) == truth);
@@ -369,7 +363,9 @@ impl Facts {
                 None => singles.push(fact),
             }
         }
-        let in_clusters = slots.iter().map(|&slot| self.cluster(model, slot).facts.len());
+        let in_clusters = slots
+            .iter()
+            .map(|&slot| self.cluster(model, slot).facts.len());
         let count = in_clusters.sum::<usize>() + singles.len();
         if count > MOST_COUPLED {
             return Err(count);
@@ -418,7 +414,13 @@ impl Facts {
             let is_true = cluster.mass(|index| index & bit == 0) == 0.0;
             if is_false || is_true || cluster.facts.len() == 1 {
                 cluster.remove(place);
-                let p = if is_false { 0.0 } else if is_true { 1.0 } else { p };
+                let p = if is_false {
+                    0.0
+                } else if is_true {
+                    1.0
+                } else {
+                    p
+                };
                 let record = Record {
                     layer: cluster.layer,
                     p,

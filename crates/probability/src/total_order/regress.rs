@@ -146,7 +146,10 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
                 // A derived fact: unchanged if nothing that it rests on is.
                 let is_touched = |fact: &FactId| {
                     let position = model.position(*fact);
-                    event.effects.iter().any(|effect| Some(effect.fact) == position)
+                    event
+                        .effects
+                        .iter()
+                        .any(|effect| Some(effect.fact) == position)
                 };
                 if basic.iter().any(is_touched) {
                     return None;
@@ -188,11 +191,19 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
     let Some(position) = model.fluent_position(fluent) else {
         return Ok(None);
     };
-    if event.continuous.iter().any(|(changed, _)| *changed == position) {
+    if event
+        .continuous
+        .iter()
+        .any(|(changed, _)| *changed == position)
+    {
         return Err(Lost);
     }
     let mut value: Option<Expression> = None;
-    for update in event.updates.iter().filter(|update| update.fluent == position) {
+    for update in event
+        .updates
+        .iter()
+        .filter(|update| update.fluent == position)
+    {
         if update.guard.is_some() {
             return Err(Lost);
         }

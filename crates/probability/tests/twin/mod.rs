@@ -283,7 +283,8 @@ impl<'a> Worlds<'a> {
             Condition::Fact(fact) => world.facts[fact.index()],
             Condition::Compare(comparison, left, right) => {
                 let value = |side: &Expression| {
-                    side.evaluate(&mut |leaf| number(leaf, &self.values)).unwrap()
+                    side.evaluate(&mut |leaf| number(leaf, &self.values))
+                        .unwrap()
                 };
                 comparison.holds(&value(left), &value(right))
             }
