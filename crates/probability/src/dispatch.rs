@@ -1,4 +1,4 @@
-//! PExec: which happening of an order is next, as things stand.
+//! `PExec`: which happening of an order is next, as things stand.
 //!
 //! Paper 2, Algorithm 1: of all layers of the order that fit what is believed, the lattermost says
 //! what is next. That skips what has become superfluous, and repeats what did not work. Where

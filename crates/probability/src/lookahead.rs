@@ -1,4 +1,4 @@
-//! A successor of PExec that knows what the world may do next: [`Lookahead`].
+//! A successor of `PExec` that knows what the world may do next: [`Lookahead`].
 
 use std::ops::ControlFlow;
 

@@ -380,7 +380,7 @@ impl<'m> PrunedNetwork<'m> {
             apart,
             is_step: event.is_step,
         };
-        self.facts_transform_with(node, &uncertain, pending)
+        self.facts_transform_with(node, &uncertain, &pending)
     }
 
     fn facts_transform(
@@ -393,18 +393,18 @@ impl<'m> PrunedNetwork<'m> {
             apart: Vec::new(),
             is_step,
         };
-        self.facts_transform_with(node, guarded, pending)
+        self.facts_transform_with(node, guarded, &pending)
     }
 
     fn facts_transform_with(
         &mut self,
         node: NodeId,
         guarded: &[(Option<Condition>, Outcome)],
-        pending: Pending,
+        pending: &Pending,
     ) -> Result<(), TooCoupled> {
         let (model, numbers) = (self.model, &self.numbers);
         let value = |leaf: &Expression| numbers.value(model, leaf, None);
-        let changed = self.facts.apply_guarded(model, guarded, &pending, &value);
+        let changed = self.facts.apply_guarded(model, guarded, pending, &value);
         changed.map_err(|count| self.too_coupled(node, count))
     }
 

@@ -1,4 +1,4 @@
-//! PGen: the order of a plan's happenings that is most likely to succeed.
+//! `PGen`: the order of a plan's happenings that is most likely to succeed.
 //!
 //! Branch and bound over sequences of happenings (paper 2, section 2.2.1), depth first, the most
 //! promising happening first. A sequence is given up when
@@ -150,7 +150,7 @@ impl OrderSearch {
         let key = cache::key(&self.model, circumstances, has_deadlines);
         if let Some(known) = self.cache.get(&key) {
             return Ok(Found {
-                order: known.map(|order| order.from(&circumstances.now)),
+                order: known.from(&circumstances.now),
                 stop: SearchStop::Complete,
                 sequences: 0,
             });

@@ -52,7 +52,8 @@ impl TotalOrderPlan {
         slots: Vec<Slot>,
     ) -> Self {
         let sequence = network.sequence().to_vec();
-        let mut running = circumstances.running.iter().map(|r| r.instance).collect();
+        let running = circumstances.running.iter();
+        let mut running: Vec<InstanceId> = running.map(|running| running.instance).collect();
         let mut under_way = vec![sorted(&running)];
         for &node in &sequence {
             step(model, &mut running, node);
@@ -82,8 +83,8 @@ impl TotalOrderPlan {
     }
 }
 
-fn sorted(running: &Vec<InstanceId>) -> Vec<InstanceId> {
-    let mut running = running.clone();
+fn sorted(running: &[InstanceId]) -> Vec<InstanceId> {
+    let mut running = running.to_vec();
     running.sort_unstable();
     running
 }

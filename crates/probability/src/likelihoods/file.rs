@@ -49,6 +49,9 @@ pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> 
 type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
 type Value<'a> = Spanned<DeValue<'a>>;
 
+/// A mistake that has been noted.
+struct Noted;
+
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
@@ -199,7 +202,7 @@ impl Reader<'_> {
             Err(objection) => return self.object(key.span(), objection),
         };
         let parameters = &self.problem.schemas[schema.index()].parameters;
-        let Some(arguments) = self.arguments(key, name, parameters, words) else {
+        let Ok(arguments) = self.arguments(key, name, parameters, words) else {
             return;
         };
         let mut success = Success::default();
@@ -285,7 +288,7 @@ impl Reader<'_> {
         match names::predicate(self.problem, name) {
             Ok(predicate) => {
                 let parameters = &self.problem.predicates[predicate.index()].parameters;
-                let arguments = self.arguments(key, name, parameters, words)?;
+                let arguments = self.arguments(key, name, parameters, words).ok()?;
                 Some((predicate, arguments))
             }
             Err(objection) => {
@@ -295,23 +298,23 @@ impl Reader<'_> {
         }
     }
 
-    /// The objects in a key; inside, `None` if there are none where there could be some.
+    /// The objects in a key; `None` if there are none where there could be some.
     fn arguments<'k>(
         &mut self,
         key: &Key<'_>,
         of: &str,
         parameters: &[elbowroom_model::problem::Variable],
         words: impl Iterator<Item = &'k str>,
-    ) -> Option<Option<Vec<ObjectId>>> {
+    ) -> Result<Option<Vec<ObjectId>>, Noted> {
         let mut words = words.peekable();
         if words.peek().is_none() && !parameters.is_empty() {
-            return Some(None);
+            return Ok(None);
         }
         match names::arguments(self.problem, of, parameters, words) {
-            Ok(objects) => Some(Some(objects)),
+            Ok(objects) => Ok(Some(objects)),
             Err(objection) => {
                 self.object(key.span(), objection);
-                None
+                Err(Noted)
             }
         }
     }

@@ -325,12 +325,10 @@ impl Facts {
     fn open(&mut self, model: &Model, facts: &[usize]) -> Vec<usize> {
         let mut open = Vec::new();
         for &fact in facts {
-            let is_open = match self.records[fact].cluster {
-                Some(_) => true,
-                None => {
-                    let p = self.single(model, fact);
-                    p > 0.0 && p < 1.0
-                }
+            let is_coupled = self.records[fact].cluster.is_some();
+            let is_open = is_coupled || {
+                let p = self.single(model, fact);
+                p > 0.0 && p < 1.0
             };
             if is_open {
                 open.push(fact);

@@ -225,8 +225,12 @@ impl<'s> Timing<'s> {
         }
         match what {
             Node::Timed(_) => {
-                let time = separations.timed.get(next_timed)?.1.clone();
-                self.fix(own, &time)?;
+                // One that has happened, or is not next, leaves no time.
+                let (next, time) = separations.timed.get(next_timed)?;
+                if *next != node {
+                    return None;
+                }
+                self.fix(own, time)?;
             }
             _ => self.keep_before(own, node, next_timed)?,
         }

@@ -164,13 +164,11 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
             let mut is_lost = false;
             let mut side = |side: &Expression| {
                 side.map_leaves(&mut |leaf| match leaf {
-                    Expression::Fluent(fluent) => match value_after(model, event, *fluent) {
-                        Ok(changed) => changed,
-                        Err(Lost) => {
-                            is_lost = true;
-                            None
-                        }
-                    },
+                    Expression::Fluent(fluent) => {
+                        let changed = value_after(model, event, *fluent);
+                        is_lost |= changed.is_err();
+                        changed.ok().flatten()
+                    }
                     _ => None,
                 })
             };

@@ -13,6 +13,7 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 
 /// What may occur.
+#[allow(clippy::struct_excessive_bools, reason = "each is a taste of its own")]
 #[derive(Clone, Copy)]
 pub(crate) struct Taste {
     pub(crate) facts: usize,
