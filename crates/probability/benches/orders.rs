@@ -90,7 +90,7 @@ fn rooms(count: usize) -> (Model, Circumstances) {
            (:goal (and{goal})))"
     );
     let likelihoods = "format = \"elbowroom-likelihoods\"\nversion = 1\n
-         [defaults]\nbecomes_true = 0.01\nbecomes_false = 0.02\nstart = 0.8\neffect = 0.9\n";
+         [defaults]\nbecomes_true = 0.01\nbecomes_false = 0.02\nstart = 0.8\neffect = 0.9\n[facts.open]\n";
     model(domain, &problem, &plan, likelihoods)
 }
 

@@ -7,8 +7,8 @@
 //!   probability 0;
 //! - there is no time for them: durations, their bounds, timed initials and now leave no schedule;
 //! - no way to go on can beat the best order found (a sharper bound than the paper's P(A), see
-//!   [`bound`]);
-//! - another sequence has done the same and stands at least as well (see [`memo`]).
+//!   `search/bound.rs`);
+//! - another sequence has done the same and stands at least as well (see `search/memo.rs`).
 //!
 //! Unlike the published code this keeps the best order found, starts from the belief as it is now,
 //! and lets actions be done again that were done before.
