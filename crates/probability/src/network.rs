@@ -3,6 +3,7 @@
 mod cluster;
 mod facts;
 mod numbers;
+mod outcome;
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
@@ -10,10 +11,11 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
+use facts::Facts;
 pub(crate) use facts::Snapshot;
-use facts::{Facts, Outcome, Pending};
 pub(crate) use numbers::Number;
 use numbers::Numbers;
+use outcome::{Outcome, Pending};
 
 /// A condition couples more facts than can be tracked exactly.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -24,6 +24,7 @@
 //! limit.
 
 mod process;
+mod table;
 
 use elbowroom_plan::{InstanceId, NodeId};
 

@@ -48,21 +48,21 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
             let pushed = network.push(node).unwrap();
             worlds.push(node);
             let actions = worlds.actions_probability();
-            let words = || {
+            let story = || {
                 let order = order[..=at].iter().map(|&node| model.node_words(node));
                 format!("{}\n{:?}", case.text, order.collect::<Vec<_>>())
             };
             assert!(
                 (pushed - actions).abs() < 1e-12,
                 "{pushed} {actions} {}",
-                words()
+                story()
             );
             let success = network.success_probability().unwrap();
             let expected = worlds.success_probability();
             assert!(
                 (success - expected).abs() < 1e-12,
                 "{success} {expected} {}",
-                words()
+                story()
             );
             possible += usize::from(actions > 0.0);
         }

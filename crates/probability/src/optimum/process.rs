@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Condition, FactId};
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
+use super::table::{check, holds, table};
 use super::{Horizon, Move, NotSmall, Optimum, Settings};
 use crate::circumstances::Circumstances;
-use crate::model::{Event, Model, Requirement, Semantics, evaluate};
+use crate::model::{Event, Model, Requirement};
 
 /// More states than this are not tabulated.
 const MOST_STATES: usize = 1 << 22;
@@ -442,66 +442,4 @@ impl Perturbed {
         }
         after
     }
-}
-
-/// Whether the model is of a world without numbers and time.
-fn check(model: &Model) -> Result<(), NotSmall> {
-    if model.semantics() != Semantics::World {
-        return Err(NotSmall::PaperSemantics);
-    }
-    let unsupported = |what: &str| NotSmall::Unsupported {
-        what: what.to_owned(),
-    };
-    if !model.fluents.is_empty() {
-        return Err(unsupported("actions change numbers"));
-    }
-    if !model.task().timed().is_empty() {
-        return Err(unsupported("facts change at fixed times"));
-    }
-    if model.events.iter().any(|event| !event.watches.is_empty()) {
-        return Err(unsupported(
-            "effects depend on what held throughout an action",
-        ));
-    }
-    let remembers = |event: &Event| event.effects.iter().any(|effect| effect.is_certain);
-    if model.events.iter().any(remembers) {
-        return Err(unsupported(
-            "effects depend on what held at the start of an action",
-        ));
-    }
-    Ok(())
-}
-
-/// In which states a requirement holds.
-fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
-    (0..1_usize << model.facts.len())
-        .map(|state| {
-            let literals = requirement.literals.iter();
-            let coupled = requirement.coupled.iter().map(|coupled| &coupled.condition);
-            literals
-                .copied()
-                .all(|(fact, truth)| (state & (1 << fact) != 0) == truth)
-                && requirement
-                    .numeric
-                    .iter()
-                    .chain(coupled)
-                    .all(|c| holds(model, c, state))
-        })
-        .collect()
-}
-
-fn holds(model: &Model, condition: &Condition, state: usize) -> bool {
-    let truth = |fact: FactId| {
-        model
-            .position(fact)
-            .is_some_and(|at| state & (1 << at) != 0)
-    };
-    // Numbers do not change here.
-    let value = |leaf: &elbowroom_model::ground::Expression| match leaf {
-        elbowroom_model::ground::Expression::Fluent(fluent) => {
-            model.task().initial().values.get(fluent).cloned()
-        }
-        _ => None,
-    };
-    evaluate(model.task(), condition, &truth, &value).unwrap_or(false)
 }
