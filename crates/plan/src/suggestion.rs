@@ -1,10 +1,7 @@
 //! Near names for misspelled ones.
 
 /// The candidate that `name` most probably was meant to be, if any comes close.
-pub fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     /// Names longer than this are not worth the time, which grows with the square.
     const LONGEST: usize = 64;
     let name = name.to_lowercase();

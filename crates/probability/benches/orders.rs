@@ -22,12 +22,18 @@ fn main() {
 /// So many lamps to be screwed in, in any order and also at once; some rattle loose more easily
 /// than others.
 fn lamps(count: usize) -> (Model, Circumstances) {
-    let domain = "(define (domain lamps) (:types lamp) (:predicates (whole ?l - lamp) (lit ?l - lamp))
+    let domain =
+        "(define (domain lamps) (:types lamp) (:predicates (whole ?l - lamp) (lit ?l - lamp))
         (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
           :condition (and (at start (whole ?l)) (over all (whole ?l)) (at end (whole ?l)))
           :effect (at end (lit ?l))))";
-    let (mut objects, mut init, mut goal, mut plan, mut facts) =
-        (String::new(), String::new(), String::new(), String::new(), String::new());
+    let (mut objects, mut init, mut goal, mut plan, mut facts) = (
+        String::new(),
+        String::new(),
+        String::new(),
+        String::new(),
+        String::new(),
+    );
     for lamp in 0..count {
         let _ = write!(objects, " l{lamp}");
         let _ = write!(init, " (whole l{lamp})");
@@ -36,7 +42,10 @@ fn lamps(count: usize) -> (Model, Circumstances) {
         // Mixed up, so that no simple rule gives the order.
         let breaks = 0.01 + 0.01 * f64::from(u32::try_from(lamp * 7 % count).unwrap_or(0));
         let dims = 0.01 + 0.005 * f64::from(u32::try_from(lamp * 3 % count).unwrap_or(0));
-        let _ = writeln!(facts, "[facts.\"whole l{lamp}\"]\nbecomes_false = {breaks:?}");
+        let _ = writeln!(
+            facts,
+            "[facts.\"whole l{lamp}\"]\nbecomes_false = {breaks:?}"
+        );
         let _ = writeln!(facts, "[facts.\"lit l{lamp}\"]\nbecomes_false = {dims:?}");
     }
     let problem = format!(
@@ -60,8 +69,12 @@ fn rooms(count: usize) -> (Model, Circumstances) {
         (:durative-action go :parameters (?a ?b - room) :duration (= ?duration 1)
           :condition (at start (in ?a))
           :effect (and (at start (not (in ?a))) (at end (in ?b)))))";
-    let (mut objects, mut init, mut goal, mut plan) =
-        (String::new(), "(in r0)".to_owned(), String::new(), String::new());
+    let (mut objects, mut init, mut goal, mut plan) = (
+        String::new(),
+        "(in r0)".to_owned(),
+        String::new(),
+        String::new(),
+    );
     for room in 0..count {
         let _ = write!(objects, " r{room}");
         let _ = write!(init, " (open r{room})");
@@ -77,7 +90,7 @@ fn rooms(count: usize) -> (Model, Circumstances) {
            (:goal (and{goal})))"
     );
     let likelihoods = "format = \"elbowroom-likelihoods\"\nversion = 1\n
-         [defaults]\nbecomes_true = 0.01\nbecomes_false = 0.02\nstart = 0.8\neffect = 0.9\n";
+         [defaults]\nbecomes_true = 0.01\nbecomes_false = 0.02\nstart = 0.8\neffect = 0.9\n[facts.open]\n";
     model(domain, &problem, &plan, likelihoods)
 }
 

@@ -27,7 +27,11 @@ impl Belief {
 
     /// Sets how likely the fact is to hold, a number in [0, 1]; what is outside is brought in.
     pub fn set(&mut self, fact: FactId, probability: f64) {
-        let probability = if probability.is_nan() { 0.0 } else { probability };
+        let probability = if probability.is_nan() {
+            0.0
+        } else {
+            probability
+        };
         let probability = probability.clamp(0.0, 1.0);
         if probability > 0.0 {
             self.probabilities.insert(fact, probability);

@@ -50,6 +50,8 @@ impl Circumstances {
 
     /// Whether the instance is under way.
     pub fn is_running(&self, instance: InstanceId) -> bool {
-        self.running.iter().any(|running| running.instance == instance)
+        self.running
+            .iter()
+            .any(|running| running.instance == instance)
     }
 }

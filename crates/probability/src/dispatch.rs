@@ -1,4 +1,4 @@
-//! PExec: which happening of an order is next, as things stand.
+//! `PExec`: which happening of an order is next, as things stand.
 //!
 //! Paper 2, Algorithm 1: of all layers of the order that fit what is believed, the lattermost says
 //! what is next. That skips what has become superfluous, and repeats what did not work. Where
@@ -12,7 +12,7 @@
 use std::ops::ControlFlow;
 
 use elbowroom_num::Rational;
-use elbowroom_plan::NodeId;
+use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::network::TooCoupled;
@@ -26,6 +26,9 @@ pub enum Choice {
     GoalReached,
     /// This happening.
     Next(NextHappening),
+    /// Let this action go; its end is not worth waiting for. Only [`Lookahead`](crate::Lookahead)
+    /// says so.
+    Abandon(InstanceId),
     /// No order of the plan leads to the goal from here.
     Replan,
 }

@@ -1,8 +1,70 @@
 //! How likely a plan is to succeed, and the order most likely to (Olisipo).
+//!
+//! In: a partially ordered plan, the likelihoods of everything that can go otherwise, and what is
+//! believed now. Out: the order most likely to succeed, and what to do next.
+//!
+//! 1. [`Likelihoods`]: facts that change by themselves, starts and effects that fail; read from
+//!    files by [`likelihoods`].
+//! 2. [`Model`]: a plan's happenings as steps of a stochastic process.
+//! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
+//! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
+//! 5. [`LayerDispatch`] (`PExec`): the next happening, as things stand.
+//! 6. [`optimum`]: the best that any executor can reach in a small world, and [`Lookahead`], which
+//!    does it.
+//!
+//! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws
+//! random numbers or looks at a clock: time limits come in as callbacks, and the same input gives
+//! the same answer. Probabilities are `f64`; whether there is time for an order is decided on the
+//! real temporal network, in exact numbers.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use elbowroom_model::Task;
+//! use elbowroom_pddl::{Source, read_plan, read_problem};
+//! use elbowroom_plan::partial_order::partial_order;
+//! use elbowroom_probability::dispatch::patient;
+//! use elbowroom_probability::{
+//!     Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, Semantics,
+//! };
+//!
+//! let domain = Source::new(
+//!     "lamp.pddl",
+//!     "(define (domain lamp) (:predicates (whole) (lit))
+//!        (:durative-action screw :parameters () :duration (= ?duration 5)
+//!          :condition (over all (whole)) :effect (at end (lit))))",
+//! );
+//! let problem = Source::new(
+//!     "evening.pddl",
+//!     "(define (problem evening) (:domain lamp) (:init (whole)) (:goal (lit)))",
+//! );
+//! let (problem, _) = read_problem(&domain, &problem)?;
+//! let mut task = Task::new(problem);
+//! let (plan, _) = read_plan(&Source::new("plan", "0: (screw) [5]"), &mut task)?;
+//! let plan = partial_order(&task, &plan, &Default::default());
+//!
+//! let text = "
+//!     format = \"elbowroom-likelihoods\"
+//!     version = 1
+//!     defaults = { becomes_true = 0.0, becomes_false = 0.0, start = 0.5, effect = 0.9 }
+//!     facts.whole.becomes_false = 0.25";
+//! let likelihoods = elbowroom_probability::likelihoods::read(text.as_bytes(), &task)?;
+//!
+//! let initial = Circumstances::initial(&task);
+//! let model = Model::new(task, plan, &likelihoods, Semantics::Paper)?;
+//! let mut search = OrderSearch::new(Arc::new(model), SearchSettings::default());
+//! let found = search.best_order(&initial, &mut patient)?;
+//! // It starts, the lamp stays whole for one step, and the effect takes place.
+//! let order = found.order.ok_or("there is a way")?;
+//! assert!((order.probability - 0.5 * 0.75 * 0.9).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
 mod belief;
 mod circumstances;
 pub mod dispatch;
 pub mod likelihoods;
+mod lookahead;
 mod model;
 mod network;
 pub mod optimum;
@@ -13,6 +75,7 @@ pub use belief::Belief;
 pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
 pub use likelihoods::{Flip, Likelihoods};
+pub use lookahead::Lookahead;
 pub use model::{Model, Semantics};
 pub use network::{PrunedNetwork, TooCoupled};
 pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop, Slot};

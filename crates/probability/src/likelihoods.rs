@@ -174,11 +174,7 @@ impl Likelihoods {
         let (predicate, _) = task.atom(fact);
         self.effect_of(action.schema, &action.arguments, predicate, makes_true)
             .ok_or_else(|| Missing {
-                what: format!(
-                    "the effect of {} on {}",
-                    action.name,
-                    task.fact_name(fact)
-                ),
+                what: format!("the effect of {} on {}", action.name, task.fact_name(fact)),
             })
     }
 
@@ -210,7 +206,9 @@ impl Likelihoods {
                 || (!makes_true && all.deletions.contains_key(predicate))
         };
         all.start.or(self.defaults.start).is_some()
-            && affected.iter().all(|(predicate, makes_true)| is_stated(predicate, *makes_true))
+            && affected
+                .iter()
+                .all(|(predicate, makes_true)| is_stated(predicate, *makes_true))
     }
 
     fn success_of(&self, schema: SchemaId, arguments: &[ObjectId]) -> Option<&Success> {

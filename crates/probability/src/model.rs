@@ -122,7 +122,10 @@ impl Model {
 
     /// The facts that matter to the plan.
     pub fn facts(&self) -> impl Iterator<Item = FactId> + '_ {
-        self.facts.iter().copied().take_while(|&fact| self.is_fact(fact))
+        self.facts
+            .iter()
+            .copied()
+            .take_while(|&fact| self.is_fact(fact))
     }
 
     pub(crate) fn event(&self, node: NodeId) -> &Event {

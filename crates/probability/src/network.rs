@@ -3,6 +3,7 @@
 mod cluster;
 mod facts;
 mod numbers;
+mod outcome;
 
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_num::Rational;
@@ -10,10 +11,11 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
-use facts::{Facts, Outcome, Pending};
+use facts::Facts;
 pub(crate) use facts::Snapshot;
 pub(crate) use numbers::Number;
 use numbers::Numbers;
+use outcome::{Outcome, Pending};
 
 /// A condition couples more facts than can be tracked exactly.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -372,14 +374,15 @@ impl<'m> PrunedNetwork<'m> {
         }
         // Effects on one fact go together, whether or not they are certain.
         let is_open = |fact: usize| uncertain.iter().any(|(_, outcome)| outcome.fact == fact);
-        let (joint, apart): (Vec<_>, Vec<_>) =
-            certain.into_iter().partition(|outcome| is_open(outcome.fact));
+        let (joint, apart): (Vec<_>, Vec<_>) = certain
+            .into_iter()
+            .partition(|outcome| is_open(outcome.fact));
         uncertain.extend(joint.into_iter().map(|outcome| (None, outcome)));
         let pending = Pending {
             apart,
             is_step: event.is_step,
         };
-        self.facts_transform_with(node, &uncertain, pending)
+        self.facts_transform_with(node, &uncertain, &pending)
     }
 
     fn facts_transform(
@@ -392,18 +395,18 @@ impl<'m> PrunedNetwork<'m> {
             apart: Vec::new(),
             is_step,
         };
-        self.facts_transform_with(node, guarded, pending)
+        self.facts_transform_with(node, guarded, &pending)
     }
 
     fn facts_transform_with(
         &mut self,
         node: NodeId,
         guarded: &[(Option<Condition>, Outcome)],
-        pending: Pending,
+        pending: &Pending,
     ) -> Result<(), TooCoupled> {
         let (model, numbers) = (self.model, &self.numbers);
         let value = |leaf: &Expression| numbers.value(model, leaf, None);
-        let changed = self.facts.apply_guarded(model, guarded, &pending, &value);
+        let changed = self.facts.apply_guarded(model, guarded, pending, &value);
         changed.map_err(|count| self.too_coupled(node, count))
     }
 
@@ -447,7 +450,10 @@ const UNKNOWN: elbowroom_model::problem::UpdateOperator =
 
 fn present(after: &[(usize, Number)], numbers: &Numbers, fluent: usize) -> Number {
     let found = after.iter().find(|(other, _)| *other == fluent);
-    found.map_or_else(|| numbers.changing[fluent].clone(), |(_, number)| number.clone())
+    found.map_or_else(
+        || numbers.changing[fluent].clone(),
+        |(_, number)| number.clone(),
+    )
 }
 
 fn put(after: &mut Vec<(usize, Number)>, fluent: usize, number: Number) {

@@ -24,6 +24,7 @@
 //! limit.
 
 mod process;
+mod table;
 
 use elbowroom_plan::{InstanceId, NodeId};
 
@@ -113,7 +114,7 @@ impl Optimum {
     ///
     /// With [`Horizon::Unlimited`] it is approached from below; the sweeps stop when none of them
     /// adds more than 1e-12 to any state.
-    pub fn value(&self, process: &Perturbed<'_>, circumstances: &Circumstances) -> f64 {
+    pub fn value(&self, process: &Perturbed, circumstances: &Circumstances) -> f64 {
         process
             .weights(circumstances)
             .into_iter()
@@ -124,7 +125,7 @@ impl Optimum {
     /// What to do, with all steps of the horizon still to come.
     ///
     /// Of an uncertain belief, the most likely state counts.
-    pub fn choose(&self, process: &Perturbed<'_>, circumstances: &Circumstances) -> Move {
+    pub fn choose(&self, process: &Perturbed, circumstances: &Circumstances) -> Move {
         let mut weights = process.weights(circumstances);
         weights.sort_by(|(.., a), (.., b)| b.total_cmp(a));
         let likeliest = weights.first();

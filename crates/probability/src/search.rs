@@ -1,4 +1,4 @@
-//! PGen: the order of a plan's happenings that is most likely to succeed.
+//! `PGen`: the order of a plan's happenings that is most likely to succeed.
 //!
 //! Branch and bound over sequences of happenings (paper 2, section 2.2.1), depth first, the most
 //! promising happening first. A sequence is given up when
@@ -7,8 +7,8 @@
 //!   probability 0;
 //! - there is no time for them: durations, their bounds, timed initials and now leave no schedule;
 //! - no way to go on can beat the best order found (a sharper bound than the paper's P(A), see
-//!   [`bound`]);
-//! - another sequence has done the same and stands at least as well (see [`memo`]).
+//!   `search/bound.rs`);
+//! - another sequence has done the same and stands at least as well (see `search/memo.rs`).
 //!
 //! Unlike the published code this keeps the best order found, starts from the belief as it is now,
 //! and lets actions be done again that were done before.
@@ -18,22 +18,23 @@ mod bound;
 mod cache;
 mod memo;
 mod nominal;
+mod run;
 mod timing;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::{Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
 use crate::total_order::TotalOrderPlan;
-use bound::{Bounds, Outlook};
+use bound::Bounds;
 use cache::Cache;
-use memo::Memo;
 use nominal::Nominal;
+use run::Run;
 use timing::{Separations, Timing};
 
 /// Which sequences are orders of the plan.
@@ -150,12 +151,12 @@ impl OrderSearch {
         let key = cache::key(&self.model, circumstances, has_deadlines);
         if let Some(known) = self.cache.get(&key) {
             return Ok(Found {
-                order: known.map(|order| order.from(&circumstances.now)),
+                order: known.from(&circumstances.now),
                 stop: SearchStop::Complete,
                 sequences: 0,
             });
         }
-        let found = self.search(circumstances, has_deadlines, watch)?;
+        let found = self.search(circumstances, watch)?;
         if found.stop == SearchStop::Complete {
             let order = found.order.as_ref();
             self.cache.put(key, order, &circumstances.now);
@@ -166,7 +167,6 @@ impl OrderSearch {
     fn search(
         &self,
         circumstances: &Circumstances,
-        has_deadlines: bool,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Found, TooCoupled> {
         let model = &*self.model;
@@ -183,34 +183,12 @@ impl OrderSearch {
         if must_work && !works {
             return Ok(nothing(0));
         }
-        let now = &circumstances.now;
-        let next_timed = self.separations.timed.iter();
-        let next_timed = next_timed.take_while(|(_, time)| time <= now).count();
-        let mut is_used = vec![false; model.plan().instances.len()];
-        for running in &circumstances.running {
-            is_used[running.instance.index()] = true;
-        }
-        let mut run = Run {
-            search: self,
-            model,
-            must_work,
-            has_deadlines,
-            network: PrunedNetwork::new(model, circumstances)?,
-            nominal,
-            timing,
-            is_used,
-            is_placed: vec![false; model.plan().nodes.len()],
-            next_timed,
-            memo: Memo::new(model, &self.separations),
-            best: None,
-            sequences: 0,
-            watch,
-        };
+        let mut run = Run::new(self, circumstances, nominal, timing, watch)?;
         let stop = match run.explore()? {
             ControlFlow::Continue(()) => SearchStop::Complete,
             ControlFlow::Break(()) => SearchStop::Interrupted,
         };
-        let (best, sequences) = (run.best.take(), run.sequences);
+        let (best, sequences) = run.finish();
         let order = match best {
             None => None,
             Some((probability, sequence)) => {
@@ -278,233 +256,4 @@ pub struct Slot {
     pub earliest: Rational,
     /// Not after; `None` if as late as one likes.
     pub latest: Option<Rational>,
-}
-
-struct Run<'s, 'w> {
-    search: &'s OrderSearch,
-    model: &'s Model,
-    must_work: bool,
-    has_deadlines: bool,
-    network: PrunedNetwork<'s>,
-    nominal: Nominal,
-    timing: Timing<'s>,
-    is_used: Vec<bool>,
-    is_placed: Vec<bool>,
-    /// The next of the timed initials that matter.
-    next_timed: usize,
-    memo: Memo,
-    best: Option<(f64, Vec<NodeId>)>,
-    sequences: usize,
-    watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
-}
-
-/// Two probabilities closer than this, relatively, count as equal.
-const TIE: f64 = 1e-12;
-
-impl Run<'_, '_> {
-    /// Looks at the sequence so far, and at all that begin with it.
-    fn explore(&mut self) -> Result<ControlFlow<()>, TooCoupled> {
-        self.sequences += 1;
-        let progress = Progress {
-            sequences: self.sequences,
-            best: self.best.as_ref().map(|(probability, _)| *probability),
-        };
-        if (self.watch)(&progress).is_break() {
-            return Ok(ControlFlow::Break(()));
-        }
-        self.consider()?;
-        let mut promising = Vec::new();
-        for node in self.next() {
-            if let Some(bound) = self.push(node)? {
-                promising.push((bound, node));
-                self.pop(node);
-            }
-        }
-        promising.sort_by(|(a, first), (b, second)| b.total_cmp(a).then(first.cmp(second)));
-        for (bound, node) in promising {
-            if !self.can_beat(bound) {
-                continue;
-            }
-            if self.push(node)?.is_none() {
-                continue;
-            }
-            let deeper = if self.timing.push(self.model, node, self.timed_before(node)) {
-                let deeper = if self.is_dominated() {
-                    ControlFlow::Continue(())
-                } else {
-                    self.explore()?
-                };
-                self.timing.pop();
-                deeper
-            } else {
-                ControlFlow::Continue(())
-            };
-            self.pop(node);
-            if deeper.is_break() {
-                return Ok(deeper);
-            }
-        }
-        Ok(ControlFlow::Continue(()))
-    }
-
-    /// The position among the timed initials that `node` itself has, if it is one.
-    fn timed_before(&self, node: NodeId) -> usize {
-        let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
-        self.next_timed - usize::from(is_timed)
-    }
-
-    /// Whether something of that probability, or of any up to that bound, could be better than the
-    /// best so far.
-    fn can_beat(&self, bound: f64) -> bool {
-        match &self.best {
-            None => bound > 0.0,
-            Some((best, order)) => {
-                bound > best * (1.0 + TIE)
-                    || (bound >= best * (1.0 - TIE) && self.length() < order.len())
-            }
-        }
-    }
-
-    fn length(&self) -> usize {
-        self.network.sequence().len() + self.network.running().len()
-    }
-
-    /// Keeps the sequence so far, if it is an order and better than the best.
-    fn consider(&mut self) -> Result<(), TooCoupled> {
-        let last = self.network.sequence().last();
-        let is_timed = |node: &NodeId| {
-            matches!(self.model.plan().nodes[node.index()], Node::Timed(_))
-        };
-        if !self.network.running().is_empty() || last.is_some_and(is_timed) {
-            return Ok(());
-        }
-        if self.must_work {
-            let checkpoint = self.nominal.checkpoint();
-            let works = self.nominal.admit(self.model, &self.model.goal);
-            self.nominal.undo_to(checkpoint);
-            if !works {
-                return Ok(());
-            }
-        }
-        let probability = self.network.success_probability()?;
-        let length = self.network.sequence().len();
-        let is_better = match &self.best {
-            None => probability > 0.0,
-            Some((best, order)) => {
-                probability > best * (1.0 + TIE)
-                    || (probability >= best * (1.0 - TIE) && length < order.len())
-            }
-        };
-        if is_better {
-            self.best = Some((probability, self.network.sequence().to_vec()));
-        }
-        Ok(())
-    }
-
-    /// What could be next, time and probabilities aside.
-    fn next(&self) -> Vec<NodeId> {
-        let separations = &self.search.separations;
-        let mut next = Vec::new();
-        for (id, _) in self.model.plan().instances() {
-            let (start, end) = (
-                separations.starts[id.index()],
-                separations.ends[id.index()],
-            );
-            let node = if !self.is_used[id.index()] {
-                start
-            } else if start != end && self.network.running().contains(&id) {
-                end
-            } else {
-                continue;
-            };
-            if separations.may_follow(node, &|other| self.is_placed[other.index()]) {
-                next.push(node);
-            }
-        }
-        next.extend(separations.timed.get(self.next_timed).map(|(node, _)| *node));
-        next
-    }
-
-    /// Adds a happening to everything but the timing; the bound of all that can follow, unless
-    /// the happening is impossible or the bound is not good enough.
-    fn push(&mut self, node: NodeId) -> Result<Option<f64>, TooCoupled> {
-        let model = self.model;
-        let event = model.event(node);
-        self.memo.mark(self.nominal.checkpoint());
-        let what = model.plan().nodes[node.index()];
-        self.is_placed[node.index()] = true;
-        match what {
-            Node::Start(id) | Node::Instant(id) => self.is_used[id.index()] = true,
-            Node::Timed(_) => self.next_timed += 1,
-            Node::End(_) | Node::Zero => {}
-        }
-        let pushed = self.network.push(node);
-        let probability = match pushed {
-            Ok(probability) => probability,
-            Err(error) => {
-                self.unmark(node);
-                return Err(error);
-            }
-        };
-        let works = !self.must_work
-            || self.nominal.apply(model, event, self.network.running());
-        let bound = if works && probability > 0.0 {
-            self.bound()
-        } else {
-            0.0
-        };
-        if self.can_beat(bound) {
-            Ok(Some(bound))
-        } else {
-            self.pop(node);
-            Ok(None)
-        }
-    }
-
-    fn pop(&mut self, node: NodeId) {
-        self.network.pop();
-        self.unmark(node);
-    }
-
-    fn unmark(&mut self, node: NodeId) {
-        self.is_placed[node.index()] = false;
-        match self.model.plan().nodes[node.index()] {
-            Node::Start(id) | Node::Instant(id) => self.is_used[id.index()] = false,
-            Node::Timed(_) => self.next_timed -= 1,
-            Node::End(_) | Node::Zero => {}
-        }
-        let checkpoint = self.memo.unmark();
-        self.nominal.undo_to(checkpoint);
-    }
-
-    fn bound(&mut self) -> f64 {
-        let is_used = &self.is_used;
-        let is_free = |id: InstanceId| !is_used[id.index()];
-        let outlook = Outlook {
-            nominal: &self.nominal,
-            must_work: self.must_work,
-            is_free: &is_free,
-            has_timed: self.next_timed < self.search.separations.timed.len(),
-        };
-        self.search.bounds.bound(
-            self.model,
-            &mut self.network,
-            &outlook,
-            &self.search.separations,
-        )
-    }
-
-    /// Whether a sequence that has done the same stands at least as well.
-    fn is_dominated(&mut self) -> bool {
-        let has_timed = self.next_timed < self.search.separations.timed.len();
-        let room = self.timing.room(self.has_deadlines && has_timed);
-        self.memo.is_dominated(
-            self.model,
-            &self.nominal,
-            &mut self.network,
-            &self.is_used,
-            self.next_timed,
-            room,
-        )
-    }
 }

@@ -52,7 +52,8 @@ impl TotalOrderPlan {
         slots: Vec<Slot>,
     ) -> Self {
         let sequence = network.sequence().to_vec();
-        let mut running = circumstances.running.iter().map(|r| r.instance).collect();
+        let running = circumstances.running.iter();
+        let mut running: Vec<InstanceId> = running.map(|running| running.instance).collect();
         let mut under_way = vec![sorted(&running)];
         for &node in &sequence {
             step(model, &mut running, node);
@@ -82,8 +83,8 @@ impl TotalOrderPlan {
     }
 }
 
-fn sorted(running: &Vec<InstanceId>) -> Vec<InstanceId> {
-    let mut running = running.clone();
+fn sorted(running: &[InstanceId]) -> Vec<InstanceId> {
+    let mut running = running.to_vec();
     running.sort_unstable();
     running
 }
@@ -100,7 +101,8 @@ impl Layer {
     /// Whether what is believed fits: whether each fact is more likely to be as required than not,
     /// all conditions hold of what is more likely, and the same actions are under way.
     pub fn fits(&self, model: &Model, circumstances: &Circumstances) -> bool {
-        let mut running: Vec<InstanceId> = circumstances.running.iter().map(|r| r.instance).collect();
+        let mut running: Vec<InstanceId> =
+            circumstances.running.iter().map(|r| r.instance).collect();
         running.sort_unstable();
         running == self.running && self.holds(model, circumstances)
     }
@@ -113,7 +115,9 @@ impl Layer {
             _ => None,
         };
         let task = model.task();
-        self.literals.iter().all(|&(fact, truth)| is_likely(fact) == truth)
+        self.literals
+            .iter()
+            .all(|&(fact, truth)| is_likely(fact) == truth)
             && self.conditions.iter().all(|condition| {
                 // A number that is not known now cannot speak against it.
                 evaluate(task, condition, &is_likely, &value).unwrap_or(true)

@@ -1,4 +1,5 @@
-//! PGen against all orders tried one after the other.
+//! `PGen` against all orders tried one after the other.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
 mod twin;
@@ -12,9 +13,16 @@ use rand_chacha::ChaCha8Rng;
 use twin::random::{Case, Taste, case};
 
 fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> bool {
-    let model = Model::new(case.task.clone(), case.plan.clone(), &case.likelihoods, semantics);
+    let model = Model::new(
+        case.task.clone(),
+        case.plan.clone(),
+        &case.likelihoods,
+        semantics,
+    );
     let mut search = OrderSearch::new(model.unwrap(), settings);
-    let found = search.best_order(&case.circumstances, &mut patient).unwrap();
+    let found = search
+        .best_order(&case.circumstances, &mut patient)
+        .unwrap();
     let best = twin::orders::best(case, semantics, &search);
     let words = format!(
         "{}\n{:?}\n{:?} {semantics:?}",
@@ -26,7 +34,10 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> bool 
         (None, None) => {}
         (Some(order), Some(best)) => {
             let p = order.probability;
-            assert!((p - best).abs() <= 1e-9 * best, "{p} is not {best}: {words}\n{order:?}");
+            assert!(
+                (p - best).abs() <= 1e-9 * best,
+                "{p} is not {best}: {words}\n{order:?}"
+            );
             // What is claimed of the order holds of it.
             let mut network = PrunedNetwork::new(search.model(), &case.circumstances).unwrap();
             for &node in &order.sequence {
@@ -37,7 +48,9 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> bool 
         (found, best) => panic!("{found:?} is not {best:?}: {words}"),
     }
     // Asked again, it knows.
-    let again = search.best_order(&case.circumstances, &mut patient).unwrap();
+    let again = search
+        .best_order(&case.circumstances, &mut patient)
+        .unwrap();
     assert_eq!((again.order, again.sequences), (found.order.clone(), 0));
     found.order.is_some_and(|order| order.sequence.len() > 1)
 }

@@ -1,4 +1,5 @@
 //! The pruned network against worlds spelt out one by one.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
 
 mod shared;
 mod twin;
@@ -21,7 +22,12 @@ const FACTORED: Taste = Taste {
 
 /// Pushes random orders, taking back some happenings on the way, and compares at each step.
 fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
-    let model = Model::new(case.task.clone(), case.plan.clone(), &case.likelihoods, semantics);
+    let model = Model::new(
+        case.task.clone(),
+        case.plan.clone(),
+        &case.likelihoods,
+        semantics,
+    );
     let model = model.unwrap();
     let mut network = PrunedNetwork::new(&model, &case.circumstances).unwrap();
     let mut possible = 0;
@@ -42,14 +48,22 @@ fn compare(case: &Case, semantics: Semantics, rng: &mut ChaCha8Rng) -> usize {
             let pushed = network.push(node).unwrap();
             worlds.push(node);
             let actions = worlds.actions_probability();
-            let words = || {
+            let story = || {
                 let order = order[..=at].iter().map(|&node| model.node_words(node));
                 format!("{}\n{:?}", case.text, order.collect::<Vec<_>>())
             };
-            assert!((pushed - actions).abs() < 1e-12, "{pushed} {actions} {}", words());
+            assert!(
+                (pushed - actions).abs() < 1e-12,
+                "{pushed} {actions} {}",
+                story()
+            );
             let success = network.success_probability().unwrap();
             let expected = worlds.success_probability();
-            assert!((success - expected).abs() < 1e-12, "{success} {expected} {}", words());
+            assert!(
+                (success - expected).abs() < 1e-12,
+                "{success} {expected} {}",
+                story()
+            );
             possible += usize::from(actions > 0.0);
         }
         while !network.sequence().is_empty() {

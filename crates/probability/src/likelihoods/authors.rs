@@ -160,7 +160,10 @@ impl Reader<'_> {
             let predicate = &self.problem.predicates[predicate.index()].name;
             self.mistakes.add(
                 name.span.clone(),
-                format!("the effect of `{}` on {predicate} has no probability", name.text),
+                format!(
+                    "the effect of `{}` on {predicate} has no probability",
+                    name.text
+                ),
                 format!("add `{predicate}%P`"),
             );
         }
@@ -226,7 +229,11 @@ impl Reader<'_> {
                 missing.len() < 4
             });
             if let [first, more @ ..] = missing.as_slice() {
-                let others = if more.is_empty() { "" } else { ", and of others" };
+                let others = if more.is_empty() {
+                    ""
+                } else {
+                    ", and of others"
+                };
                 self.mistakes.add(
                     separator.clone(),
                     format!("the file says nothing of {first}{others}"),

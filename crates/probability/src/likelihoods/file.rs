@@ -49,6 +49,9 @@ pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> 
 type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
 type Value<'a> = Spanned<DeValue<'a>>;
 
+/// A mistake that has been noted.
+struct Noted;
+
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
@@ -61,7 +64,9 @@ impl Reader<'_> {
     }
 
     fn document(&mut self, document: &DeTable<'_>) {
-        const SECTIONS: [&str; 6] = ["format", "version", "defaults", "facts", "actions", "beliefs"];
+        const SECTIONS: [&str; 6] = [
+            "format", "version", "defaults", "facts", "actions", "beliefs",
+        ];
         self.header(document);
         for (key, value) in document {
             match key.get_ref().as_ref() {
@@ -128,7 +133,10 @@ impl Reader<'_> {
     ) {
         match value.get_ref() {
             DeValue::Table(table) => {
-                for (key, value) in table {
+                // In the order of the file, so that of two mistakes the second is the mistake.
+                let mut entries: Vec<_> = table.iter().collect();
+                entries.sort_by_key(|(key, _)| key.span().start);
+                for (key, value) in entries {
                     entry(self, key, value);
                 }
             }
@@ -163,19 +171,25 @@ impl Reader<'_> {
             return;
         };
         let mut flip = PartialFlip::default();
-        self.each(key, value, &mut |reader, key, value| {
-            match key.get_ref().as_ref() {
+        self.each(
+            key,
+            value,
+            &mut |reader, key, value| match key.get_ref().as_ref() {
                 "becomes_true" => flip.becomes_true = reader.probability(value),
                 "becomes_false" => flip.becomes_false = reader.probability(value),
                 _ => reader.unknown(key, &["becomes_true", "becomes_false"]),
-            }
-        });
+            },
+        );
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (predicate, arguments);
                 self.likelihoods.facts.insert(key, flip).is_none()
             }
-            None => self.likelihoods.predicates.insert(predicate, flip).is_none(),
+            None => self
+                .likelihoods
+                .predicates
+                .insert(predicate, flip)
+                .is_none(),
         };
         self.check_new(is_new, key);
     }
@@ -188,19 +202,21 @@ impl Reader<'_> {
             Err(objection) => return self.object(key.span(), objection),
         };
         let parameters = &self.problem.schemas[schema.index()].parameters;
-        let Some(arguments) = self.arguments(key, name, parameters, words) else {
+        let Ok(arguments) = self.arguments(key, name, parameters, words) else {
             return;
         };
         let mut success = Success::default();
-        self.each(key, value, &mut |reader, key, value| {
-            match key.get_ref().as_ref() {
+        self.each(
+            key,
+            value,
+            &mut |reader, key, value| match key.get_ref().as_ref() {
                 "start" => success.start = reader.probability(value),
                 "effects" => reader.each(key, value, &mut |reader, key, value| {
                     reader.effect(schema, key, value, &mut success);
                 }),
                 _ => reader.unknown(key, &["start", "effects"]),
-            }
-        });
+            },
+        );
         let is_new = match arguments {
             Some(arguments) => {
                 let key = (schema, arguments);
@@ -272,7 +288,7 @@ impl Reader<'_> {
         match names::predicate(self.problem, name) {
             Ok(predicate) => {
                 let parameters = &self.problem.predicates[predicate.index()].parameters;
-                let arguments = self.arguments(key, name, parameters, words)?;
+                let arguments = self.arguments(key, name, parameters, words).ok()?;
                 Some((predicate, arguments))
             }
             Err(objection) => {
@@ -282,23 +298,23 @@ impl Reader<'_> {
         }
     }
 
-    /// The objects in a key; inside, `None` if there are none where there could be some.
+    /// The objects in a key; `None` if there are none where there could be some.
     fn arguments<'k>(
         &mut self,
         key: &Key<'_>,
         of: &str,
         parameters: &[elbowroom_model::problem::Variable],
         words: impl Iterator<Item = &'k str>,
-    ) -> Option<Option<Vec<ObjectId>>> {
+    ) -> Result<Option<Vec<ObjectId>>, Noted> {
         let mut words = words.peekable();
         if words.peek().is_none() && !parameters.is_empty() {
-            return Some(None);
+            return Ok(None);
         }
         match names::arguments(self.problem, of, parameters, words) {
-            Ok(objects) => Some(Some(objects)),
+            Ok(objects) => Ok(Some(objects)),
             Err(objection) => {
                 self.object(key.span(), objection);
-                None
+                Err(Noted)
             }
         }
     }
@@ -393,7 +409,7 @@ impl Reader<'_> {
             }
             for &(predicate, makes_true) in &affected {
                 let effect = self.likelihoods.effect_of(id, tuple, predicate, makes_true);
-                if effect.is_none() {
+                if missing.is_none() && effect.is_none() {
                     let name = self.problem.apply_name(&schema.name, tuple);
                     let predicate = &self.problem.predicates[predicate.index()].name;
                     missing = Some(format!("how likely the effect of {name} on {predicate} is"));

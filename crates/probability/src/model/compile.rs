@@ -236,12 +236,7 @@ impl Compiler<'_> {
         guard.now = Condition::And(vec![Condition::Fact(memory), now]);
     }
 
-    fn effect(
-        &self,
-        action: &Action,
-        effect: &Effect,
-        event: &mut Event,
-    ) -> Result<(), Missing> {
+    fn effect(&self, action: &Action, effect: &Effect, event: &mut Event) -> Result<(), Missing> {
         let guard = Some(effect.guard.now.clone()).filter(|guard| !guard.is_trivial());
         let (fact, makes_true) = match &effect.change {
             Change::Add(fact) => (*fact, true),
@@ -265,7 +260,9 @@ impl Compiler<'_> {
         let compiled = FactEffect {
             fact: self.position(fact),
             makes_true,
-            probability: self.likelihoods.effect(self.task, action, fact, makes_true)?,
+            probability: self
+                .likelihoods
+                .effect(self.task, action, fact, makes_true)?,
             guard,
             is_certain: false,
         };

@@ -65,11 +65,6 @@ impl Requirement {
         requirement.literals.dedup();
         requirement
     }
-
-    /// Whether nothing is required.
-    pub(crate) fn is_trivial(&self) -> bool {
-        self.literals.is_empty() && self.numeric.is_empty() && self.coupled.is_empty()
-    }
 }
 
 /// Whether rules define the fact. Memories have ids beyond the task's table.
@@ -92,7 +87,9 @@ pub(crate) fn visit_facts(task: &Task, condition: &Condition, visit: &mut impl F
 pub(crate) fn negations_inwards(condition: &Condition, is_positive: bool) -> Condition {
     let all = |parts: &[Condition]| {
         let parts = parts.iter();
-        parts.map(|part| negations_inwards(part, is_positive)).collect()
+        parts
+            .map(|part| negations_inwards(part, is_positive))
+            .collect()
     };
     match condition {
         Condition::Not(part) => negations_inwards(part, !is_positive),

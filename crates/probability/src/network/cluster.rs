@@ -80,7 +80,11 @@ impl Cluster {
             for (place, kernel) in places.iter().zip(kernels(before)) {
                 let bit = 1 << place;
                 let was_true = before & bit != 0;
-                let p = if was_true { kernel.if_true } else { kernel.if_false };
+                let p = if was_true {
+                    kernel.if_true
+                } else {
+                    kernel.if_false
+                };
                 let mut next = Vec::with_capacity(outcomes.len() * 2);
                 for (index, weight) in outcomes {
                     next.push((index | bit, weight * p));

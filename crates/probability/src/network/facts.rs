@@ -8,9 +8,9 @@ use elbowroom_model::ground::{Condition, Expression, FactId};
 use elbowroom_num::Rational;
 
 use super::cluster::{Cluster, Kernel};
+use super::outcome::{Outcome, Pending, by_itself, kernel};
 use crate::belief::Belief;
-use crate::likelihoods::Flip;
-use crate::model::{FactEffect, Model, Semantics, evaluate, visit_facts};
+use crate::model::{Model, evaluate, visit_facts};
 
 /// How many facts a cluster can have: 2^16 numbers.
 pub(super) const MOST_COUPLED: usize = 16;
@@ -47,34 +47,6 @@ pub(super) struct Checkpoint {
     layer: u32,
     undo: usize,
     clusters: usize,
-}
-
-/// An effect that takes place, with its chance to fail.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Outcome {
-    pub(super) fact: usize,
-    pub(super) makes_true: bool,
-    pub(super) probability: f64,
-    pub(super) is_certain: bool,
-}
-
-impl From<&FactEffect> for Outcome {
-    fn from(effect: &FactEffect) -> Self {
-        Self {
-            fact: effect.fact,
-            makes_true: effect.makes_true,
-            probability: effect.probability,
-            is_certain: effect.is_certain,
-        }
-    }
-}
-
-/// What happens besides guarded effects.
-pub(super) struct Pending {
-    /// Unconditional effects on other facts.
-    pub(super) apart: Vec<Outcome>,
-    /// Whether facts change by themselves afterwards.
-    pub(super) is_step: bool,
 }
 
 /// The distribution of some facts at one moment.
@@ -153,13 +125,7 @@ impl Facts {
         mass
     }
 
-    fn require_in_cluster(
-        &mut self,
-        model: &Model,
-        slot: u32,
-        fact: usize,
-        truth: bool,
-    ) -> f64 {
+    fn require_in_cluster(&mut self, model: &Model, slot: u32, fact: usize, truth: bool) -> f64 {
         let mut cluster = self.cluster(model, slot).clone();
         let bit = 1 << cluster.place(fact);
         let mass = cluster.condition(|index| (index & bit != 0) == truth);
@@ -331,12 +297,10 @@ impl Facts {
     fn open(&mut self, model: &Model, facts: &[usize]) -> Vec<usize> {
         let mut open = Vec::new();
         for &fact in facts {
-            let is_open = match self.records[fact].cluster {
-                Some(_) => true,
-                None => {
-                    let p = self.single(model, fact);
-                    p > 0.0 && p < 1.0
-                }
+            let is_coupled = self.records[fact].cluster.is_some();
+            let is_open = is_coupled || {
+                let p = self.single(model, fact);
+                p > 0.0 && p < 1.0
             };
             if is_open {
                 open.push(fact);
@@ -369,7 +333,9 @@ impl Facts {
                 None => singles.push(fact),
             }
         }
-        let in_clusters = slots.iter().map(|&slot| self.cluster(model, slot).facts.len());
+        let in_clusters = slots
+            .iter()
+            .map(|&slot| self.cluster(model, slot).facts.len());
         let count = in_clusters.sum::<usize>() + singles.len();
         if count > MOST_COUPLED {
             return Err(count);
@@ -418,7 +384,13 @@ impl Facts {
             let is_true = cluster.mass(|index| index & bit == 0) == 0.0;
             if is_false || is_true || cluster.facts.len() == 1 {
                 cluster.remove(place);
-                let p = if is_false { 0.0 } else if is_true { 1.0 } else { p };
+                let p = if is_false {
+                    0.0
+                } else if is_true {
+                    1.0
+                } else {
+                    p
+                };
                 let record = Record {
                     layer: cluster.layer,
                     p,
@@ -567,71 +539,4 @@ fn read(model: &Model, condition: &Condition) -> Vec<usize> {
     facts.sort_unstable();
     facts.dedup();
     facts
-}
-
-/// A fact changing by itself.
-fn by_itself(flip: Flip) -> Kernel {
-    Kernel {
-        if_true: 1.0 - flip.becomes_false,
-        if_false: flip.becomes_true,
-    }
-}
-
-/// What the effects that take place do to their fact; deletions come before additions.
-fn kernel<'a>(
-    model: &Model,
-    fact: usize,
-    outcomes: impl Iterator<Item = &'a Outcome>,
-    is_step: bool,
-) -> Kernel {
-    let (mut stays, mut comes_not) = (1.0, 1.0);
-    let (mut adds, mut deletes, mut is_certain) = (false, false, false);
-    for outcome in outcomes {
-        is_certain |= outcome.is_certain;
-        if outcome.makes_true {
-            adds = true;
-            comes_not *= 1.0 - outcome.probability;
-        } else {
-            deletes = true;
-            stays *= 1.0 - outcome.probability;
-        }
-    }
-    let flip = model.flips[fact];
-    if !adds && !deletes {
-        return if is_step {
-            by_itself(flip)
-        } else {
-            Kernel {
-                if_true: 1.0,
-                if_false: 0.0,
-            }
-        };
-    }
-    let comes = 1.0 - comes_not;
-    match model.semantics() {
-        // A deletion that fails leaves the fact true, an addition that fails leaves it false.
-        Semantics::Paper => {
-            let rest = if deletes { stays } else { 0.0 };
-            let p = comes + comes_not * rest;
-            Kernel {
-                if_true: p,
-                if_false: p,
-            }
-        }
-        Semantics::World => {
-            let after = Kernel {
-                if_true: stays + (1.0 - stays) * comes,
-                if_false: comes,
-            };
-            if is_step && !is_certain {
-                let flipped = by_itself(flip);
-                Kernel {
-                    if_true: flipped.apply(after.if_true),
-                    if_false: flipped.apply(after.if_false),
-                }
-            } else {
-                after
-            }
-        }
-    }
 }

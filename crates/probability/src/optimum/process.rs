@@ -1,19 +1,21 @@
 //! The Markov decision process of a perturbed world, and dynamic programming over it.
 
-use elbowroom_model::ground::{Condition, FactId};
+use std::sync::Arc;
+
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
+use super::table::{check, holds, table};
 use super::{Horizon, Move, NotSmall, Optimum, Settings};
 use crate::circumstances::Circumstances;
-use crate::model::{Event, Model, Requirement, Semantics, evaluate};
+use crate::model::{Event, Model, Requirement};
 
 /// More states than this are not tabulated.
 const MOST_STATES: usize = 1 << 22;
 
 /// See [`optimum`](super).
 #[derive(Clone, Debug)]
-pub struct Perturbed<'m> {
-    model: &'m Model,
+pub struct Perturbed {
+    model: Arc<Model>,
     settings: Settings,
     /// The sets of actions that can be under way, as bits, those with fewer actions first.
     sets: Vec<u32>,
@@ -30,15 +32,16 @@ pub struct Perturbed<'m> {
     ends: Vec<NodeId>,
 }
 
-impl<'m> Perturbed<'m> {
+impl Perturbed {
     /// The world in which the actions of the model's plan can be done, again and again.
     ///
     /// # Errors
     /// When it is not small enough, or not of this kind.
-    pub fn new(model: &'m Model, settings: Settings) -> Result<Self, NotSmall> {
+    pub fn new(model: impl Into<Arc<Model>>, settings: Settings) -> Result<Self, NotSmall> {
+        let model: Arc<Model> = model.into();
         let instances = model.plan().instances.len();
         let facts = model.facts.len();
-        check(model)?;
+        check(&model)?;
         let too_many = || NotSmall::TooManyStates {
             facts,
             actions: instances,
@@ -52,9 +55,8 @@ impl<'m> Perturbed<'m> {
             .filter(|(_, instance)| instance.action.durative().is_some())
             .map(|(id, _)| 1 << id.0)
             .sum();
-        let fits = |set: &u32| {
-            set & !durative == 0 && set.count_ones() as usize <= settings.most_running
-        };
+        let fits =
+            |set: &u32| set & !durative == 0 && set.count_ones() as usize <= settings.most_running;
         let mut sets: Vec<u32> = (0..1 << instances).filter(fits).collect();
         sets.sort_by_key(|set| (set.count_ones(), *set));
         if sets.len() << facts > MOST_STATES {
@@ -64,22 +66,33 @@ impl<'m> Perturbed<'m> {
         for (at, &set) in sets.iter().enumerate() {
             place[set as usize] = at;
         }
-        let holds = |requirement: &Requirement| table(model, requirement);
+        let holds = |requirement: &Requirement| table(&model, requirement);
         let ids = || model.plan().instances().map(|(id, _)| id);
         let mut process = Self {
             settings,
             sets,
             place,
-            is_possible: model.events.iter().map(|event| holds(&event.condition)).collect(),
-            goes_on: ids().map(|id| holds(&model.event(model.start(id)).over_all)).collect(),
+            is_possible: model
+                .events
+                .iter()
+                .map(|event| holds(&event.condition))
+                .collect(),
+            goes_on: ids()
+                .map(|id| holds(&model.event(model.start(id)).over_all))
+                .collect(),
             goal: holds(&model.goal),
             is_solvable: Vec::new(),
             starts: ids().map(|id| model.start(id)).collect(),
             ends: ids().map(|id| model.end(id)).collect(),
-            model,
+            model: Arc::clone(&model),
         };
         process.is_solvable = process.solvable();
         Ok(process)
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
     }
 
     /// The rules.
@@ -96,6 +109,15 @@ impl<'m> Perturbed<'m> {
             sweeps: 0,
         };
         self.reward(&mut optimum.values);
+        // Letting go takes no step, so it can be done when none is left.
+        for set in 1..self.sets.len() {
+            for state in (0..states).filter(|state| self.goal[*state]) {
+                if let Some(id) = self.members(set).next() {
+                    optimum.values[set][state] = 1.0;
+                    optimum.moves[set][state] = Move::Abandon(id);
+                }
+            }
+        }
         loop {
             if matches!(self.settings.horizon, Horizon::Steps(most) if optimum.sweeps >= most) {
                 return optimum;
@@ -154,6 +176,13 @@ impl<'m> Perturbed<'m> {
         }
         let mut values = vec![vec![0.0; states]; self.sets.len()];
         self.reward(&mut values);
+        for set in 1..self.sets.len() {
+            for state in 0..states {
+                if let Move::Abandon(id) = moves[set][state] {
+                    values[set][state] = values[self.without(set, id)][state];
+                }
+            }
+        }
         let mut sweeps = 0;
         loop {
             if matches!(self.settings.horizon, Horizon::Steps(most) if sweeps >= most) {
@@ -178,7 +207,9 @@ impl<'m> Perturbed<'m> {
             }
         }
         let weights = self.weights(initial).into_iter();
-        weights.map(|(set, state, weight)| weight * values[set][state]).sum()
+        weights
+            .map(|(set, state, weight)| weight * values[set][state])
+            .sum()
     }
 
     /// The circumstances in which the facts are as in a state and a set of actions is under way.
@@ -202,19 +233,29 @@ impl<'m> Perturbed<'m> {
     pub(super) fn weights(&self, circumstances: &Circumstances) -> Vec<(usize, usize, f64)> {
         let running = circumstances.running.iter();
         let set: u32 = running.map(|running| 1 << running.instance.0).sum();
-        let Some(&set) = self.place.get(set as usize).filter(|place| **place != usize::MAX) else {
+        let Some(&set) = self
+            .place
+            .get(set as usize)
+            .filter(|place| **place != usize::MAX)
+        else {
             return Vec::new();
         };
         let mut weights = vec![(0, 1.0)];
         for (place, &fact) in self.model.facts.iter().enumerate() {
             let p = circumstances.belief.probability(fact);
             let split = |(state, weight): (usize, f64)| {
-                [(state | (1 << place), weight * p), (state, weight * (1.0 - p))]
+                [
+                    (state | (1 << place), weight * p),
+                    (state, weight * (1.0 - p)),
+                ]
             };
             weights = weights.into_iter().flat_map(split).collect();
             weights.retain(|(_, weight)| *weight > 0.0);
         }
-        weights.into_iter().map(|(state, weight)| (set, state, weight)).collect()
+        weights
+            .into_iter()
+            .map(|(state, weight)| (set, state, weight))
+            .collect()
     }
 
     fn reward(&self, values: &mut [Vec<f64>]) {
@@ -225,13 +266,18 @@ impl<'m> Perturbed<'m> {
 
     /// Whether nothing is left to decide: success, or no way to it.
     fn is_over(&self, set: usize, state: usize) -> bool {
-        (set == 0 && self.goal[state]) || (self.settings.needs_plan && !self.is_solvable[set][state])
+        (set == 0 && self.goal[state])
+            || (self.settings.needs_plan && !self.is_solvable[set][state])
     }
 
     fn members(&self, set: usize) -> impl Iterator<Item = InstanceId> + '_ {
         let bits = self.sets[set];
         let ids = self.model.plan().instances().map(|(id, _)| id);
         ids.filter(move |id| bits & (1 << id.0) != 0)
+    }
+
+    fn without(&self, set: usize, id: InstanceId) -> usize {
+        self.place[(self.sets[set] & !(1 << id.0)) as usize]
     }
 
     /// What can be done, in the order of the plan.
@@ -275,7 +321,7 @@ impl<'m> Perturbed<'m> {
     ) -> f64 {
         match option {
             Move::Stop => 0.0,
-            Move::Abandon(id) => values[self.place[(self.sets[set] & !(1 << id.0)) as usize]][state],
+            Move::Abandon(id) => values[self.without(set, id)][state],
             Move::Do(node) => {
                 let event = self.model.event(node);
                 let after = &flipped[self.set_after(set, node)];
@@ -291,7 +337,7 @@ impl<'m> Perturbed<'m> {
             event.effects.iter().filter(move |effect| {
                 let guard = effect.guard.as_ref();
                 effect.makes_true == makes_true
-                    && guard.is_none_or(|guard| holds(self.model, guard, state))
+                    && guard.is_none_or(|guard| holds(&self.model, guard, state))
             })
         };
         let mut outcomes = vec![(state, 1.0)];
@@ -299,13 +345,20 @@ impl<'m> Perturbed<'m> {
             let bit = 1 << effect.fact;
             let p = effect.probability;
             let split = |(state, weight): (usize, f64)| {
-                let done = if effect.makes_true { state | bit } else { state & !bit };
+                let done = if effect.makes_true {
+                    state | bit
+                } else {
+                    state & !bit
+                };
                 [(done, weight * p), (state, weight * (1.0 - p))]
             };
             outcomes = outcomes.into_iter().flat_map(split).collect();
             outcomes.retain(|(_, weight)| *weight > 0.0);
         }
-        outcomes.iter().map(|(state, weight)| weight * after[*state]).sum()
+        outcomes
+            .iter()
+            .map(|(state, weight)| weight * after[*state])
+            .sum()
     }
 
     /// The expected values before facts change by themselves, fact by fact.
@@ -350,17 +403,17 @@ impl<'m> Perturbed<'m> {
                     if solvable[set][state] {
                         continue;
                     }
-                    let leads_on = self.options(set, state).into_iter().any(|option| match option {
-                        Move::Do(node) => {
-                            let after = self.nominal(self.model.event(node), state);
-                            solvable[self.set_after(set, node)][after]
-                        }
-                        Move::Abandon(id) => {
-                            let fewer = self.sets[set] & !(1 << id.0);
-                            solvable[self.place[fewer as usize]][state]
-                        }
-                        Move::Stop => false,
-                    });
+                    let leads_on =
+                        self.options(set, state)
+                            .into_iter()
+                            .any(|option| match option {
+                                Move::Do(node) => {
+                                    let after = self.nominal(self.model.event(node), state);
+                                    solvable[self.set_after(set, node)][after]
+                                }
+                                Move::Abandon(id) => solvable[self.without(set, id)][state],
+                                Move::Stop => false,
+                            });
                     solvable[set][state] = leads_on;
                     is_changed |= leads_on;
                 }
@@ -377,62 +430,16 @@ impl<'m> Perturbed<'m> {
         for makes_true in [false, true] {
             for effect in event.effects.iter().filter(|e| e.makes_true == makes_true) {
                 let guard = effect.guard.as_ref();
-                if guard.is_none_or(|guard| holds(self.model, guard, state)) {
+                if guard.is_none_or(|guard| holds(&self.model, guard, state)) {
                     let bit = 1 << effect.fact;
-                    after = if makes_true { after | bit } else { after & !bit };
+                    after = if makes_true {
+                        after | bit
+                    } else {
+                        after & !bit
+                    };
                 }
             }
         }
         after
     }
-}
-
-/// Whether the model is of a world without numbers and time.
-fn check(model: &Model) -> Result<(), NotSmall> {
-    if model.semantics() != Semantics::World {
-        return Err(NotSmall::PaperSemantics);
-    }
-    let unsupported = |what: &str| NotSmall::Unsupported {
-        what: what.to_owned(),
-    };
-    if !model.fluents.is_empty() {
-        return Err(unsupported("actions change numbers"));
-    }
-    if !model.task().timed().is_empty() {
-        return Err(unsupported("facts change at fixed times"));
-    }
-    if model.events.iter().any(|event| !event.watches.is_empty()) {
-        return Err(unsupported("effects depend on what held throughout an action"));
-    }
-    let remembers = |event: &Event| event.effects.iter().any(|effect| effect.is_certain);
-    if model.events.iter().any(remembers) {
-        return Err(unsupported("effects depend on what held at the start of an action"));
-    }
-    Ok(())
-}
-
-/// In which states a requirement holds.
-fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
-    (0..1_usize << model.facts.len())
-        .map(|state| {
-            let literals = requirement.literals.iter();
-            let coupled = requirement.coupled.iter().map(|coupled| &coupled.condition);
-            literals
-                .copied()
-                .all(|(fact, truth)| (state & (1 << fact) != 0) == truth)
-                && requirement.numeric.iter().chain(coupled).all(|c| holds(model, c, state))
-        })
-        .collect()
-}
-
-fn holds(model: &Model, condition: &Condition, state: usize) -> bool {
-    let truth = |fact: FactId| model.position(fact).is_some_and(|at| state & (1 << at) != 0);
-    // Numbers do not change here.
-    let value = |leaf: &elbowroom_model::ground::Expression| match leaf {
-        elbowroom_model::ground::Expression::Fluent(fluent) => {
-            model.task().initial().values.get(fluent).cloned()
-        }
-        _ => None,
-    };
-    evaluate(model.task(), condition, &truth, &value).unwrap_or(false)
 }

@@ -43,7 +43,8 @@ fn least_sum(costs: &[Vec<f64>]) -> f64 {
             let at = row_of[column];
             let (mut delta, mut next) = (f64::INFINITY, 0);
             for other in (1..=size).filter(|&other| !is_done[other]) {
-                let reduced = costs[at - 1][other - 1] - row_potential[at] - column_potential[other];
+                let reduced =
+                    costs[at - 1][other - 1] - row_potential[at] - column_potential[other];
                 if reduced < least[other] {
                     least[other] = reduced;
                     previous[other] = column;
@@ -69,7 +70,9 @@ fn least_sum(costs: &[Vec<f64>]) -> f64 {
             column = before;
         }
     }
-    (1..=size).map(|column| costs[row_of[column] - 1][column - 1]).sum()
+    (1..=size)
+        .map(|column| costs[row_of[column] - 1][column - 1])
+        .sum()
 }
 
 #[cfg(test)]

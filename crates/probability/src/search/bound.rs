@@ -83,10 +83,7 @@ impl Bounds {
         let mut needs_at_end = Vec::new();
         let mut needs_throughout = Vec::new();
         for (id, _) in model.plan().instances() {
-            let (start, end) = (
-                separations.starts[id.index()],
-                separations.ends[id.index()],
-            );
+            let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             note(model.event(start), Some(id), false);
             needs_at_start.push(model.event(start).condition.literals.clone());
             needs_throughout.push(model.event(start).over_all.literals.clone());
@@ -225,10 +222,7 @@ impl Run<'_, '_, '_> {
         let mut steps = 0;
         let mut ends: Vec<InstanceId> = Vec::new();
         for (place, &id) in needed.iter().enumerate() {
-            let (start, end) = (
-                separations.starts[id.index()],
-                separations.ends[id.index()],
-            );
+            let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             if place >= running {
                 self.bound *= self.model.event(start).success;
                 steps += 1;
@@ -288,7 +282,9 @@ impl Run<'_, '_, '_> {
                 .map(|&literal| self.lasting(id, literal, before))
                 .product();
             let brings = brings.iter();
-            let kept: f64 = brings.map(|(chain, p)| chain.best_after(*p, after)).product();
+            let kept: f64 = brings
+                .map(|(chain, p)| chain.best_after(*p, after))
+                .product();
             lasting * kept
         };
         (0..queue.ends)
@@ -368,8 +364,8 @@ impl Run<'_, '_, '_> {
         let chain = Chain::of(self.model.flips[fact], truth);
         let of = |p: f64| if truth { p } else { 1.0 - p };
         // If it must be brought about, what it is now does not count.
-        let must_be_set = self.outlook.must_work
-            && self.outlook.nominal.truth(fact) == Truth::from(!truth);
+        let must_be_set =
+            self.outlook.must_work && self.outlook.nominal.truth(fact) == Truth::from(!truth);
         let mut best: f64 = 0.0;
         if !must_be_set {
             best = chain.best_after(of(self.network.marginal_at(fact)), steps);
@@ -425,7 +421,8 @@ impl Chain {
             return p;
         }
         let rest = becomes_true / sum;
-        let decayed = rest + (p - rest) * (1.0 - sum).powi(i32::try_from(steps).unwrap_or(i32::MAX));
+        let decayed =
+            rest + (p - rest) * (1.0 - sum).powi(i32::try_from(steps).unwrap_or(i32::MAX));
         decayed.max(rest)
     }
 }

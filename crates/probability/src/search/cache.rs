@@ -45,36 +45,38 @@ pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: b
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cache {
-    /// The orders, with the time at which they began.
-    known: IndexMap<Key, Option<(TotalOrderPlan, Rational)>>,
+    known: IndexMap<Key, Known>,
 }
 
 impl Cache {
-    /// What is known; inside, `None` if there is no order.
-    pub(super) fn get(&self, key: &Key) -> Option<Option<Known<'_>>> {
-        let known = self.known.get(key)?;
-        Some(known.as_ref().map(|(order, began)| Known { order, began }))
+    /// What is known.
+    pub(super) fn get(&self, key: &Key) -> Option<&Known> {
+        self.known.get(key)
     }
 
     pub(super) fn put(&mut self, key: Key, order: Option<&TotalOrderPlan>, now: &Rational) {
         if self.known.len() >= MOST {
             self.known.clear();
         }
-        let order = order.map(|order| (order.clone(), now.clone()));
-        self.known.insert(key, order);
+        let known = Known {
+            order: order.cloned(),
+            began: now.clone(),
+        };
+        self.known.insert(key, known);
     }
 }
 
-/// An order that was found at another time.
-pub(super) struct Known<'a> {
-    order: &'a TotalOrderPlan,
-    began: &'a Rational,
+/// What was found at another time.
+#[derive(Clone, Debug)]
+pub(super) struct Known {
+    order: Option<TotalOrderPlan>,
+    began: Rational,
 }
 
-impl Known<'_> {
-    /// The order as it is if it begins now.
-    pub(super) fn from(&self, now: &Rational) -> TotalOrderPlan {
-        let delay = now - self.began;
-        self.order.delayed(&delay)
+impl Known {
+    /// The order as it is if it begins now; `None` if there is none.
+    pub(super) fn from(&self, now: &Rational) -> Option<TotalOrderPlan> {
+        let delay = now - &self.began;
+        self.order.as_ref().map(|order| order.delayed(&delay))
     }
 }

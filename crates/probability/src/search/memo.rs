@@ -138,9 +138,8 @@ impl Memo {
             is_used: is_used.to_vec(),
             running,
             next_timed,
-            is_timed_last: last.is_some_and(|node| {
-                matches!(model.plan().nodes[node.index()], Node::Timed(_))
-            }),
+            is_timed_last: last
+                .is_some_and(|node| matches!(model.plan().nodes[node.index()], Node::Timed(_))),
             truths: (0..need.len())
                 .filter(matters)
                 .map(|fact| nominal.truth(fact))
@@ -188,7 +187,9 @@ fn ratio(from: &Snapshot, than: &Snapshot, need: &Need) -> f64 {
             return 0.0;
         }
         let pairs = own.iter().zip(weights);
-        ratio *= pairs.map(|(&own, &its)| part(own, its)).fold(f64::INFINITY, f64::min);
+        ratio *= pairs
+            .map(|(&own, &its)| part(own, its))
+            .fold(f64::INFINITY, f64::min);
     }
     if from.single.len() != than.single.len() {
         return 0.0;
@@ -227,7 +228,11 @@ impl Needs {
         for id in running {
             add(&self.rest[id.index()]);
         }
-        for (need, _) in need.iter_mut().zip(&self.is_turbulent).filter(|(_, is)| **is) {
+        for (need, _) in need
+            .iter_mut()
+            .zip(&self.is_turbulent)
+            .filter(|(_, is)| **is)
+        {
             if *need != 0 {
                 *need = BOTH;
             }
@@ -260,10 +265,18 @@ fn include_condition(
 }
 
 fn include_guards(model: &Model, need: &mut Need, event: &crate::model::Event) {
-    for guard in event.effects.iter().filter_map(|effect| effect.guard.as_ref()) {
+    for guard in event
+        .effects
+        .iter()
+        .filter_map(|effect| effect.guard.as_ref())
+    {
         include_condition(model, need, guard);
     }
-    for guard in event.updates.iter().filter_map(|update| update.guard.as_ref()) {
+    for guard in event
+        .updates
+        .iter()
+        .filter_map(|update| update.guard.as_ref())
+    {
         include_condition(model, need, guard);
     }
 }

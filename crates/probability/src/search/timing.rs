@@ -39,7 +39,12 @@ impl Separations {
         let footprints: Vec<Footprint> = plan.nodes.iter().map(|&node| footprint(node)).collect();
         let mut apart: Vec<Vec<bool>> = footprints
             .iter()
-            .map(|one| footprints.iter().map(|two| one.interferes_with(two)).collect())
+            .map(|one| {
+                footprints
+                    .iter()
+                    .map(|two| one.interferes_with(two))
+                    .collect()
+            })
             .collect();
         let mut never_after = vec![Vec::new(); plan.nodes.len()];
         for link in plan.links.iter().filter(|_| keeps_interference) {
@@ -67,12 +72,16 @@ impl Separations {
                     .filter(|(node, _)| is_action(node))
                     .any(|(_, other)| own.interferes_with(other))
         };
-        let timed = plan.nodes.iter().enumerate().filter_map(|(at, node)| match node {
-            Node::Timed(index) if matters(at) => {
-                Some((NodeId::from(at), task.timed()[*index].time.clone()))
-            }
-            _ => None,
-        });
+        let timed = plan
+            .nodes
+            .iter()
+            .enumerate()
+            .filter_map(|(at, node)| match node {
+                Node::Timed(index) if matters(at) => {
+                    Some((NodeId::from(at), task.timed()[*index].time.clone()))
+                }
+                _ => None,
+            });
         let ids = || plan.instances().map(|(id, _)| id);
         Self {
             epsilon: epsilon.clone(),
@@ -125,10 +134,7 @@ struct Mark {
 
 impl<'s> Timing<'s> {
     /// The network without happenings; `None` if what is under way leaves no schedule.
-    pub(crate) fn new(
-        separations: &'s Separations,
-        circumstances: &Circumstances,
-    ) -> Option<Self> {
+    pub(crate) fn new(separations: &'s Separations, circumstances: &Circumstances) -> Option<Self> {
         let mut network = ConsistentNetwork::new();
         let zero = network.add_node();
         let now = network.add_node();
@@ -200,7 +206,10 @@ impl<'s> Timing<'s> {
         let what = model.plan().nodes[node.index()];
         let own = match what {
             Node::End(id) => {
-                let place = self.pending.iter().position(|(pending, _)| *pending == id)?;
+                let place = self
+                    .pending
+                    .iter()
+                    .position(|(pending, _)| *pending == id)?;
                 self.pending.remove(place).1
             }
             _ => self.network.add_node(),
@@ -216,8 +225,12 @@ impl<'s> Timing<'s> {
         }
         match what {
             Node::Timed(_) => {
-                let time = separations.timed.get(next_timed)?.1.clone();
-                self.fix(own, &time)?;
+                // One that has happened, or is not next, leaves no time.
+                let (next, time) = separations.timed.get(next_timed)?;
+                if *next != node {
+                    return None;
+                }
+                self.fix(own, time)?;
             }
             _ => self.keep_before(own, node, next_timed)?,
         }
@@ -281,7 +294,11 @@ impl<'s> Timing<'s> {
         let recent = recent.take_while(|(_, own)| is_close(*own));
         let mut recent: Vec<_> = recent.filter(|(node, _)| matters(*node)).collect();
         recent.sort_unstable_by_key(|(node, _)| *node);
-        points.extend(recent.iter().map(|(node, own)| (Point::Recent(*node), *own)));
+        points.extend(
+            recent
+                .iter()
+                .map(|(node, own)| (Point::Recent(*node), *own)),
+        );
         let distances = points
             .iter()
             .map(|(_, from)| {

@@ -146,7 +146,10 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
                 // A derived fact: unchanged if nothing that it rests on is.
                 let is_touched = |fact: &FactId| {
                     let position = model.position(*fact);
-                    event.effects.iter().any(|effect| Some(effect.fact) == position)
+                    event
+                        .effects
+                        .iter()
+                        .any(|effect| Some(effect.fact) == position)
                 };
                 if basic.iter().any(is_touched) {
                     return None;
@@ -161,13 +164,11 @@ fn regressed(model: &Model, event: &Event, condition: &Condition) -> Option<Cond
             let mut is_lost = false;
             let mut side = |side: &Expression| {
                 side.map_leaves(&mut |leaf| match leaf {
-                    Expression::Fluent(fluent) => match value_after(model, event, *fluent) {
-                        Ok(changed) => changed,
-                        Err(Lost) => {
-                            is_lost = true;
-                            None
-                        }
-                    },
+                    Expression::Fluent(fluent) => {
+                        let changed = value_after(model, event, *fluent);
+                        is_lost |= changed.is_err();
+                        changed.ok().flatten()
+                    }
                     _ => None,
                 })
             };
@@ -188,11 +189,19 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
     let Some(position) = model.fluent_position(fluent) else {
         return Ok(None);
     };
-    if event.continuous.iter().any(|(changed, _)| *changed == position) {
+    if event
+        .continuous
+        .iter()
+        .any(|(changed, _)| *changed == position)
+    {
         return Err(Lost);
     }
     let mut value: Option<Expression> = None;
-    for update in event.updates.iter().filter(|update| update.fluent == position) {
+    for update in event
+        .updates
+        .iter()
+        .filter(|update| update.fluent == position)
+    {
         if update.guard.is_some() {
             return Err(Lost);
         }

@@ -32,7 +32,7 @@ pub(crate) struct Worlds<'a> {
     semantics: Semantics,
     values: BTreeMap<FluentId, Rational>,
     running: Vec<InstanceId>,
-    worlds: Vec<(World, f64)>,
+    possible: Vec<(World, f64)>,
 }
 
 impl<'a> Worlds<'a> {
@@ -78,7 +78,7 @@ impl<'a> Worlds<'a> {
             semantics,
             values: circumstances.values.clone(),
             running: circumstances.running.iter().map(|r| r.instance).collect(),
-            worlds: worlds.into_iter().map(world).collect(),
+            possible: worlds.into_iter().map(world).collect(),
         };
         all.look_throughout();
         all
@@ -86,13 +86,13 @@ impl<'a> Worlds<'a> {
 
     /// P(A) so far.
     pub(crate) fn actions_probability(&self) -> f64 {
-        self.worlds.iter().map(|(_, weight)| weight).sum()
+        self.possible.iter().map(|(_, weight)| weight).sum()
     }
 
     /// P(A ∩ G) so far.
     pub(crate) fn success_probability(&self) -> f64 {
         let goal = self.task.goal();
-        let worlds = self.worlds.iter();
+        let worlds = self.possible.iter();
         worlds
             .filter(|(world, _)| self.holds(goal, world))
             .map(|(_, weight)| weight)
@@ -108,7 +108,7 @@ impl<'a> Worlds<'a> {
             Node::Zero => {}
             Node::Timed(index) => {
                 for change in &self.task.timed()[index].changes {
-                    for (world, _) in &mut self.worlds {
+                    for (world, _) in &mut self.possible {
                         match change {
                             Change::Add(fact) => world.facts[fact.index()] = true,
                             Change::Delete(fact) => world.facts[fact.index()] = false,
@@ -133,7 +133,7 @@ impl<'a> Worlds<'a> {
                     self.do_snap(id, &body.end, 1.0, &[]);
                 }
                 self.running.retain(|running| *running != id);
-                for (world, _) in &mut self.worlds {
+                for (world, _) in &mut self.possible {
                     world.memories.retain(|(owner, _), _| *owner != id);
                 }
             }
@@ -142,7 +142,7 @@ impl<'a> Worlds<'a> {
     }
 
     fn do_snap(&mut self, id: InstanceId, snap: &SnapAction, success: f64, to_come: &[Effect]) {
-        let arrived = std::mem::take(&mut self.worlds);
+        let arrived = std::mem::take(&mut self.possible);
         let mut after = BTreeMap::new();
         for (world, weight) in arrived {
             if !self.holds(&snap.condition, &world) {
@@ -158,7 +158,7 @@ impl<'a> Worlds<'a> {
                 *after.entry(next).or_insert(0.0) += weight;
             }
         }
-        self.worlds = after.into_iter().collect();
+        self.possible = after.into_iter().collect();
         let arrival = self.values.clone();
         for effect in &snap.effects {
             if let Change::Update {
@@ -253,7 +253,7 @@ impl<'a> Worlds<'a> {
 
     /// What must hold throughout, and what end effects depend on throughout.
     fn look_throughout(&mut self) {
-        let mut worlds = std::mem::take(&mut self.worlds);
+        let mut worlds = std::mem::take(&mut self.possible);
         for &id in &self.running {
             let Body::Durative(body) = &self.plan.instance(id).action.body else {
                 continue;
@@ -270,7 +270,7 @@ impl<'a> Worlds<'a> {
                 }
             }
         }
-        self.worlds = worlds;
+        self.possible = worlds;
     }
 
     fn holds(&self, condition: &Condition, world: &World) -> bool {
@@ -283,7 +283,8 @@ impl<'a> Worlds<'a> {
             Condition::Fact(fact) => world.facts[fact.index()],
             Condition::Compare(comparison, left, right) => {
                 let value = |side: &Expression| {
-                    side.evaluate(&mut |leaf| number(leaf, &self.values)).unwrap()
+                    side.evaluate(&mut |leaf| number(leaf, &self.values))
+                        .unwrap()
                 };
                 comparison.holds(&value(left), &value(right))
             }

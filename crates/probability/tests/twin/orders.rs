@@ -60,9 +60,7 @@ fn extend(
         let is_new = !sequence.contains(&node);
         let is_next = match what {
             Node::Zero => false,
-            Node::Start(id) | Node::Instant(id) => {
-                is_new && !case.circumstances.is_running(*id)
-            }
+            Node::Start(id) | Node::Instant(id) => is_new && !case.circumstances.is_running(*id),
             Node::End(id) => worlds.running().contains(id),
             Node::Timed(index) => is_new && *index == next_timed,
         };

@@ -13,6 +13,7 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 
 /// What may occur.
+#[allow(clippy::struct_excessive_bools, reason = "each is a taste of its own")]
 #[derive(Clone, Copy)]
 pub(crate) struct Taste {
     pub(crate) facts: usize,
@@ -56,7 +57,14 @@ fn texts(rng: &mut impl Rng, taste: Taste) -> (String, String, String) {
     let derived = if taste.couples { " (d)" } else { "" };
     let _ = write!(domain, "{derived}) (:functions (n))");
     if taste.couples {
-        let condition = condition(rng, Taste { couples: false, ..taste }, 2);
+        let condition = condition(
+            rng,
+            Taste {
+                couples: false,
+                ..taste
+            },
+            2,
+        );
         let other = literal(rng, taste);
         let _ = write!(domain, "\n(:derived (d) (or {condition} {other}))");
     }
@@ -84,10 +92,12 @@ fn texts(rng: &mut impl Rng, taste: Taste) -> (String, String, String) {
         }
         if taste.couples && rng.random_bool(0.5) {
             let guards = ["at start", "over all", "at end"];
-            let guards = guards.choose_multiple(rng, 2).fold(String::new(), |mut all, when| {
-                let _ = write!(all, "({when} {})", literal(rng, taste));
-                all
-            });
+            let guards = guards
+                .choose_multiple(rng, 2)
+                .fold(String::new(), |mut all, when| {
+                    let _ = write!(all, "({when} {})", literal(rng, taste));
+                    all
+                });
             let effect = change(rng, taste);
             let _ = write!(does, "(when (and {guards}) (at end {effect}))");
         }
@@ -114,8 +124,7 @@ fn texts(rng: &mut impl Rng, taste: Taste) -> (String, String, String) {
     } else {
         condition(rng, taste, 2)
     };
-    let problem =
-        format!("(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))");
+    let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))");
     (domain, problem, plan)
 }
 
@@ -131,14 +140,25 @@ fn literal(rng: &mut impl Rng, taste: Taste) -> String {
 fn condition(rng: &mut impl Rng, taste: Taste, depth: usize) -> String {
     let kind = rng.random_range(0..10);
     if taste.couples && depth > 0 && kind < 3 {
-        let (one, two) = (condition(rng, taste, depth - 1), condition(rng, taste, depth - 1));
+        let (one, two) = (
+            condition(rng, taste, depth - 1),
+            condition(rng, taste, depth - 1),
+        );
         return format!("(or {one} {two})");
     }
     if taste.couples && kind == 3 {
-        return if rng.random_bool(0.5) { "(d)" } else { "(not (d))" }.to_owned();
+        return if rng.random_bool(0.5) {
+            "(d)"
+        } else {
+            "(not (d))"
+        }
+        .to_owned();
     }
     if depth > 0 && kind < 6 {
-        let (one, two) = (condition(rng, taste, depth - 1), condition(rng, taste, depth - 1));
+        let (one, two) = (
+            condition(rng, taste, depth - 1),
+            condition(rng, taste, depth - 1),
+        );
         return format!("(and {one} {two})");
     }
     if taste.numbers && kind == 9 {
@@ -189,7 +209,9 @@ fn likelihoods(rng: &mut impl Rng, task: &Task) -> Likelihoods {
             becomes_true: Some(probability(rng) * 0.5),
             becomes_false: Some(probability(rng) * 0.6),
         };
-        likelihoods.predicates.insert(PredicateId::from(index), flip);
+        likelihoods
+            .predicates
+            .insert(PredicateId::from(index), flip);
     }
     for index in 0..task.problem().schemas.len() {
         let mut success = Success {
@@ -231,7 +253,12 @@ fn circumstances(rng: &mut impl Rng, task: &Task, plan: &PartialOrderPlan) -> Ci
 
 /// A random order, with every action under way ended in the end.
 pub(crate) fn order(rng: &mut impl Rng, case: &Case) -> Vec<NodeId> {
-    let mut running: Vec<InstanceId> = case.circumstances.running.iter().map(|r| r.instance).collect();
+    let mut running: Vec<InstanceId> = case
+        .circumstances
+        .running
+        .iter()
+        .map(|r| r.instance)
+        .collect();
     let mut unused: Vec<InstanceId> = case
         .plan
         .instances()

@@ -1,0 +1,100 @@
+//! What effects, and changes by themselves, do to the probability of a fact.
+
+use super::cluster::Kernel;
+use crate::likelihoods::Flip;
+use crate::model::{FactEffect, Model, Semantics};
+
+/// An effect that takes place, with its chance to fail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Outcome {
+    pub(super) fact: usize,
+    pub(super) makes_true: bool,
+    pub(super) probability: f64,
+    pub(super) is_certain: bool,
+}
+
+impl From<&FactEffect> for Outcome {
+    fn from(effect: &FactEffect) -> Self {
+        Self {
+            fact: effect.fact,
+            makes_true: effect.makes_true,
+            probability: effect.probability,
+            is_certain: effect.is_certain,
+        }
+    }
+}
+
+/// What happens besides guarded effects.
+pub(super) struct Pending {
+    /// Unconditional effects on other facts.
+    pub(super) apart: Vec<Outcome>,
+    /// Whether facts change by themselves afterwards.
+    pub(super) is_step: bool,
+}
+
+/// A fact changing by itself.
+pub(super) fn by_itself(flip: Flip) -> Kernel {
+    Kernel {
+        if_true: 1.0 - flip.becomes_false,
+        if_false: flip.becomes_true,
+    }
+}
+
+/// What the effects that take place do to their fact; deletions come before additions.
+pub(super) fn kernel<'a>(
+    model: &Model,
+    fact: usize,
+    outcomes: impl Iterator<Item = &'a Outcome>,
+    is_step: bool,
+) -> Kernel {
+    let (mut stays, mut comes_not) = (1.0, 1.0);
+    let (mut adds, mut deletes, mut is_certain) = (false, false, false);
+    for outcome in outcomes {
+        is_certain |= outcome.is_certain;
+        if outcome.makes_true {
+            adds = true;
+            comes_not *= 1.0 - outcome.probability;
+        } else {
+            deletes = true;
+            stays *= 1.0 - outcome.probability;
+        }
+    }
+    let flip = model.flips[fact];
+    if !adds && !deletes {
+        return if is_step {
+            by_itself(flip)
+        } else {
+            Kernel {
+                if_true: 1.0,
+                if_false: 0.0,
+            }
+        };
+    }
+    let comes = 1.0 - comes_not;
+    match model.semantics() {
+        // A deletion that fails leaves the fact true, an addition that fails leaves it false.
+        Semantics::Paper => {
+            let rest = if deletes { stays } else { 0.0 };
+            let p = comes + comes_not * rest;
+            Kernel {
+                if_true: p,
+                if_false: p,
+            }
+        }
+        Semantics::World => {
+            let after = Kernel {
+                if_true: stays + (1.0 - stays) * comes,
+                if_false: comes,
+            };
+            if is_step && !is_certain {
+                let flipped = by_itself(flip);
+                Kernel {
+                    if_true: flipped.apply(after.if_true),
+                    if_false: flipped.apply(after.if_false),
+                }
+            } else {
+                after
+            }
+        }
+    }
+}

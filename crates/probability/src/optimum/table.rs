@@ -1,0 +1,67 @@
+//! Conditions as tables over states: bit `i` of a state is the truth of the model's fact `i`.
+
+use elbowroom_model::ground::{Condition, Expression, FactId};
+
+use super::NotSmall;
+use crate::model::{Event, Model, Requirement, Semantics, evaluate};
+
+/// Whether the model is of a world without numbers and time.
+pub(super) fn check(model: &Model) -> Result<(), NotSmall> {
+    if model.semantics() != Semantics::World {
+        return Err(NotSmall::PaperSemantics);
+    }
+    let unsupported = |what: &str| NotSmall::Unsupported {
+        what: what.to_owned(),
+    };
+    if !model.fluents.is_empty() {
+        return Err(unsupported("actions change numbers"));
+    }
+    if !model.task().timed().is_empty() {
+        return Err(unsupported("facts change at fixed times"));
+    }
+    if model.events.iter().any(|event| !event.watches.is_empty()) {
+        return Err(unsupported(
+            "effects depend on what held throughout an action",
+        ));
+    }
+    let remembers = |event: &Event| event.effects.iter().any(|effect| effect.is_certain);
+    if model.events.iter().any(remembers) {
+        return Err(unsupported(
+            "effects depend on what held at the start of an action",
+        ));
+    }
+    Ok(())
+}
+
+/// In which states a requirement holds.
+pub(super) fn table(model: &Model, requirement: &Requirement) -> Vec<bool> {
+    (0..1_usize << model.facts.len())
+        .map(|state| {
+            let literals = requirement.literals.iter();
+            let coupled = requirement.coupled.iter().map(|coupled| &coupled.condition);
+            literals
+                .copied()
+                .all(|(fact, truth)| (state & (1 << fact) != 0) == truth)
+                && requirement
+                    .numeric
+                    .iter()
+                    .chain(coupled)
+                    .all(|c| holds(model, c, state))
+        })
+        .collect()
+}
+
+/// Whether a condition holds in a state.
+pub(super) fn holds(model: &Model, condition: &Condition, state: usize) -> bool {
+    let truth = |fact: FactId| {
+        model
+            .position(fact)
+            .is_some_and(|at| state & (1 << at) != 0)
+    };
+    // Numbers do not change here.
+    let value = |leaf: &Expression| match leaf {
+        Expression::Fluent(fluent) => model.task().initial().values.get(fluent).cloned(),
+        _ => None,
+    };
+    evaluate(model.task(), condition, &truth, &value).unwrap_or(false)
+}
