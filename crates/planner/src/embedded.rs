@@ -26,6 +26,7 @@ mod network;
 mod relaxed;
 mod search;
 mod state;
+mod symbolic;
 mod time;
 
 use std::ops::ControlFlow;
@@ -44,8 +45,11 @@ use compile::Compiled;
 use search::{Search, Style, Turn};
 use time::NEVER;
 
-/// How many states are looked at between two reports.
-const REPORT_EVERY: u64 = 256;
+/// How much work lies between two reports, in operators of estimates: about ten milliseconds.
+const REPORT_WORK: u64 = 2_000_000;
+
+/// The most turns between two reports.
+const REPORT_TURNS: u64 = 256;
 
 /// How many states the hasty search may look at before the complete one gets its first turns.
 const HASTE: u64 = 20_000;
@@ -198,6 +202,7 @@ impl Planner<'_> {
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
         let before = (self.progress.counts, search.counts());
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, REPORT_TURNS);
         for turn in 0..budget {
             match search.turn() {
                 Turn::Over => return Outcome::Over,
@@ -209,7 +214,7 @@ impl Planner<'_> {
                     }
                 }
             }
-            if turn % REPORT_EVERY == REPORT_EVERY - 1 {
+            if turn % report_every == report_every - 1 {
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);

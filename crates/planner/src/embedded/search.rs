@@ -147,6 +147,11 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// How much there is to an estimate: the number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.relaxed.size()
+    }
+
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         if self.nodes.is_empty() {
@@ -212,8 +217,8 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        let outlook = (!self.style.is_hasty && !state.network.is_empty())
-            .then(|| Box::new(state.outlook()));
+        let outlook =
+            (!self.style.is_hasty && !state.network.is_empty()).then(|| Box::new(state.outlook()));
         if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
@@ -268,8 +273,7 @@ impl<'a> Search<'a> {
             let node = &self.nodes[number as usize];
             let other = &node.state;
             if other.is_discretely(state) {
-                let mut is_no_later =
-                    self.is_timeless || other.has_no_later_stamps_than(state);
+                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
                 if self.style.is_hasty {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
@@ -291,11 +295,17 @@ impl<'a> Search<'a> {
     /// Whether the plan could end here.
     fn is_goal(&self, state: &State) -> bool {
         let compiled = self.compiled;
-        if !state.open.is_empty()
-            || !compiled
-                .goal
-                .holds(&state.facts, &mut |test| state.passes(compiled, test, None))
-        {
+        if !state.open.is_empty() {
+            return false;
+        }
+        let holds = if state.symbolic.is_some() {
+            let mut stepper = Stepper::new(compiled);
+            stepper.reach_goal(&mut state.clone()).is_some()
+        } else {
+            let mut passes = |test| state.passes(compiled, test, None);
+            compiled.goal.holds(&state.facts, &mut passes)
+        };
+        if !holds {
             return false;
         }
         // What happens by itself before the last happening counts.

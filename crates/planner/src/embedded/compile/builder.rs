@@ -13,6 +13,7 @@ use super::{
 };
 use crate::embedded::formula::{Formula, Numeric};
 use crate::embedded::state::{Open, State};
+use crate::embedded::symbolic::{self, Form};
 use crate::embedded::time::{Scale, Ticks};
 
 /// A feature that the embedded planner does not handle, with the action or the like that uses it.
@@ -109,7 +110,9 @@ fn may_be_shortened(schema: &problem::Schema) -> bool {
             !is_conjunction(at_start)
                 || !is_conjunction(at_end)
                 || effects.any(is_conditional)
-                || continuous.iter().any(|effect| !effect.guard.at_start.is_trivial())
+                || continuous
+                    .iter()
+                    .any(|effect| !effect.guard.at_start.is_trivial())
         }
     }
 }
@@ -557,7 +560,12 @@ impl<'a> Builder<'a> {
             scale,
             epsilon,
             now: now.0,
-            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
+            fact_stamps: self
+                .symbols
+                .facts
+                .iter()
+                .map(|&fact| stamps.of_fact(fact))
+                .collect(),
             facts: self.symbols.facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,
@@ -575,6 +583,9 @@ impl<'a> Builder<'a> {
             is_symbolic: false,
         };
         compiled.is_symbolic = is_symbolic(&compiled);
+        if compiled.is_symbolic {
+            compiled.gap = Some("values that depend on when things happen");
+        }
         compiled.initial = initial(&mut compiled, situation);
         compiled
     }
@@ -652,10 +663,13 @@ fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
 /// Whether it costs little to let the end follow the start at once in the order of happenings:
 /// unless the action offers something to others only while it runs.
 fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
-    let conditional = end.conditional.iter().filter_map(|effect| match effect.change {
-        Change::Delete(fact) => Some(fact),
-        _ => None,
-    });
+    let conditional = end
+        .conditional
+        .iter()
+        .filter_map(|effect| match effect.change {
+            Change::Delete(fact) => Some(fact),
+            _ => None,
+        });
     let mut withdrawn = end.deletes.iter().copied().chain(conditional);
     let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
     let lends = end.updates.iter().any(|back| {
@@ -823,6 +837,21 @@ fn initial(compiled: &mut Compiled, situation: &Situation) -> State {
             .push(Open::under_way(narrow(number), start, least, most));
     }
     compiled.is_exact &= is_exact;
+    if compiled.is_symbolic {
+        state.symbolic = Some(Box::default());
+        let now = Form::constant(situation.time.clone());
+        for place in 0..state.open.len() {
+            for flow in &compiled.actions[place].flows {
+                if let Some(rate) = flow.rate.value(&state.values, None) {
+                    state.open[place].flows.push((flow.fluent, rate));
+                }
+            }
+            for (fluent, rate) in state.open[place].flows.clone() {
+                let flows = symbolic::flow(&mut state, fluent, &rate, &now);
+                compiled.is_exact &= flows.is_some();
+            }
+        }
+    }
     state
 }
 
