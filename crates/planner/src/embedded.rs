@@ -27,6 +27,7 @@ mod relaxed;
 mod search;
 mod state;
 mod symbolic;
+mod symmetry;
 mod time;
 
 use std::ops::ControlFlow;
@@ -43,6 +44,7 @@ pub use compile::Unsupported;
 use apply::Step;
 use compile::Compiled;
 use search::{Search, Style, Turn};
+use symmetry::Symmetry;
 use time::NEVER;
 
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
@@ -99,7 +101,9 @@ pub fn plan(
         Ok(compiled) => compiled,
         Err(unsupported) => return Answer::Unsupported(unsupported),
     };
+    let symmetry = Symmetry::of(grounded, &compiled);
     Planner {
+        symmetry: &symmetry,
         task,
         situation,
         settings,
@@ -133,6 +137,7 @@ struct Planner<'a> {
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     progress: Progress,
     best: Option<Found>,
 }
@@ -142,6 +147,7 @@ impl Planner<'_> {
         let compiled = self.compiled;
         let mut hasty = Search::new(
             compiled,
+            self.symmetry,
             Style {
                 is_hasty: true,
                 variants: 4,
@@ -149,6 +155,7 @@ impl Planner<'_> {
         );
         let mut complete = Search::new(
             compiled,
+            self.symmetry,
             Style {
                 is_hasty: false,
                 variants: usize::MAX,

@@ -12,6 +12,7 @@ use super::compile::Compiled;
 use super::hash::Map;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
+use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 
 /// How many turns the preferred successors get for a better estimate.
@@ -30,6 +31,7 @@ pub(crate) struct Style {
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
@@ -96,7 +98,7 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, style: Style) -> Self {
+    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, style: Style) -> Self {
         let has_deadline = |most: Ticks| most < NEVER;
         let is_timeless = compiled.timed.is_empty()
             && !compiled
@@ -106,6 +108,7 @@ impl<'a> Search<'a> {
                 .any(|open| has_deadline(open.most));
         Self {
             compiled,
+            symmetry,
             style,
             stepper: Stepper::new(compiled),
             relaxed: Relaxed::new(compiled, style.is_hasty),
@@ -223,9 +226,15 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         }
         self.evaluated += 1;
-        let Some(estimate) = self.relaxed.evaluate(&state) else {
+        let Some(mut estimate) = self.relaxed.evaluate(&state) else {
             return Turn::Nothing;
         };
+        self.symmetry
+            .thin_out(&state, self.is_timeless, &mut estimate.applicable);
+        let kept = &estimate.applicable;
+        estimate
+            .preferred
+            .retain(|step| kept.binary_search(step).is_ok());
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         self.known.entry(hash).or_default().push(number);
         let outlook_size = outlook.as_ref().map_or(0, |outlook| outlook.size());
