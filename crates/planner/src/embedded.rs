@@ -42,7 +42,7 @@ pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Setti
 pub use compile::Unsupported;
 
 use apply::Step;
-use compile::Compiled;
+use compile::{Compiled, Eagerness};
 use search::{Search, Style, Turn};
 use symmetry::Symmetry;
 use time::NEVER;
@@ -145,49 +145,43 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn run(mut self) -> Answer {
         let compiled = self.compiled;
-        let mut hasty = Search::new(
-            compiled,
-            self.symmetry,
-            Style {
-                is_hasty: true,
-                variants: 4,
-            },
-        );
-        let mut complete = Search::new(
-            compiled,
-            self.symmetry,
-            Style {
-                is_hasty: false,
-                variants: usize::MAX,
-            },
-        );
+        let mut styles = vec![Style::hasty(Eagerness::Lends)];
+        let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
+        if compiled.actions.iter().any(lends) {
+            styles.push(Style::hasty(Eagerness::Free));
+        }
+        styles.push(Style::COMPLETE);
+        let mut searches: Vec<Search<'_>> = styles
+            .iter()
+            .map(|&style| Search::new(compiled, self.symmetry, style))
+            .collect();
+        let mut is_over = vec![false; searches.len()];
         let mut budget = HASTE;
-        let stopped = loop {
-            match self.work(&mut hasty, Phase::Hasty, budget) {
-                Outcome::Stop(stopped) => break stopped,
-                Outcome::Over if !hasty.is_incomplete() => break Stopped::Exhausted,
-                Outcome::Over => {
-                    if let Outcome::Stop(stopped) =
-                        self.work(&mut complete, Phase::Complete, u64::MAX)
-                    {
-                        break stopped;
-                    }
-                    break Stopped::Exhausted;
+        let stopped = 'turns: loop {
+            for (number, search) in searches.iter_mut().enumerate() {
+                if is_over[number] {
+                    continue;
                 }
-                Outcome::BudgetSpent => {}
+                let (phase, share) = match styles[number].haste {
+                    Some(_) => (Phase::Hasty, budget),
+                    None => (Phase::Complete, budget / COMPLETE_SHARE),
+                };
+                match self.work(search, phase, share) {
+                    Outcome::Stop(stopped) => break 'turns stopped,
+                    Outcome::BudgetSpent => {}
+                    Outcome::Over if search.is_incomplete() => is_over[number] = true,
+                    Outcome::Over => break 'turns Stopped::Exhausted,
+                }
             }
-            match self.work(&mut complete, Phase::Complete, budget / COMPLETE_SHARE) {
-                Outcome::Stop(stopped) => break stopped,
-                Outcome::Over => break Stopped::Exhausted,
-                Outcome::BudgetSpent => {}
+            if !is_over.contains(&false) {
+                break Stopped::Exhausted;
             }
             budget = budget.saturating_mul(2);
         };
-        let is_complete = |search: &Search<'_>| !search.is_incomplete();
         let is_proof = stopped == Stopped::Exhausted
             && compiled.is_exact
             && compiled.gap.is_none()
-            && (is_complete(&hasty) || is_complete(&complete));
+            && searches.iter().any(|search| !search.is_incomplete());
         let counts = self.progress.counts;
         match self.best {
             Some(found) => Answer::Plan {

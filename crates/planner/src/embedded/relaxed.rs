@@ -13,7 +13,7 @@ mod graph;
 mod numbers;
 
 use super::apply::Step;
-use super::compile::{Compiled, NONE};
+use super::compile::{Compiled, Eagerness, NONE};
 use super::state::State;
 
 use super::network::SETTLED;
@@ -65,9 +65,9 @@ pub(crate) struct Relaxed<'a> {
 }
 
 impl<'a> Relaxed<'a> {
-    /// With `merges_eager`, actions that can end at once count as one step.
-    pub(crate) fn new(compiled: &'a Compiled, merges_eager: bool) -> Self {
-        let graph = Graph::of(compiled, merges_eager);
+    /// Actions that are at least as eager as `haste` count as one step.
+    pub(crate) fn new(compiled: &'a Compiled, haste: Option<Eagerness>) -> Self {
+        let graph = Graph::of(compiled, haste);
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
-use super::compile::Compiled;
+use super::compile::{Compiled, Eagerness, NONE};
 use super::hash::Map;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
@@ -21,10 +21,27 @@ const BOOST: i64 = 1000;
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Style {
-    /// Whether actions end at once where that costs little. Some plans are lost.
-    pub(crate) is_hasty: bool,
+    /// If present, actions that are at least so eager end at once, and states are compared
+    /// roughly. Some plans are lost.
+    pub(crate) haste: Option<Eagerness>,
     /// How many states that differ in times only are kept; more are dropped, and some plans lost.
     pub(crate) variants: usize,
+}
+
+impl Style {
+    /// Loses nothing but what [`Search::is_incomplete`] tells.
+    pub(crate) const COMPLETE: Self = Self {
+        haste: None,
+        variants: usize::MAX,
+    };
+
+    /// Actions that are at least so eager end at once.
+    pub(crate) fn hasty(haste: Eagerness) -> Self {
+        Self {
+            haste: Some(haste),
+            variants: 4,
+        }
+    }
 }
 
 /// A search in progress.
@@ -111,7 +128,7 @@ impl<'a> Search<'a> {
             symmetry,
             style,
             stepper: Stepper::new(compiled),
-            relaxed: Relaxed::new(compiled, style.is_hasty),
+            relaxed: Relaxed::new(compiled, style.haste),
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
@@ -195,14 +212,18 @@ impl<'a> Search<'a> {
                     .filter(|open| open.action == action)
                     .count()
             };
-            if !data.excludes_itself && data.end != super::compile::NONE {
-                let most = if self.style.is_hasty { 0 } else { 1 };
+            if !data.excludes_itself && data.end != NONE {
+                let most = usize::from(self.style.haste.is_none());
                 if runs_already() > most {
                     self.has_lost = true;
                     return None;
                 }
             }
-            if self.style.is_hasty && data.is_eager {
+            let is_whole = self
+                .style
+                .haste
+                .is_some_and(|haste| data.eagerness >= haste);
+            if is_whole && data.end != NONE {
                 let whole = Step::Whole(action);
                 if let Some(next) = self.stepper.apply(state, whole) {
                     self.has_lost = true;
@@ -220,8 +241,8 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        let outlook =
-            (!self.style.is_hasty && !state.network.is_empty()).then(|| Box::new(state.outlook()));
+        let outlook = (self.style.haste.is_none() && !state.network.is_empty())
+            .then(|| Box::new(state.outlook()));
         if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
@@ -283,7 +304,7 @@ impl<'a> Search<'a> {
             let other = &node.state;
             if other.is_discretely(state) {
                 let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
-                if self.style.is_hasty {
+                if self.style.haste.is_some() {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);

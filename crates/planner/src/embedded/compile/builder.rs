@@ -9,7 +9,8 @@ use elbowroom_num::{End, Rational};
 use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
 use super::symbols::Symbols;
 use super::{
-    Action, Bound, Change, Compiled, Conditional, Duration, Flow, NONE, Rule, Snap, Timed, Update,
+    Action, Bound, Change, Compiled, Conditional, Duration, Eagerness, Flow, NONE, Rule, Snap,
+    Timed, Update,
 };
 use crate::embedded::formula::{Formula, Numeric};
 use crate::embedded::state::{Open, State};
@@ -296,7 +297,7 @@ impl<'a> Builder<'a> {
                     },
                     flows: Vec::new(),
                     breaking_timed: Vec::new(),
-                    is_eager: false,
+                    eagerness: Eagerness::Offers,
                     excludes_itself: true,
                     uses_duration: false,
                 });
@@ -450,7 +451,7 @@ impl<'a> Builder<'a> {
             duration,
             flows,
             breaking_timed: Vec::new(),
-            is_eager: false,
+            eagerness: Eagerness::Offers,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }
@@ -503,7 +504,7 @@ impl<'a> Builder<'a> {
                     &self.snaps[action.end as usize],
                 );
                 let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                self.actions[number].is_eager = is_eager(start, end, &offers);
+                self.actions[number].eagerness = eagerness(start, end, &offers);
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
@@ -660,9 +661,7 @@ fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
     readers
 }
 
-/// Whether it costs little to let the end follow the start at once in the order of happenings:
-/// unless the action offers something to others only while it runs.
-fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
+fn eagerness(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> Eagerness {
     let conditional = end
         .conditional
         .iter()
@@ -679,7 +678,11 @@ fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -
                 .iter()
                 .any(|out| out.fluent == back.fluent && out.operator != back.operator)
     });
-    !offers && !lends
+    match (offers, lends) {
+        (true, _) => Eagerness::Offers,
+        (false, true) => Eagerness::Lends,
+        (false, false) => Eagerness::Free,
+    }
 }
 
 fn excludes_itself(start: &Snap) -> bool {
