@@ -139,9 +139,13 @@ impl<'a> Relaxed<'a> {
                 &mut self.missing,
             );
         }
-        let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
+        let graph = &self.graph;
+        let reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {
                 cost[proposition as usize] = 0;
+                if graph.needing(proposition).is_empty() {
+                    return;
+                }
                 if buckets.is_empty() {
                     buckets.push(Vec::new());
                 }
