@@ -23,6 +23,7 @@ mod formula;
 mod hash;
 mod metric;
 mod network;
+mod reasons;
 mod relaxed;
 mod search;
 mod state;
@@ -101,6 +102,13 @@ pub fn plan(
         Ok(compiled) => compiled,
         Err(unsupported) => return Answer::Unsupported(unsupported),
     };
+    let is_provable = compiled.is_exact && (compiled.gap.is_none() || compiled.is_symbolic);
+    if is_provable && let Some(proof) = reasons::relaxed_proof(grounded, &compiled) {
+        return Answer::Unsolvable {
+            proof,
+            counts: progress.counts,
+        };
+    }
     let symmetry = Symmetry::of(grounded, &compiled);
     Planner {
         symmetry: &symmetry,

@@ -8,6 +8,7 @@
 //! here once, and the search only takes maxima.
 
 mod builder;
+mod gaps;
 mod interference;
 mod symbols;
 

@@ -14,6 +14,7 @@ mod numbers;
 
 use super::apply::Step;
 use super::compile::{Compiled, Eagerness, NONE};
+use super::formula::Literal;
 use super::state::State;
 
 use super::network::SETTLED;
@@ -40,6 +41,14 @@ pub(crate) struct Estimate {
     pub(crate) applicable: Vec<Step>,
     /// Those among them that are in the relaxed plan.
     pub(crate) preferred: Vec<Step>,
+}
+
+/// Something that is out of reach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Missing {
+    Literal(Literal),
+    /// A test or a choice.
+    Other,
 }
 
 /// Evaluates states; keeps its tables from one to the next.
@@ -90,6 +99,39 @@ impl<'a> Relaxed<'a> {
     /// The number of operators.
     pub(crate) fn size(&self) -> u64 {
         self.graph.operators.len() as u64
+    }
+
+    /// The parts of the goal that are out of reach, and the ends of what is under way; after an
+    /// evaluation that found nothing.
+    pub(crate) fn missing_goals(&self) -> Vec<Missing> {
+        let goals = self.graph.goal.iter();
+        let goals = goals.filter(|&&goal| self.cost[goal as usize] == UNREACHED);
+        let facts = 2 * self.compiled.facts.len();
+        goals
+            .map(|&goal| {
+                if (goal as usize) < facts {
+                    Missing::Literal(Literal(goal))
+                } else {
+                    Missing::Other
+                }
+            })
+            .collect()
+    }
+
+    /// How many timetables there are: literals that change at fixed times only.
+    pub(crate) fn timetable_count(&self) -> usize {
+        self.graph.timetable.len()
+    }
+
+    /// Takes a literal to be true at all times, and says when it last would have become false.
+    pub(crate) fn ignore_timetable(&mut self, number: usize) -> Option<(Literal, Ticks)> {
+        let spans = std::mem::replace(&mut self.graph.timetable[number], vec![(-NEVER, NEVER)]);
+        let end = spans
+            .iter()
+            .map(|span| span.1)
+            .filter(|&end| end < NEVER)
+            .max()?;
+        Some((self.graph.timetable_literal(number)?, end))
     }
 
     /// The estimate, or `None` if even the relaxed goal is out of reach.

@@ -6,6 +6,7 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::{End, Rational};
 
+use super::gaps;
 use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
 use super::symbols::Symbols;
 use super::{
@@ -584,6 +585,7 @@ impl<'a> Builder<'a> {
             is_symbolic: false,
         };
         compiled.is_symbolic = is_symbolic(&compiled);
+        compiled.gap = gaps::gap(&compiled.actions, &compiled.snaps, compiled.facts.len());
         if compiled.is_symbolic {
             compiled.gap = Some("values that depend on when things happen");
         }

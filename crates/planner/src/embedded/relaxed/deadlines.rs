@@ -92,7 +92,11 @@ impl Deadlines {
             } else {
                 state.network.earliest(open.node)
             };
-            self.lower(graph, graph.running(open.action) as usize, start + open.least);
+            self.lower(
+                graph,
+                graph.running(open.action) as usize,
+                start + open.least,
+            );
         }
     }
 

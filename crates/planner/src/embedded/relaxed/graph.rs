@@ -129,6 +129,16 @@ impl Graph {
         self.first_running + action
     }
 
+    /// The literal of a timetable.
+    pub(crate) fn timetable_literal(&self, number: usize) -> Option<Literal> {
+        let number = narrow(number);
+        let place = self
+            .timetable_of
+            .iter()
+            .position(|&entry| entry == number)?;
+        Some(Literal(narrow(place)))
+    }
+
     /// Where in `needing_list` the operators stand that need the proposition.
     pub(crate) fn needing(&self, proposition: u32) -> Range<usize> {
         let begin = match proposition {
