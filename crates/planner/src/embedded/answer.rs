@@ -156,6 +156,15 @@ pub enum Proof {
     /// A conjunct of the goal cannot become true even if nothing that was reached is ever lost.
     #[error("no plan exists: {}", .0.join("; "))]
     Unreachable(Vec<String>),
+    /// A conjunct of the goal comes too late even if nothing that was reached is ever lost, and
+    /// everything is as early as it can be.
+    #[error("no plan exists: {goal} cannot be reached before {deadline}")]
+    TooLate {
+        /// The parts of the goal.
+        goal: String,
+        /// What ends when.
+        deadline: String,
+    },
     /// All orders of happenings were tried.
     #[error(
         "no plan exists: every order in which things can happen was tried, {states} states in all"

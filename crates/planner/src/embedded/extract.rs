@@ -7,7 +7,8 @@ use elbowroom_num::Rational;
 use super::answer::Settings;
 use super::apply::{Log, Step, Stepper};
 use super::compile::{Compiled, NONE};
-use super::network::{Network, NodeId};
+use super::network::{Network, NodeId, SETTLED};
+use super::symbolic;
 use super::time::NEVER;
 
 /// A step of the plan to be.
@@ -43,6 +44,10 @@ pub(crate) fn plan_of(
     let mut open: Vec<usize> = (0..under_way).collect();
     for &step in steps {
         let node = NodeId::try_from(state.network.node_count()).ok()?;
+        let foreseen_end = match step {
+            Step::End(place) => state.open[place as usize].end,
+            _ => SETTLED,
+        };
         let ended = match step {
             Step::End(place) => Some(open.remove(place as usize)),
             _ => None,
@@ -61,9 +66,19 @@ pub(crate) fn plan_of(
                     open.insert(place, timings.len() - 1);
                 }
             }
-            Step::End(_) => timings[ended?].end = Some(node),
+            Step::End(_) => {
+                let node = if foreseen_end == SETTLED {
+                    node
+                } else {
+                    foreseen_end
+                };
+                timings[ended?].end = Some(node);
+            }
             Step::Timed => {}
         }
+    }
+    if state.symbolic.is_some() {
+        stepper.reach_goal(&mut state)?;
     }
     // The goal may need a timed initial that comes after all else: then something must wait.
     let needed = compiled
@@ -83,7 +98,11 @@ pub(crate) fn plan_of(
             })
             .next()?;
     }
-    let times = exact_times(compiled, &state.network, stepper.log.as_ref()?, settings)?;
+    let log = stepper.log.as_ref()?;
+    let times = match &state.symbolic {
+        None => exact_times(compiled, &state.network, log, settings)?,
+        Some(_) => symbolic::solve(&state, compiled.scale, &exact_distances(log))?,
+    };
     let mut plan = TimeTriggeredPlan::default();
     for (number, timing) in timings.iter().enumerate() {
         let at = |node: NodeId| times[node as usize].clone();
@@ -116,6 +135,16 @@ pub(crate) fn plan_of(
     }
 }
 
+/// The distances between starts and ends, exactly.
+fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
+    let mut distances = Vec::new();
+    for (end, start, least, most) in &log.ends {
+        distances.push((*start, *end, least.clone()));
+        distances.extend(most.as_ref().map(|most| (*end, *start, -most)));
+    }
+    distances
+}
+
 /// The earliest times of all happenings in exact numbers.
 ///
 /// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
@@ -129,9 +158,10 @@ fn exact_times(
 ) -> Option<Vec<Rational>> {
     let scale = compiled.scale;
     let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
-    let are_durations_on_grid = log.ends.iter().all(|(_, _, least, most)| {
-        is_on_grid(least) && most.as_ref().is_none_or(is_on_grid)
-    });
+    let are_durations_on_grid = log
+        .ends
+        .iter()
+        .all(|(_, _, least, most)| is_on_grid(least) && most.as_ref().is_none_or(is_on_grid));
     let is_exact = are_durations_on_grid && compiled.is_exact && is_on_grid(&settings.epsilon);
     if is_exact {
         let nodes = 0..network.node_count();
@@ -140,24 +170,17 @@ fn exact_times(
             .collect();
     }
     let slack = i64::from(!compiled.is_exact);
-    let mut times: Vec<Rational> = log
-        .floors
-        .iter()
-        .map(|&floor| {
+    let mut times: Vec<Rational> = network
+        .bounds()
+        .map(|(floor, _)| {
             let is_free = floor <= compiled.now;
             scale.units(if is_free { floor } else { floor + slack })
         })
         .collect();
+    let exact = exact_distances(log);
     let of_end = |from: NodeId, to: NodeId| {
-        log.ends.iter().find_map(|(end, start, least, most)| {
-            if (from, to) == (*start, *end) {
-                Some(least.clone())
-            } else if (from, to) == (*end, *start) {
-                most.as_ref().map(|most| -most)
-            } else {
-                None
-            }
-        })
+        let found = exact.iter().find(|known| (known.0, known.1) == (from, to));
+        found.map(|known| known.2.clone())
     };
     let edges: Vec<(usize, usize, Rational)> = network
         .edges()

@@ -13,13 +13,14 @@ mod graph;
 mod numbers;
 
 use super::apply::Step;
-use super::compile::{Compiled, NONE};
+use super::compile::{Compiled, Eagerness, NONE};
+use super::formula::Literal;
 use super::state::State;
 
-pub(crate) use graph::Graph;
 use super::network::SETTLED;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
+pub(crate) use graph::Graph;
 use graph::Kind;
 
 /// Beyond this, costs are all alike.
@@ -40,6 +41,14 @@ pub(crate) struct Estimate {
     pub(crate) applicable: Vec<Step>,
     /// Those among them that are in the relaxed plan.
     pub(crate) preferred: Vec<Step>,
+}
+
+/// Something that is out of reach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Missing {
+    Literal(Literal),
+    /// A test or a choice.
+    Other,
 }
 
 /// Evaluates states; keeps its tables from one to the next.
@@ -65,9 +74,9 @@ pub(crate) struct Relaxed<'a> {
 }
 
 impl<'a> Relaxed<'a> {
-    /// With `merges_eager`, actions that can end at once count as one step.
-    pub(crate) fn new(compiled: &'a Compiled, merges_eager: bool) -> Self {
-        let graph = Graph::of(compiled, merges_eager);
+    /// Actions that are at least as eager as `haste` count as one step.
+    pub(crate) fn new(compiled: &'a Compiled, haste: Option<Eagerness>) -> Self {
+        let graph = Graph::of(compiled, haste);
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
@@ -85,6 +94,44 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             graph,
         }
+    }
+
+    /// The number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.graph.operators.len() as u64
+    }
+
+    /// The parts of the goal that are out of reach, and the ends of what is under way; after an
+    /// evaluation that found nothing.
+    pub(crate) fn missing_goals(&self) -> Vec<Missing> {
+        let goals = self.graph.goal.iter();
+        let goals = goals.filter(|&&goal| self.cost[goal as usize] == UNREACHED);
+        let facts = 2 * self.compiled.facts.len();
+        goals
+            .map(|&goal| {
+                if (goal as usize) < facts {
+                    Missing::Literal(Literal(goal))
+                } else {
+                    Missing::Other
+                }
+            })
+            .collect()
+    }
+
+    /// How many timetables there are: literals that change at fixed times only.
+    pub(crate) fn timetable_count(&self) -> usize {
+        self.graph.timetable.len()
+    }
+
+    /// Takes a literal to be true at all times, and says when it last would have become false.
+    pub(crate) fn ignore_timetable(&mut self, number: usize) -> Option<(Literal, Ticks)> {
+        let spans = std::mem::replace(&mut self.graph.timetable[number], vec![(-NEVER, NEVER)]);
+        let end = spans
+            .iter()
+            .map(|span| span.1)
+            .filter(|&end| end < NEVER)
+            .max()?;
+        Some((self.graph.timetable_literal(number)?, end))
     }
 
     /// The estimate, or `None` if even the relaxed goal is out of reach.
@@ -121,14 +168,26 @@ impl<'a> Relaxed<'a> {
         self.applicable.clear();
         if self.horizon < NEVER
             || !self.graph.windows.is_empty()
-            || state.open.iter().any(|open| open.node == SETTLED && open.most < NEVER)
+            || state
+                .open
+                .iter()
+                .any(|open| open.node == SETTLED && open.most < NEVER)
         {
-            self.deadlines
-                .exclude_late(self.compiled, &self.graph, state, self.horizon, &mut self.missing);
+            self.deadlines.exclude_late(
+                self.compiled,
+                &self.graph,
+                state,
+                self.horizon,
+                &mut self.missing,
+            );
         }
-        let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
+        let graph = &self.graph;
+        let reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {
                 cost[proposition as usize] = 0;
+                if graph.needing(proposition).is_empty() {
+                    return;
+                }
                 if buckets.is_empty() {
                     buckets.push(Vec::new());
                 }
@@ -145,7 +204,8 @@ impl<'a> Relaxed<'a> {
         for (number, gap) in self.gaps.iter_mut().enumerate() {
             #[allow(clippy::cast_possible_truncation, reason = "tests are numbered by u32")]
             let test = number as u32;
-            let is_free = self.graph.is_free_test[number];
+            let is_free =
+                self.graph.is_free_test[number] || depends_on_times(self.compiled, test, state);
             if is_free || state.passes(self.compiled, test, None) {
                 reach(self.graph.test(test), cost, buckets);
             } else {
@@ -321,6 +381,17 @@ impl<'a> Relaxed<'a> {
         estimate.applicable.sort_unstable();
         estimate.applicable.dedup();
     }
+}
+
+/// Whether times decide the test; then it is taken for granted.
+fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
+    let Some(symbolic) = &state.symbolic else {
+        return false;
+    };
+    let mut depends = false;
+    let difference = &compiled.tests[test as usize].difference;
+    difference.visit_fluents(&mut |fluent| depends |= symbolic.governs(fluent));
+    depends
 }
 
 /// The steps that an operator stands for.

@@ -6,13 +6,16 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::{End, Rational};
 
+use super::gaps;
 use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
 use super::symbols::Symbols;
 use super::{
-    Action, Bound, Change, Compiled, Conditional, Duration, Flow, NONE, Rule, Snap, Timed, Update,
+    Action, Bound, Change, Compiled, Conditional, Duration, Eagerness, Flow, NONE, Rule, Snap,
+    Timed, Update,
 };
 use crate::embedded::formula::{Formula, Numeric};
 use crate::embedded::state::{Open, State};
+use crate::embedded::symbolic::{self, Form};
 use crate::embedded::time::{Scale, Ticks};
 
 /// A feature that the embedded planner does not handle, with the action or the like that uses it.
@@ -109,7 +112,9 @@ fn may_be_shortened(schema: &problem::Schema) -> bool {
             !is_conjunction(at_start)
                 || !is_conjunction(at_end)
                 || effects.any(is_conditional)
-                || continuous.iter().any(|effect| !effect.guard.at_start.is_trivial())
+                || continuous
+                    .iter()
+                    .any(|effect| !effect.guard.at_start.is_trivial())
         }
     }
 }
@@ -293,7 +298,7 @@ impl<'a> Builder<'a> {
                     },
                     flows: Vec::new(),
                     breaking_timed: Vec::new(),
-                    is_eager: false,
+                    eagerness: Eagerness::Offers,
                     excludes_itself: true,
                     uses_duration: false,
                 });
@@ -447,7 +452,7 @@ impl<'a> Builder<'a> {
             duration,
             flows,
             breaking_timed: Vec::new(),
-            is_eager: false,
+            eagerness: Eagerness::Offers,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }
@@ -500,7 +505,7 @@ impl<'a> Builder<'a> {
                     &self.snaps[action.end as usize],
                 );
                 let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                self.actions[number].is_eager = is_eager(start, end, &offers);
+                self.actions[number].eagerness = eagerness(start, end, &offers);
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
@@ -557,7 +562,12 @@ impl<'a> Builder<'a> {
             scale,
             epsilon,
             now: now.0,
-            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
+            fact_stamps: self
+                .symbols
+                .facts
+                .iter()
+                .map(|&fact| stamps.of_fact(fact))
+                .collect(),
             facts: self.symbols.facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,
@@ -575,6 +585,10 @@ impl<'a> Builder<'a> {
             is_symbolic: false,
         };
         compiled.is_symbolic = is_symbolic(&compiled);
+        compiled.gap = gaps::gap(&compiled.actions, &compiled.snaps, compiled.facts.len());
+        if compiled.is_symbolic {
+            compiled.gap = Some("values that depend on when things happen");
+        }
         compiled.initial = initial(&mut compiled, situation);
         compiled
     }
@@ -649,13 +663,14 @@ fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
     readers
 }
 
-/// Whether it costs little to let the end follow the start at once in the order of happenings:
-/// unless the action offers something to others only while it runs.
-fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
-    let conditional = end.conditional.iter().filter_map(|effect| match effect.change {
-        Change::Delete(fact) => Some(fact),
-        _ => None,
-    });
+fn eagerness(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> Eagerness {
+    let conditional = end
+        .conditional
+        .iter()
+        .filter_map(|effect| match effect.change {
+            Change::Delete(fact) => Some(fact),
+            _ => None,
+        });
     let mut withdrawn = end.deletes.iter().copied().chain(conditional);
     let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
     let lends = end.updates.iter().any(|back| {
@@ -665,7 +680,11 @@ fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -
                 .iter()
                 .any(|out| out.fluent == back.fluent && out.operator != back.operator)
     });
-    !offers && !lends
+    match (offers, lends) {
+        (true, _) => Eagerness::Offers,
+        (false, true) => Eagerness::Lends,
+        (false, false) => Eagerness::Free,
+    }
 }
 
 fn excludes_itself(start: &Snap) -> bool {
@@ -823,6 +842,21 @@ fn initial(compiled: &mut Compiled, situation: &Situation) -> State {
             .push(Open::under_way(narrow(number), start, least, most));
     }
     compiled.is_exact &= is_exact;
+    if compiled.is_symbolic {
+        state.symbolic = Some(Box::default());
+        let now = Form::constant(situation.time.clone());
+        for place in 0..state.open.len() {
+            for flow in &compiled.actions[place].flows {
+                if let Some(rate) = flow.rate.value(&state.values, None) {
+                    state.open[place].flows.push((flow.fluent, rate));
+                }
+            }
+            for (fluent, rate) in state.open[place].flows.clone() {
+                let flows = symbolic::flow(&mut state, fluent, &rate, &now);
+                compiled.is_exact &= flows.is_some();
+            }
+        }
+    }
     state
 }
 

@@ -76,12 +76,14 @@ impl Deadlines {
                     }
                 }
             }
-            self.lower(2 * fact + usize::from(!is_true), time);
+            self.lower(graph, 2 * fact + usize::from(!is_true), time);
         }
         for test in 0..compiled.tests.len() {
             let number = u32::try_from(test).expect("few tests");
-            if graph.is_free_test[test] || state.passes(compiled, number, None) {
-                self.lower(graph.test(number) as usize, compiled.now);
+            let is_free =
+                graph.is_free_test[test] || super::depends_on_times(compiled, number, state);
+            if is_free || state.passes(compiled, number, None) {
+                self.lower(graph, graph.test(number) as usize, compiled.now);
             }
         }
         for open in &state.open {
@@ -90,14 +92,21 @@ impl Deadlines {
             } else {
                 state.network.earliest(open.node)
             };
-            self.lower(graph.running(open.action) as usize, start + open.least);
+            self.lower(
+                graph,
+                graph.running(open.action) as usize,
+                start + open.least,
+            );
         }
     }
 
-    fn lower(&mut self, proposition: usize, time: Ticks) {
+    fn lower(&mut self, graph: &Graph, proposition: usize, time: Ticks) {
         if time < self.time[proposition] {
             self.time[proposition] = time;
             let number = u32::try_from(proposition).expect("numbered by u32");
+            if graph.needing(number).is_empty() {
+                return;
+            }
             self.queue.push(Reverse((time, number)));
         }
     }
@@ -140,11 +149,11 @@ impl Deadlines {
         }
         for position in operator.effects.clone() {
             let time = begin + graph.delays[position];
-            self.lower(graph.effects[position] as usize, time);
+            self.lower(graph, graph.effects[position] as usize, time);
         }
         for position in operator.gains.clone() {
             let (test, _) = graph.gains[position];
-            self.lower(graph.test(test) as usize, begin);
+            self.lower(graph, graph.test(test) as usize, begin);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::compile::{Action, Change, Compiled, NONE, Snap, Timed, Update};
+use super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Timed, Update};
 use super::super::formula::{Formula, Literal};
 use super::super::time::{NEVER, Ticks};
 use super::numbers;
@@ -88,7 +88,7 @@ struct Draft<'a> {
 }
 
 impl Graph {
-    pub(crate) fn of(compiled: &Compiled, merges_eager: bool) -> Self {
+    pub(crate) fn of(compiled: &Compiled, haste: Option<Eagerness>) -> Self {
         let first_test = narrow(2 * compiled.facts.len());
         let first_running = first_test + narrow(compiled.tests.len());
         let mut tests_of_fluent = vec![Vec::new(); compiled.fluents.len()];
@@ -110,7 +110,7 @@ impl Graph {
         };
         graph.add_timetables(compiled);
         for (number, action) in compiled.actions.iter().enumerate() {
-            graph.add_action(compiled, narrow(number), action, merges_eager);
+            graph.add_action(compiled, narrow(number), action, haste);
         }
         graph.add_rules(compiled);
         graph.add_timed(compiled);
@@ -127,6 +127,16 @@ impl Graph {
     /// The proposition that an instance of the action is under way.
     pub(crate) fn running(&self, action: u32) -> u32 {
         self.first_running + action
+    }
+
+    /// The literal of a timetable.
+    pub(crate) fn timetable_literal(&self, number: usize) -> Option<Literal> {
+        let number = narrow(number);
+        let place = self
+            .timetable_of
+            .iter()
+            .position(|&entry| entry == number)?;
+        Some(Literal(narrow(place)))
     }
 
     /// Where in `needing_list` the operators stand that need the proposition.
@@ -193,7 +203,7 @@ impl Graph {
         compiled: &Compiled,
         number: u32,
         action: &Action,
-        merges_eager: bool,
+        haste: Option<Eagerness>,
     ) {
         if action.end == NONE {
             let snap = compiled.snap(action.start);
@@ -227,8 +237,7 @@ impl Graph {
                     .iter()
                     .filter(|need| !gained.contains(need) && !tests.contains(need)),
             );
-            let is_whole = merges_eager
-                && action.is_eager
+            let is_whole = haste.is_some_and(|haste| action.eagerness >= haste)
                 && end_needs
                     .iter()
                     .all(|need| over_all.contains(need) || gained.contains(need));
@@ -368,15 +377,14 @@ impl Graph {
             is_changed[fact as usize] = true;
         }
         for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
-            let touches = |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
+            let touches =
+                |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
             if !compiled.timed.iter().any(|timed| touches(&timed)) {
                 continue;
             }
             for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
                 let mut spans = Vec::new();
-                let mut since = literal
-                    .holds(&compiled.initial.facts)
-                    .then_some(-NEVER);
+                let mut since = literal.holds(&compiled.initial.facts).then_some(-NEVER);
                 for timed in compiled.timed.iter().filter(touches) {
                     let is_true = timed.adds.contains(&fact);
                     match (since, is_true == literal.truth()) {
