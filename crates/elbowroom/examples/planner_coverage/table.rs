@@ -1,6 +1,7 @@
 //! From results to Markdown.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 use std::fs;
 
 use crate::row::Row;
@@ -55,7 +56,7 @@ fn table(rows: &[Row]) -> String {
     let results = Results::of(rows);
     let mut text = String::from("| domain | instances |");
     for planner in &results.planners {
-        text.push_str(&format!(" {planner}: solved | first plan | makespans |"));
+        let _ = write!(text, " {planner}: solved | first plan | makespans |");
     }
     text.push_str("\n|---|--:|");
     text.push_str(&"--:|--:|--:|".repeat(results.planners.len()));
@@ -105,8 +106,9 @@ fn line(title: &str, planners: &[&str], instances: &[&BTreeMap<&str, &Row>]) -> 
         firsts.sort_by(f64::total_cmp);
         let median = firsts.get(firsts.len() / 2);
         let median = median.map_or_else(String::new, |seconds| format!("{seconds:.2}"));
-        let scores: f64 = solved.iter().map(|(_, score)| score).sum();
-        text.push_str(&format!(" {} | {median} | {scores:.1} |", solved.len()));
+        // The sum of nothing is -0.
+        let scores = solved.iter().fold(0.0, |sum, (_, score)| sum + score);
+        let _ = write!(text, " {} | {median} | {scores:.1} |", solved.len());
     }
     text.push('\n');
     text
@@ -135,16 +137,16 @@ fn outcomes(results: &Results<'_>) -> String {
         .collect();
     let mut text = String::from("| outcome |");
     for planner in &results.planners {
-        text.push_str(&format!(" {planner} |"));
+        let _ = write!(text, " {planner} |");
     }
     text.push_str("\n|---|");
     text.push_str(&"--:|".repeat(results.planners.len()));
     text.push('\n');
     let mut count_line = |title: &str, counts: &dyn Fn(&Row) -> usize| {
-        text.push_str(&format!("| {title} |"));
+        let _ = write!(text, "| {title} |");
         for planner in &results.planners {
             let count: usize = all.iter().map(|runs| counts(runs[planner])).sum();
-            text.push_str(&format!(" {count} |"));
+            let _ = write!(text, " {count} |");
         }
         text.push('\n');
     };
@@ -168,10 +170,11 @@ fn contradictions(results: &Results<'_>) -> String {
             let says_no = runs.values().filter(|row| row.outcome == "unsolvable");
             let is_solved = runs.values().any(|row| row.is_solved());
             for row in says_no.filter(|_| is_solved) {
-                text.push_str(&format!(
+                let _ = write!(
+                    text,
                     "- {} says that {domain} {instance} has no plan, and another planner has one\n",
                     row.planner
-                ));
+                );
             }
         }
     }

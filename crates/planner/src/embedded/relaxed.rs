@@ -16,10 +16,10 @@ use super::apply::Step;
 use super::compile::{Compiled, NONE};
 use super::state::State;
 
-pub(crate) use graph::Graph;
 use super::network::SETTLED;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
+pub(crate) use graph::Graph;
 use graph::Kind;
 
 /// Beyond this, costs are all alike.
@@ -121,10 +121,18 @@ impl<'a> Relaxed<'a> {
         self.applicable.clear();
         if self.horizon < NEVER
             || !self.graph.windows.is_empty()
-            || state.open.iter().any(|open| open.node == SETTLED && open.most < NEVER)
+            || state
+                .open
+                .iter()
+                .any(|open| open.node == SETTLED && open.most < NEVER)
         {
-            self.deadlines
-                .exclude_late(self.compiled, &self.graph, state, self.horizon, &mut self.missing);
+            self.deadlines.exclude_late(
+                self.compiled,
+                &self.graph,
+                state,
+                self.horizon,
+                &mut self.missing,
+            );
         }
         let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {

@@ -212,8 +212,8 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        let outlook = (!self.style.is_hasty && !state.network.is_empty())
-            .then(|| Box::new(state.outlook()));
+        let outlook =
+            (!self.style.is_hasty && !state.network.is_empty()).then(|| Box::new(state.outlook()));
         if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
@@ -268,8 +268,7 @@ impl<'a> Search<'a> {
             let node = &self.nodes[number as usize];
             let other = &node.state;
             if other.is_discretely(state) {
-                let mut is_no_later =
-                    self.is_timeless || other.has_no_later_stamps_than(state);
+                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
                 if self.style.is_hasty {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {

@@ -200,7 +200,9 @@ impl State {
                 to_stamps,
             }
         });
-        Outlook { rows: rows.collect() }
+        Outlook {
+            rows: rows.collect(),
+        }
     }
 
     /// Whether everything settled was no later here, and what is not settled can be as early as

@@ -537,7 +537,12 @@ impl<'a> Builder<'a> {
             scale,
             epsilon,
             now: now.0,
-            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
+            fact_stamps: self
+                .symbols
+                .facts
+                .iter()
+                .map(|&fact| stamps.of_fact(fact))
+                .collect(),
             facts: self.symbols.facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,
@@ -632,10 +637,13 @@ fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
 /// Whether it costs little to let the end follow the start at once in the order of happenings:
 /// unless the action offers something to others only while it runs.
 fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
-    let conditional = end.conditional.iter().filter_map(|effect| match effect.change {
-        Change::Delete(fact) => Some(fact),
-        _ => None,
-    });
+    let conditional = end
+        .conditional
+        .iter()
+        .filter_map(|effect| match effect.change {
+            Change::Delete(fact) => Some(fact),
+            _ => None,
+        });
     let mut withdrawn = end.deletes.iter().copied().chain(conditional);
     let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
     let lends = end.updates.iter().any(|back| {
