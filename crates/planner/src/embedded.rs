@@ -26,6 +26,8 @@ mod network;
 mod relaxed;
 mod search;
 mod state;
+mod symbolic;
+mod symmetry;
 mod time;
 
 use std::ops::ControlFlow;
@@ -40,12 +42,16 @@ pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Setti
 pub use compile::Unsupported;
 
 use apply::Step;
-use compile::Compiled;
+use compile::{Compiled, Eagerness};
 use search::{Search, Style, Turn};
+use symmetry::Symmetry;
 use time::NEVER;
 
-/// How many states are looked at between two reports.
-const REPORT_EVERY: u64 = 256;
+/// How much work lies between two reports, in operators of estimates: about ten milliseconds.
+const REPORT_WORK: u64 = 2_000_000;
+
+/// The most turns between two reports.
+const REPORT_TURNS: u64 = 256;
 
 /// How many states the hasty search may look at before the complete one gets its first turns.
 const HASTE: u64 = 20_000;
@@ -95,7 +101,9 @@ pub fn plan(
         Ok(compiled) => compiled,
         Err(unsupported) => return Answer::Unsupported(unsupported),
     };
+    let symmetry = Symmetry::of(grounded, &compiled);
     Planner {
+        symmetry: &symmetry,
         task,
         situation,
         settings,
@@ -129,6 +137,7 @@ struct Planner<'a> {
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     progress: Progress,
     best: Option<Found>,
 }
@@ -136,47 +145,43 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn run(mut self) -> Answer {
         let compiled = self.compiled;
-        let mut hasty = Search::new(
-            compiled,
-            Style {
-                is_hasty: true,
-                variants: 4,
-            },
-        );
-        let mut complete = Search::new(
-            compiled,
-            Style {
-                is_hasty: false,
-                variants: usize::MAX,
-            },
-        );
+        let mut styles = vec![Style::hasty(Eagerness::Lends)];
+        let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
+        if compiled.actions.iter().any(lends) {
+            styles.push(Style::hasty(Eagerness::Free));
+        }
+        styles.push(Style::COMPLETE);
+        let mut searches: Vec<Search<'_>> = styles
+            .iter()
+            .map(|&style| Search::new(compiled, self.symmetry, style))
+            .collect();
+        let mut is_over = vec![false; searches.len()];
         let mut budget = HASTE;
-        let stopped = loop {
-            match self.work(&mut hasty, Phase::Hasty, budget) {
-                Outcome::Stop(stopped) => break stopped,
-                Outcome::Over if !hasty.is_incomplete() => break Stopped::Exhausted,
-                Outcome::Over => {
-                    if let Outcome::Stop(stopped) =
-                        self.work(&mut complete, Phase::Complete, u64::MAX)
-                    {
-                        break stopped;
-                    }
-                    break Stopped::Exhausted;
+        let stopped = 'turns: loop {
+            for (number, search) in searches.iter_mut().enumerate() {
+                if is_over[number] {
+                    continue;
                 }
-                Outcome::BudgetSpent => {}
+                let (phase, share) = match styles[number].haste {
+                    Some(_) => (Phase::Hasty, budget),
+                    None => (Phase::Complete, budget / COMPLETE_SHARE),
+                };
+                match self.work(search, phase, share) {
+                    Outcome::Stop(stopped) => break 'turns stopped,
+                    Outcome::BudgetSpent => {}
+                    Outcome::Over if search.is_incomplete() => is_over[number] = true,
+                    Outcome::Over => break 'turns Stopped::Exhausted,
+                }
             }
-            match self.work(&mut complete, Phase::Complete, budget / COMPLETE_SHARE) {
-                Outcome::Stop(stopped) => break stopped,
-                Outcome::Over => break Stopped::Exhausted,
-                Outcome::BudgetSpent => {}
+            if !is_over.contains(&false) {
+                break Stopped::Exhausted;
             }
             budget = budget.saturating_mul(2);
         };
-        let is_complete = |search: &Search<'_>| !search.is_incomplete();
         let is_proof = stopped == Stopped::Exhausted
             && compiled.is_exact
             && compiled.gap.is_none()
-            && (is_complete(&hasty) || is_complete(&complete));
+            && searches.iter().any(|search| !search.is_incomplete());
         let counts = self.progress.counts;
         match self.best {
             Some(found) => Answer::Plan {
@@ -198,6 +203,7 @@ impl Planner<'_> {
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
         let before = (self.progress.counts, search.counts());
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, REPORT_TURNS);
         for turn in 0..budget {
             match search.turn() {
                 Turn::Over => return Outcome::Over,
@@ -209,7 +215,7 @@ impl Planner<'_> {
                     }
                 }
             }
-            if turn % REPORT_EVERY == REPORT_EVERY - 1 {
+            if turn % report_every == report_every - 1 {
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);

@@ -121,13 +121,23 @@ pub(crate) struct Action {
     pub(crate) flows: Vec<Flow>,
     /// Timed initials that would break the over-all condition while the action runs; ascending.
     pub(crate) breaking_timed: Vec<u32>,
-    /// Whether it can end as soon as it has started, as far as the order of happenings goes; see
-    /// the search.
-    pub(crate) is_eager: bool,
+    /// What is lost if it ends as soon as it has started, as far as the order of happenings goes.
+    pub(crate) eagerness: Eagerness,
     /// Whether it cannot start while another instance of it runs.
     pub(crate) excludes_itself: bool,
     /// Whether something reads `?duration`, or changes continuously.
     pub(crate) uses_duration: bool,
+}
+
+/// What is lost if an action ends before anything else happens, in the order of happenings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Eagerness {
+    /// What it offers to others while it runs.
+    Offers,
+    /// That others use what is left of the quantity from which it borrows while it runs.
+    Lends,
+    /// Little.
+    Free,
 }
 
 /// How long an action may take.

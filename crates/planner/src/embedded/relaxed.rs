@@ -13,7 +13,7 @@ mod graph;
 mod numbers;
 
 use super::apply::Step;
-use super::compile::{Compiled, NONE};
+use super::compile::{Compiled, Eagerness, NONE};
 use super::state::State;
 
 use super::network::SETTLED;
@@ -65,9 +65,9 @@ pub(crate) struct Relaxed<'a> {
 }
 
 impl<'a> Relaxed<'a> {
-    /// With `merges_eager`, actions that can end at once count as one step.
-    pub(crate) fn new(compiled: &'a Compiled, merges_eager: bool) -> Self {
-        let graph = Graph::of(compiled, merges_eager);
+    /// Actions that are at least as eager as `haste` count as one step.
+    pub(crate) fn new(compiled: &'a Compiled, haste: Option<Eagerness>) -> Self {
+        let graph = Graph::of(compiled, haste);
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
@@ -85,6 +85,11 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             graph,
         }
+    }
+
+    /// The number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.graph.operators.len() as u64
     }
 
     /// The estimate, or `None` if even the relaxed goal is out of reach.
@@ -153,7 +158,8 @@ impl<'a> Relaxed<'a> {
         for (number, gap) in self.gaps.iter_mut().enumerate() {
             #[allow(clippy::cast_possible_truncation, reason = "tests are numbered by u32")]
             let test = number as u32;
-            let is_free = self.graph.is_free_test[number];
+            let is_free =
+                self.graph.is_free_test[number] || depends_on_times(self.compiled, test, state);
             if is_free || state.passes(self.compiled, test, None) {
                 reach(self.graph.test(test), cost, buckets);
             } else {
@@ -329,6 +335,17 @@ impl<'a> Relaxed<'a> {
         estimate.applicable.sort_unstable();
         estimate.applicable.dedup();
     }
+}
+
+/// Whether times decide the test; then it is taken for granted.
+fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
+    let Some(symbolic) = &state.symbolic else {
+        return false;
+    };
+    let mut depends = false;
+    let difference = &compiled.tests[test as usize].difference;
+    difference.visit_fluents(&mut |fluent| depends |= symbolic.governs(fluent));
+    depends
 }
 
 /// The steps that an operator stands for.

@@ -8,10 +8,11 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
-use super::compile::Compiled;
+use super::compile::{Compiled, Eagerness, NONE};
 use super::hash::Map;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
+use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 
 /// How many turns the preferred successors get for a better estimate.
@@ -20,16 +21,34 @@ const BOOST: i64 = 1000;
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Style {
-    /// Whether actions end at once where that costs little. Some plans are lost.
-    pub(crate) is_hasty: bool,
+    /// If present, actions that are at least so eager end at once, and states are compared
+    /// roughly. Some plans are lost.
+    pub(crate) haste: Option<Eagerness>,
     /// How many states that differ in times only are kept; more are dropped, and some plans lost.
     pub(crate) variants: usize,
+}
+
+impl Style {
+    /// Loses nothing but what [`Search::is_incomplete`] tells.
+    pub(crate) const COMPLETE: Self = Self {
+        haste: None,
+        variants: usize::MAX,
+    };
+
+    /// Actions that are at least so eager end at once.
+    pub(crate) fn hasty(haste: Eagerness) -> Self {
+        Self {
+            haste: Some(haste),
+            variants: 4,
+        }
+    }
 }
 
 /// A search in progress.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
@@ -96,7 +115,7 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, style: Style) -> Self {
+    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, style: Style) -> Self {
         let has_deadline = |most: Ticks| most < NEVER;
         let is_timeless = compiled.timed.is_empty()
             && !compiled
@@ -106,9 +125,10 @@ impl<'a> Search<'a> {
                 .any(|open| has_deadline(open.most));
         Self {
             compiled,
+            symmetry,
             style,
             stepper: Stepper::new(compiled),
-            relaxed: Relaxed::new(compiled, style.is_hasty),
+            relaxed: Relaxed::new(compiled, style.haste),
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
@@ -145,6 +165,11 @@ impl<'a> Search<'a> {
             evaluated: self.evaluated,
             memory: self.memory,
         }
+    }
+
+    /// How much there is to an estimate: the number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.relaxed.size()
     }
 
     /// Looks at one more state.
@@ -187,14 +212,18 @@ impl<'a> Search<'a> {
                     .filter(|open| open.action == action)
                     .count()
             };
-            if !data.excludes_itself && data.end != super::compile::NONE {
-                let most = if self.style.is_hasty { 0 } else { 1 };
+            if !data.excludes_itself && data.end != NONE {
+                let most = usize::from(self.style.haste.is_none());
                 if runs_already() > most {
                     self.has_lost = true;
                     return None;
                 }
             }
-            if self.style.is_hasty && data.is_eager {
+            let is_whole = self
+                .style
+                .haste
+                .is_some_and(|haste| data.eagerness >= haste);
+            if is_whole && data.end != NONE {
                 let whole = Step::Whole(action);
                 if let Some(next) = self.stepper.apply(state, whole) {
                     self.has_lost = true;
@@ -212,15 +241,21 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        let outlook =
-            (!self.style.is_hasty && !state.network.is_empty()).then(|| Box::new(state.outlook()));
+        let outlook = (self.style.haste.is_none() && !state.network.is_empty())
+            .then(|| Box::new(state.outlook()));
         if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
         self.evaluated += 1;
-        let Some(estimate) = self.relaxed.evaluate(&state) else {
+        let Some(mut estimate) = self.relaxed.evaluate(&state) else {
             return Turn::Nothing;
         };
+        self.symmetry
+            .thin_out(&state, self.is_timeless, &mut estimate.applicable);
+        let kept = &estimate.applicable;
+        estimate
+            .preferred
+            .retain(|step| kept.binary_search(step).is_ok());
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         self.known.entry(hash).or_default().push(number);
         let outlook_size = outlook.as_ref().map_or(0, |outlook| outlook.size());
@@ -269,7 +304,7 @@ impl<'a> Search<'a> {
             let other = &node.state;
             if other.is_discretely(state) {
                 let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
-                if self.style.is_hasty {
+                if self.style.haste.is_some() {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
@@ -290,11 +325,17 @@ impl<'a> Search<'a> {
     /// Whether the plan could end here.
     fn is_goal(&self, state: &State) -> bool {
         let compiled = self.compiled;
-        if !state.open.is_empty()
-            || !compiled
-                .goal
-                .holds(&state.facts, &mut |test| state.passes(compiled, test, None))
-        {
+        if !state.open.is_empty() {
+            return false;
+        }
+        let holds = if state.symbolic.is_some() {
+            let mut stepper = Stepper::new(compiled);
+            stepper.reach_goal(&mut state.clone()).is_some()
+        } else {
+            let mut passes = |test| state.passes(compiled, test, None);
+            compiled.goal.holds(&state.facts, &mut passes)
+        };
+        if !holds {
             return false;
         }
         // What happens by itself before the last happening counts.

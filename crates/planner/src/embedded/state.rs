@@ -9,6 +9,7 @@ use super::compile::Compiled;
 use super::formula::set;
 use super::hash::Mixer;
 use super::network::{Network, NodeId, SETTLED};
+use super::symbolic::Symbolic;
 use super::time::{NEVER, Ticks};
 
 /// See the module.
@@ -31,6 +32,8 @@ pub(crate) struct State {
     pub(crate) network: Network,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
+    /// The numbers that depend on times, in a problem that has such.
+    pub(crate) symbolic: Option<Box<Symbolic>>,
 }
 
 /// An action under way.
@@ -48,6 +51,11 @@ pub(crate) struct Open {
     pub(crate) duration: Option<Rational>,
     /// Which of the action's guards held at the start.
     pub(crate) guards: u64,
+    /// The node of its end, where numbers depend on times and it started in the plan; else
+    /// [`SETTLED`].
+    pub(crate) end: NodeId,
+    /// What it changes continuously, at what rates.
+    pub(crate) flows: Vec<(u32, Rational)>,
 }
 
 impl Open {
@@ -61,6 +69,8 @@ impl Open {
             most: most.unwrap_or(NEVER),
             duration: None,
             guards: u64::MAX,
+            end: SETTLED,
+            flows: Vec::new(),
         }
     }
 
@@ -177,6 +187,7 @@ impl State {
             && self.open.len() == other.open.len()
             && self.open.iter().zip(&other.open).all(|(a, b)| a.is_like(b))
             && self.values == other.values
+            && self.symbolic == other.symbolic
     }
 
     /// What matters of the unsettled past: all that what follows can push, and how far.
@@ -234,6 +245,7 @@ impl State {
             + size_of::<Option<Rational>>() * self.values.len()
             + size_of::<Open>() * self.open.len()
             + self.network.size()
+            + self.symbolic.as_ref().map_or(0, |symbolic| symbolic.size())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::compile::{Action, Change, Compiled, NONE, Snap, Timed, Update};
+use super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Timed, Update};
 use super::super::formula::{Formula, Literal};
 use super::super::time::{NEVER, Ticks};
 use super::numbers;
@@ -88,7 +88,7 @@ struct Draft<'a> {
 }
 
 impl Graph {
-    pub(crate) fn of(compiled: &Compiled, merges_eager: bool) -> Self {
+    pub(crate) fn of(compiled: &Compiled, haste: Option<Eagerness>) -> Self {
         let first_test = narrow(2 * compiled.facts.len());
         let first_running = first_test + narrow(compiled.tests.len());
         let mut tests_of_fluent = vec![Vec::new(); compiled.fluents.len()];
@@ -110,7 +110,7 @@ impl Graph {
         };
         graph.add_timetables(compiled);
         for (number, action) in compiled.actions.iter().enumerate() {
-            graph.add_action(compiled, narrow(number), action, merges_eager);
+            graph.add_action(compiled, narrow(number), action, haste);
         }
         graph.add_rules(compiled);
         graph.add_timed(compiled);
@@ -193,7 +193,7 @@ impl Graph {
         compiled: &Compiled,
         number: u32,
         action: &Action,
-        merges_eager: bool,
+        haste: Option<Eagerness>,
     ) {
         if action.end == NONE {
             let snap = compiled.snap(action.start);
@@ -227,8 +227,7 @@ impl Graph {
                     .iter()
                     .filter(|need| !gained.contains(need) && !tests.contains(need)),
             );
-            let is_whole = merges_eager
-                && action.is_eager
+            let is_whole = haste.is_some_and(|haste| action.eagerness >= haste)
                 && end_needs
                     .iter()
                     .all(|need| over_all.contains(need) || gained.contains(need));
