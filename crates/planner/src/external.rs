@@ -8,13 +8,13 @@
 //! The way through the module:
 //!
 //! 1. `registry`, `command`: which program to start with which arguments.
-//! 2. `request`: the files that it gets. At the beginning of a task these are the user's own
+//! 2. `request`, `start`: the files that it gets. At the beginning of a task these are the user's own
 //!    texts, to the letter; in mid-execution the problem is written anew
 //!    ([`elbowroom_pddl::write_problem`]).
 //! 3. `supervise`: the process. It has a process group, a folder and limits of its own, its output
 //!    is read as it comes, and at the end nothing of it is left.
-//! 4. `log`: plans and telling phrases in what it prints. Memory stays bounded whatever that is.
-//! 5. `judge`: each plan is judged before anyone sees it, and repaired where only its times are
+//! 4. `reader`, `log`: plans and telling phrases in what it prints. Memory stays bounded whatever that is.
+//! 5. `run`, `judge`: each plan is judged before anyone sees it, and repaired where only its times are
 //!    rounded.
 //!
 //! This is the one place below the command line that looks at a clock, starts threads and
@@ -29,9 +29,11 @@ mod mailbox;
 mod outcome;
 #[cfg(target_os = "linux")]
 mod processes;
+mod reader;
 mod registry;
 mod request;
 mod run;
+mod start;
 mod supervise;
 mod workspace;
 

@@ -105,10 +105,7 @@ pub const REGISTRY: &[Registered] = &[
         how_to_get: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
                      ELBOWROOM_LPG",
         habits: Habits {
-            unsolvable: &[
-                "goals of the planning problem are not reachable",
-                "problem unsolvable",
-            ],
+            unsolvable: &["the problem is unsolvable", "no plan will solve it"],
             gave_up: &["search limit exceeded", "max time exceeded", "no solution"],
             unsupported: &["syntax error", "not supported", "not yet handled"],
             missing: &[],
@@ -145,6 +142,7 @@ const ANYONE: Habits = Habits {
     unsolvable: &[
         "problem unsolvable",
         "problem is unsolvable",
+        "no plan will solve it",
         "proven unsolvable",
         "unsolvable_proven",
         "no plan exists",

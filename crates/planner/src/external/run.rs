@@ -1,25 +1,25 @@
 //! From a request to an outcome.
 
-use std::fs;
 use std::io;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
 use elbowroom_num::Rational;
 
 use super::clock::Clock;
-use super::command::{Filling, find_program};
 use super::judge::{Judge, Judgement, Repair};
-use super::log::{Log, Sayings};
-use super::mailbox::{Mail, Mailbox};
+use super::log::Sayings;
+use super::mailbox::Mail;
 use super::outcome::{Event, Found, Outcome, Report, Statistics};
-use super::registry::{Kind, Planner};
-use super::request::{Question, Request};
-use super::supervise::{Ended, Ending, Limits, Stream, Watcher, supervise};
+use super::reader::{Reader, Shared};
+use super::registry::Planner;
+use super::request::Request;
+use super::start::{not_started, prepare};
+use super::supervise::{Ended, Ending, Limits, supervise};
 use super::workspace::Workspace;
 
 /// How to run a planner.
@@ -47,17 +47,10 @@ impl Default for Settings {
     }
 }
 
-/// The shim that speaks with unified-planning.
-const UP_SHIM: &str = include_str!("up_shim.py");
 /// How often the observer is asked whether to go on.
 const HEARTBEAT: Duration = Duration::from_millis(20);
 /// How long after the time limit plans that wait to be judged still count.
 const GRACE: Duration = Duration::from_millis(50);
-/// Given to planners that want a limit of their own where there is none: a day.
-const NO_TIME_LIMIT: u64 = 86_400;
-/// The same for memory: a million MB.
-const NO_MEMORY_LIMIT: u64 = 1_000_000;
-
 /// Asks a planner for a plan. `observe` hears of each plan, and otherwise about fifty times a
 /// second; it can end the run, which then answers with the last plan found. `repair` gets plans
 /// that the judge refuses.
@@ -89,92 +82,6 @@ pub fn plan(
     }
 }
 
-/// Everything that is needed to start the planner, or why it cannot be started.
-fn prepare(
-    planner: &Planner,
-    request: &Request<'_>,
-    settings: &Settings,
-) -> Result<(Question, Workspace, process::Command), Outcome> {
-    let question = Question::of(request, &settings.epsilon).map_err(|reason| {
-        let help =
-            "plan from a moment at which that action has ended, or with the embedded planner";
-        not_started(reason, help)
-    })?;
-    let program = match &planner.kind {
-        Kind::Program(command) => &command.program,
-        Kind::UnifiedPlanning { python, .. } => python,
-    };
-    let found = find_program(program).ok_or_else(|| {
-        let what = if program.is_file() {
-            "you may not execute"
-        } else {
-            "there is no program"
-        };
-        not_started(format!("{what} {}", program.display()), &planner.how_to_get)
-    })?;
-    let domain = request.domain.text();
-    let scratch = settings.scratch.as_deref();
-    let workspace = Workspace::new(scratch, domain, &question.text).map_err(|error| {
-        let help = "make room there, or set TMPDIR to a folder that you may write to";
-        not_started(format!("no temporary folder can be made: {error}"), help)
-    })?;
-    let command = command(planner, &found, &workspace, settings).map_err(|error| {
-        not_started(
-            format!("its folder cannot be filled: {error}"),
-            "make room on the disk",
-        )
-    })?;
-    Ok((question, workspace, command))
-}
-
-fn not_started(reason: String, help: &str) -> Outcome {
-    Outcome::NotStarted {
-        reason,
-        help: help.to_owned(),
-    }
-}
-
-/// The process to be.
-fn command(
-    planner: &Planner,
-    program: &Path,
-    workspace: &Workspace,
-    settings: &Settings,
-) -> io::Result<process::Command> {
-    let seconds = |limit: Duration| limit.as_secs() + u64::from(limit.subsec_nanos() > 0);
-    let filling = Filling {
-        domain: workspace.domain(),
-        problem: workspace.problem(),
-        plan: workspace.plan(),
-        time: settings.time_limit.map_or(NO_TIME_LIMIT, seconds),
-        memory: settings
-            .memory_limit
-            .map_or(NO_MEMORY_LIMIT, |bytes| bytes >> 20),
-    };
-    let mut command = process::Command::new(program);
-    match &planner.kind {
-        Kind::Program(own) => {
-            command.args(own.filled(&filling));
-        }
-        Kind::UnifiedPlanning { engine, .. } => {
-            let shim = workspace.path().join("up_shim.py");
-            fs::write(&shim, UP_SHIM)?;
-            command.arg(shim).arg(engine);
-            command.args([filling.domain, filling.problem]);
-            command.arg(filling.time.to_string());
-        }
-    }
-    command
-        .current_dir(workspace.path())
-        // What it writes elsewhere for a while goes with the folder.
-        .env("TMPDIR", workspace.path())
-        // Points, not commas, in numbers.
-        .env("LC_ALL", "C")
-        .env("PYTHONUNBUFFERED", "1")
-        .env("PYTHONDONTWRITEBYTECODE", "1");
-    Ok(command)
-}
-
 /// A run under way, on the side of the judge.
 struct Run<'a, 'r> {
     judge: Judge<'a, 'r>,
@@ -188,14 +95,6 @@ struct Run<'a, 'r> {
     unreadable: Option<String>,
     statistics: Statistics,
     is_stopped: bool,
-}
-
-/// What the two sides share.
-#[derive(Default)]
-struct Shared {
-    mailbox: Mailbox,
-    stop: AtomicBool,
-    memory: AtomicU64,
 }
 
 /// Sets its flag when it goes.
@@ -254,7 +153,7 @@ impl<'a, 'r> Run<'a, 'r> {
             Ok(ended) => ended,
             Err(error) => return self.not_started(planner, &error),
         };
-        self.statistics.printed = reader.output.bytes + reader.error.bytes;
+        self.statistics.printed = reader.printed_bytes();
         let sayings = reader.sayings();
         let excerpt = reader.excerpt();
         // The folder goes before anyone hears of the end.
@@ -439,84 +338,5 @@ fn crash_signal(ending: Ending) -> Option<i32> {
         Ending::Signalled(signal) => Some(signal),
         Ending::Exited(code) => FAULTS.contains(&(code - 128)).then_some(code - 128),
         _ => None,
-    }
-}
-
-/// The side that reads.
-struct Reader<'s> {
-    output: Log,
-    error: Log,
-    workspace: Workspace,
-    shared: &'s Shared,
-    is_even: bool,
-}
-
-impl<'s> Reader<'s> {
-    fn new(planner: &Planner, workspace: Workspace, shared: &'s Shared) -> Self {
-        Self {
-            output: Log::new(planner.habits),
-            error: Log::new(planner.habits),
-            workspace,
-            shared,
-            is_even: false,
-        }
-    }
-
-    /// Reads the rest; nothing comes any more.
-    fn end(&mut self, ending: Option<Ending>) {
-        let by_itself = matches!(ending, Some(Ending::Exited(_) | Ending::Signalled(_)));
-        let mut put = |text| self.shared.mailbox.put(text);
-        self.output.end(by_itself, &mut put);
-        self.error.end(by_itself, &mut put);
-        for text in self.workspace.new_plans(true) {
-            self.shared.mailbox.put(text);
-        }
-        self.shared.mailbox.close();
-    }
-
-    /// What it said; of two lines about the same, the one that says more.
-    fn sayings(&self) -> Sayings {
-        let (output, error) = (&self.output.sayings, &self.error.sayings);
-        let more = |output: &Option<String>, error: &Option<String>| {
-            let said = output.iter().chain(error);
-            said.max_by_key(|line| line.len()).cloned()
-        };
-        Sayings {
-            unsolvable: more(&output.unsolvable, &error.unsolvable),
-            gave_up: more(&output.gave_up, &error.gave_up),
-            unsupported: more(&output.unsupported, &error.unsupported),
-            missing: more(&output.missing, &error.missing),
-            out_of_memory: more(&output.out_of_memory, &error.out_of_memory),
-        }
-    }
-
-    /// The end of what it printed; its complaints, if there are any.
-    fn excerpt(&self) -> String {
-        let error = self.error.excerpt();
-        if error.is_empty() {
-            self.output.excerpt()
-        } else {
-            error
-        }
-    }
-}
-
-impl Watcher for Reader<'_> {
-    fn printed(&mut self, stream: Stream, bytes: &[u8]) {
-        let mut put = |text| self.shared.mailbox.put(text);
-        match stream {
-            Stream::Output => self.output.feed(bytes, &mut put),
-            Stream::Error => self.error.feed(bytes, &mut put),
-        }
-    }
-
-    fn tick(&mut self, memory: u64) {
-        self.shared.memory.store(memory, Ordering::Relaxed);
-        self.is_even = !self.is_even;
-        if self.is_even {
-            for text in self.workspace.new_plans(false) {
-                self.shared.mailbox.put(text);
-            }
-        }
     }
 }

@@ -6,6 +6,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use elbowroom_pddl::LineKind;
 use tempfile::TempDir;
 
 /// A larger plan file is none.
@@ -99,8 +100,16 @@ impl Workspace {
         }
         ready.sort();
         let texts = ready.iter().filter_map(|(_, path)| text_of(path).ok());
-        texts.collect()
+        texts.filter(|text| has_actions(text)).collect()
     }
+}
+
+/// Whether there is a plan in it. Some planners also write files to say that there is none.
+fn has_actions(text: &str) -> bool {
+    let kinds = text.lines().map(LineKind::of);
+    kinds
+        .into_iter()
+        .any(|kind| matches!(kind, LineKind::Timed | LineKind::Untimed))
 }
 
 fn text_of(path: &Path) -> io::Result<String> {
@@ -121,6 +130,7 @@ mod tests {
         let plan = workspace.plan();
         fs::write(&plan, "0: (a)").unwrap();
         fs::write(plan.with_extension("1"), "").unwrap();
+        fs::write(plan.with_extension("2"), "; Time 0.1\nno solution\n").unwrap();
         assert_eq!(workspace.new_plans(false), [""; 0]);
         assert_eq!(workspace.new_plans(false), ["0: (a)"]);
         assert_eq!(workspace.new_plans(true), [""; 0]);

@@ -1,0 +1,48 @@
+//! Which planner solves which benchmark, and how fast.
+//!
+//! ```text
+//! planner_coverage run --data FOLDER --planner NAME … -o FILE.csv
+//!                      [--time S] [--memory MB] [--jobs N] [--only TEXT] [--every K]
+//! planner_coverage table FILE.csv
+//! ```
+//!
+//! `run` has each planner (`embedded`, those of the registry, `up:ENGINE`, or a command line) plan
+//! for each temporal instance of `FOLDER/manifest.csv`, and appends one line for each to the file.
+//! Lines that are there already are not run again, so an interrupted run goes on where it was.
+//! `--only` keeps instances whose line in the manifest has the text in it; `--every` each Kth of
+//! a domain. `table` makes Markdown of the file.
+//!
+//! All planners run as processes under the same supervision, the embedded one too (this program
+//! calls itself for that), so times include the start of the process, and memory is measured in the
+//! same way. Only plans that the judge accepts count.
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "that is what the example does"
+)]
+
+mod embedded;
+mod row;
+mod run;
+mod table;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
+    let outcome = match command.as_str() {
+        "run" => run::main(&rest),
+        "table" => table::main(&rest),
+        "embedded" => embedded::main(&rest),
+        _ => Err("the first word is `run` or `table`; the source says what follows".to_owned()),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Runs planners on instances, and writes down what became of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use elbowroom::flow;
+use elbowroom::model::{Situation, Task};
+use elbowroom::pddl::{Source, read_problem};
+use elbowroom::planner::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
+
+use crate::row::{HEADER, Row};
+
+struct Options {
+    data: PathBuf,
+    planners: Vec<String>,
+    output: PathBuf,
+    seconds: u64,
+    megabytes: u64,
+    jobs: usize,
+    only: Option<String>,
+    every: usize,
+}
+
+/// One planner on one instance.
+struct Job {
+    row: Row,
+    domain: PathBuf,
+    problem: PathBuf,
+}
+
+pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
+    let options = options(arguments)?;
+    let done = done(&options.output)?;
+    let jobs: Vec<Job> = jobs(&options)?
+        .into_iter()
+        .filter(|job| !done.contains(&job.row.key()))
+        .collect();
+    eprintln!("{} runs, {} done before", jobs.len(), done.len());
+    let file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(&options.output)
+        .map_err(|error| format!("{}: {error}", options.output.display()))?;
+    if done.is_empty() && file.metadata().is_ok_and(|file| file.len() == 0) {
+        write(&file, HEADER)?;
+    }
+    let file = Mutex::new(file);
+    let next = AtomicUsize::new(0);
+    let work = || -> Result<(), String> {
+        loop {
+            let position = next.fetch_add(1, Ordering::Relaxed);
+            let Some(job) = jobs.get(position) else {
+                return Ok(());
+            };
+            let row = run(job, &options);
+            eprintln!(
+                "{}/{} {} {} {}: {}",
+                position + 1,
+                jobs.len(),
+                row.planner,
+                row.domain,
+                row.instance,
+                row.outcome
+            );
+            let file = file.lock().map_err(|_| "another job has failed")?;
+            write(&file, &row.line())?;
+        }
+    };
+    thread::scope(|scope| {
+        let workers: Vec<_> = (0..options.jobs).map(|_| scope.spawn(work)).collect();
+        for worker in workers {
+            worker.join().map_err(|_| "a job panicked".to_owned())??;
+        }
+        Ok(())
+    })
+}
+
+fn write(mut file: &File, line: &str) -> Result<(), String> {
+    writeln!(file, "{line}").map_err(|error| format!("the results cannot be written: {error}"))
+}
+
+fn options(arguments: &[String]) -> Result<Options, String> {
+    let mut options = Options {
+        data: PathBuf::from("../shared/data/pddl"),
+        planners: Vec::new(),
+        output: PathBuf::new(),
+        seconds: 30,
+        megabytes: 4096,
+        jobs: 1,
+        only: None,
+        every: 1,
+    };
+    let mut arguments = arguments.iter();
+    while let Some(option) = arguments.next() {
+        let value = arguments
+            .next()
+            .ok_or_else(|| format!("{option} takes a value"))?;
+        let number = || {
+            let number: Result<usize, _> = value.parse();
+            number.map_err(|_| format!("{option} takes a number, not {value}"))
+        };
+        match option.as_str() {
+            "--data" => options.data = PathBuf::from(value),
+            "--planner" => options.planners.push(value.clone()),
+            "-o" => options.output = PathBuf::from(value),
+            "--time" => options.seconds = number()? as u64,
+            "--memory" => options.megabytes = number()? as u64,
+            "--jobs" => options.jobs = number()?.max(1),
+            "--only" => options.only = Some(value.clone()),
+            "--every" => options.every = number()?.max(1),
+            _ => return Err(format!("unknown option {option}")),
+        }
+    }
+    if options.planners.is_empty() || options.output.as_os_str().is_empty() {
+        return Err("name at least one --planner, and a file with -o".to_owned());
+    }
+    Ok(options)
+}
+
+/// The runs that a file has already.
+fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
+    if !path.exists() {
+        return Ok(BTreeSet::new());
+    }
+    let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let rows = text.lines().skip(1).filter_map(Row::parse);
+    Ok(rows.map(|row| row.key()).collect())
+}
+
+/// All planners on the temporal instances, instance by instance.
+fn jobs(options: &Options) -> Result<Vec<Job>, String> {
+    let manifest = options.data.join("manifest.csv");
+    let text = fs::read_to_string(&manifest)
+        .map_err(|error| format!("{}: {error}", manifest.display()))?;
+    let mut jobs = Vec::new();
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for line in text.lines().skip(1) {
+        let columns: Vec<&str> = line.split(',').collect();
+        let [
+            collection,
+            domain,
+            instance,
+            domain_file,
+            problem_file,
+            _,
+            durative,
+            _,
+            _,
+            _,
+            domain_features,
+            problem_features,
+        ] = columns[..]
+        else {
+            continue;
+        };
+        let is_wanted = options.only.as_ref().is_none_or(|text| line.contains(text));
+        if durative == "0" || !is_wanted {
+            continue;
+        }
+        let domain = format!("{collection}/{domain}");
+        let count = counts.entry(domain.clone()).or_default();
+        *count += 1;
+        if !(*count - 1).is_multiple_of(options.every) {
+            continue;
+        }
+        for planner in &options.planners {
+            jobs.push(Job {
+                row: Row {
+                    planner: planner.clone(),
+                    kinds: kinds(&domain, domain_features, problem_features),
+                    domain: domain.clone(),
+                    instance: instance.to_owned(),
+                    ..Row::default()
+                },
+                domain: options.data.join(domain_file),
+                problem: options.data.join(problem_file),
+            });
+        }
+    }
+    Ok(jobs)
+}
+
+/// What makes an instance hard in a way that interests us.
+fn kinds(domain: &str, domain_features: &str, problem_features: &str) -> String {
+    /// Domains in which no plan does one thing after the other.
+    const CONCURRENT: &[&str] = &["match", "tms", "driverlogshift", "concurrency"];
+    let features: BTreeSet<&str> = domain_features
+        .split_whitespace()
+        .chain(problem_features.split_whitespace())
+        .collect();
+    let mut kinds = Vec::new();
+    if features.contains("TIL") {
+        kinds.push("deadlines");
+    }
+    if features.contains("num-cond") || features.contains("num-eff") {
+        kinds.push("numbers");
+    }
+    let name = domain.to_lowercase();
+    if CONCURRENT.iter().any(|word| name.contains(word)) {
+        kinds.push("concurrency");
+    }
+    kinds.join(" ")
+}
+
+fn run(job: &Job, options: &Options) -> Row {
+    let mut row = job.row.clone();
+    let outcome = |row: Row, outcome: &str, note: String| Row {
+        outcome: outcome.to_owned(),
+        note,
+        ..row
+    };
+    let source = |path: &Path| match fs::read(path) {
+        Ok(bytes) => Source::from_bytes(path.display().to_string(), &bytes),
+        Err(error) => Source::new(path.display().to_string(), error.to_string()),
+    };
+    let (domain, problem) = (source(&job.domain), source(&job.problem));
+    let mut task = match read_problem(&domain, &problem) {
+        Ok((problem, _)) => Task::new(problem),
+        Err(errors) => {
+            let first = errors.errors().next().map(ToString::to_string);
+            return outcome(row, "not read", first.unwrap_or_default());
+        }
+    };
+    let planner = match planner(&row.planner) {
+        Ok(planner) => planner,
+        Err(error) => return outcome(row, "not started", error),
+    };
+    let settings = Settings {
+        time_limit: Some(Duration::from_secs(options.seconds)),
+        memory_limit: Some(options.megabytes << 20),
+        ..Settings::default()
+    };
+    let epsilon = settings.epsilon.clone();
+    let situation = Situation::initial(&task);
+    let mut first_makespan = None;
+    let report = plan(
+        &planner,
+        &mut Request {
+            task: &mut task,
+            situation: &situation,
+            domain: &domain,
+            problem: &problem,
+        },
+        &settings,
+        &mut |task, plan| flow::repaired(task, plan, &epsilon),
+        &mut |event| {
+            if let Event::Plan { found, .. } = event {
+                first_makespan.get_or_insert_with(|| found.makespan.to_decimal(3));
+            }
+            ControlFlow::Continue(())
+        },
+    );
+    row.first_makespan = first_makespan.unwrap_or_default();
+    filled(row, &report)
+}
+
+/// The planner of that name; the embedded one as a process of its own.
+fn planner(name: &str) -> Result<Planner, String> {
+    if name != "embedded" {
+        return Planner::named(name).map_err(|error| error.to_string());
+    }
+    let program = std::env::current_exe().map_err(|error| error.to_string())?;
+    let line = format!(
+        "'{}' embedded {{domain}} {{problem}} {{time}} {{memory}}",
+        program.display()
+    );
+    let mut planner = Planner::named(&line).map_err(|error| error.to_string())?;
+    name.clone_into(&mut planner.name);
+    Ok(planner)
+}
+
+fn filled(row: Row, report: &Report) -> Row {
+    let seconds = |time: Duration| format!("{:.3}", time.as_secs_f64());
+    let statistics = &report.statistics;
+    let note = match &report.outcome {
+        Outcome::Plan(found) => found.repaired.clone().unwrap_or_default(),
+        Outcome::NotUnderstood { excerpt, .. } | Outcome::Crashed { excerpt, .. } => {
+            let last: Vec<&str> = excerpt.lines().rev().take(2).collect();
+            format!("{}: {}", report.outcome, last.join(" / "))
+        }
+        other => other.to_string(),
+    };
+    let found = report.outcome.found();
+    Row {
+        outcome: report.outcome.name().to_owned(),
+        first_seconds: statistics.first_plan.map(seconds).unwrap_or_default(),
+        best_makespan: found
+            .map(|found| found.makespan.to_decimal(3))
+            .unwrap_or_default(),
+        plans: statistics.plans.to_string(),
+        refused: statistics.refused.to_string(),
+        repaired: found
+            .map(|found| {
+                if found.repaired.is_some() {
+                    "yes"
+                } else {
+                    "no"
+                }
+                .to_owned()
+            })
+            .unwrap_or_default(),
+        seconds: seconds(statistics.elapsed),
+        megabytes: (statistics.peak_memory >> 20).to_string(),
+        note: note.chars().take(300).collect(),
+        ..row
+    }
+}

@@ -1,0 +1,186 @@
+//! From results to Markdown.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+use std::fs;
+
+use crate::row::Row;
+
+/// `table FILE.csv`
+pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
+    let [path] = arguments else {
+        return Err("table FILE.csv".to_owned());
+    };
+    let text = fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
+    let rows: Vec<Row> = text.lines().skip(1).filter_map(Row::parse).collect();
+    print!("{}", table(&rows));
+    Ok(())
+}
+
+/// Instance and planner lead to what became of it. An instance counts if every planner was run on
+/// it, so that all are measured on the same.
+struct Results<'a> {
+    planners: Vec<&'a str>,
+    /// By domain, in order; then by instance; then by planner.
+    domains: BTreeMap<&'a str, BTreeMap<&'a str, BTreeMap<&'a str, &'a Row>>>,
+}
+
+impl<'a> Results<'a> {
+    fn of(rows: &'a [Row]) -> Self {
+        let mut planners: Vec<&str> = Vec::new();
+        let mut domains: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, &Row>>> = BTreeMap::new();
+        for row in rows.iter().filter(|row| row.outcome != "not read") {
+            if !planners.contains(&row.planner.as_str()) {
+                planners.push(&row.planner);
+            }
+            let instances = domains.entry(&row.domain).or_default();
+            let runs = instances.entry(&row.instance).or_default();
+            runs.insert(&row.planner, row);
+        }
+        for instances in domains.values_mut() {
+            instances.retain(|_, runs| runs.len() == planners.len());
+        }
+        domains.retain(|_, instances| !instances.is_empty());
+        Self { planners, domains }
+    }
+
+    /// The instances with a row for which `keep` holds.
+    fn instances(&self, keep: impl Fn(&Row) -> bool) -> Vec<&BTreeMap<&'a str, &'a Row>> {
+        let all = self.domains.values().flat_map(BTreeMap::values);
+        all.filter(|runs| runs.values().any(|row| keep(row)))
+            .collect()
+    }
+}
+
+fn table(rows: &[Row]) -> String {
+    let results = Results::of(rows);
+    let mut text = String::from("| domain | instances |");
+    for planner in &results.planners {
+        let _ = write!(text, " {planner}: solved | first plan | makespans |");
+    }
+    text.push_str("\n|---|--:|");
+    text.push_str(&"--:|--:|--:|".repeat(results.planners.len()));
+    text.push('\n');
+    for (domain, instances) in &results.domains {
+        let runs: Vec<_> = instances.values().collect();
+        text.push_str(&line(domain, &results.planners, &runs));
+    }
+    for (title, kind) in [
+        ("**with deadlines**", Some("deadlines")),
+        ("**with numbers**", Some("numbers")),
+        ("**with required concurrency**", Some("concurrency")),
+        ("**any of these**", Some("")),
+        ("**all**", None),
+    ] {
+        let runs = results.instances(|row| match kind {
+            None => true,
+            Some("") => !row.kinds.is_empty(),
+            Some(kind) => row.kinds.split(' ').any(|own| own == kind),
+        });
+        if !runs.is_empty() {
+            text.push_str(&line(title, &results.planners, &runs));
+        }
+    }
+    text.push_str(
+        "\nSolved: instances with a plan that the judge accepts. First plan: the median of the \
+         seconds to it,\nprocess start included. Makespans: the sum, over the instances it \
+         solved, of the least makespan that any\nplanner here found divided by its own.\n\n",
+    );
+    text.push_str(&outcomes(&results));
+    text.push_str(&contradictions(&results));
+    text
+}
+
+fn line(title: &str, planners: &[&str], instances: &[&BTreeMap<&str, &Row>]) -> String {
+    let mut text = format!("| {title} | {} |", instances.len());
+    for planner in planners {
+        let solved: Vec<(&Row, f64)> = instances
+            .iter()
+            .filter(|runs| runs[planner].is_solved())
+            .map(|runs| (runs[planner], score(runs, planner)))
+            .collect();
+        let mut firsts: Vec<f64> = solved
+            .iter()
+            .filter_map(|(row, _)| row.first_seconds.parse().ok())
+            .collect();
+        firsts.sort_by(f64::total_cmp);
+        let median = firsts.get(firsts.len() / 2);
+        let median = median.map_or_else(String::new, |seconds| format!("{seconds:.2}"));
+        // The sum of nothing is -0.
+        let scores = solved.iter().fold(0.0, |sum, (_, score)| sum + score);
+        let _ = write!(text, " {} | {median} | {scores:.1} |", solved.len());
+    }
+    text.push('\n');
+    text
+}
+
+/// The least makespan of all planners, divided by this one's.
+fn score(runs: &BTreeMap<&str, &Row>, planner: &str) -> f64 {
+    let makespan = |row: &Row| row.best_makespan.parse::<f64>().ok();
+    let least = runs
+        .values()
+        .filter_map(|row| makespan(row))
+        .reduce(f64::min);
+    match (least, makespan(runs[planner])) {
+        (Some(least), Some(own)) if own > 0.0 => least / own,
+        (Some(_), Some(_)) => 1.0,
+        _ => 0.0,
+    }
+}
+
+/// How each planner's runs ended.
+fn outcomes(results: &Results<'_>) -> String {
+    let all = results.instances(|_| true);
+    let names: BTreeSet<&str> = all
+        .iter()
+        .flat_map(|runs| runs.values().map(|row| row.outcome.as_str()))
+        .collect();
+    let mut text = String::from("| outcome |");
+    for planner in &results.planners {
+        let _ = write!(text, " {planner} |");
+    }
+    text.push_str("\n|---|");
+    text.push_str(&"--:|".repeat(results.planners.len()));
+    text.push('\n');
+    let mut count_line = |title: &str, counts: &dyn Fn(&Row) -> usize| {
+        let _ = write!(text, "| {title} |");
+        for planner in &results.planners {
+            let count: usize = all.iter().map(|runs| counts(runs[planner])).sum();
+            let _ = write!(text, " {count} |");
+        }
+        text.push('\n');
+    };
+    for name in names {
+        count_line(name, &|row| usize::from(row.outcome == name));
+    }
+    count_line("plans refused by the judge", &|row| {
+        row.refused.parse().unwrap_or(0)
+    });
+    count_line("plans whose times were repaired", &|row| {
+        usize::from(row.repaired == "yes")
+    });
+    text
+}
+
+/// Instances that one planner solves although another says that there is no plan.
+fn contradictions(results: &Results<'_>) -> String {
+    let mut text = String::new();
+    for (domain, instances) in &results.domains {
+        for (instance, runs) in instances {
+            let says_no = runs.values().filter(|row| row.outcome == "unsolvable");
+            let is_solved = runs.values().any(|row| row.is_solved());
+            for row in says_no.filter(|_| is_solved) {
+                let _ = write!(
+                    text,
+                    "- {} says that {domain} {instance} has no plan, and another planner has one\n",
+                    row.planner
+                );
+            }
+        }
+    }
+    if text.is_empty() {
+        "\nNo planner denied an instance that another one solved.\n".to_owned()
+    } else {
+        format!("\n{text}")
+    }
+}

@@ -1,0 +1,103 @@
+//! The side of a run that reads: output and plan files, while the time is kept.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use super::log::{Log, Sayings};
+use super::mailbox::Mailbox;
+use super::registry::Planner;
+use super::supervise::{Ending, Stream, Watcher};
+use super::workspace::Workspace;
+
+/// What the side that reads shares with the side that judges.
+#[derive(Default)]
+pub(super) struct Shared {
+    pub(super) mailbox: Mailbox,
+    /// Set by the side that judges, to end the run.
+    pub(super) stop: AtomicBool,
+    /// In bytes, as last measured.
+    pub(super) memory: AtomicU64,
+}
+
+/// The side that reads.
+pub(super) struct Reader<'s> {
+    output: Log,
+    error: Log,
+    workspace: Workspace,
+    shared: &'s Shared,
+    is_even: bool,
+}
+
+impl<'s> Reader<'s> {
+    pub(super) fn new(planner: &Planner, workspace: Workspace, shared: &'s Shared) -> Self {
+        Self {
+            output: Log::new(planner.habits),
+            error: Log::new(planner.habits),
+            workspace,
+            shared,
+            is_even: false,
+        }
+    }
+
+    /// How many bytes came.
+    pub(super) fn printed_bytes(&self) -> u64 {
+        self.output.bytes + self.error.bytes
+    }
+
+    /// Reads the rest; nothing comes any more.
+    pub(super) fn end(&mut self, ending: Option<Ending>) {
+        let by_itself = matches!(ending, Some(Ending::Exited(_) | Ending::Signalled(_)));
+        let mut put = |text| self.shared.mailbox.put(text);
+        self.output.end(by_itself, &mut put);
+        self.error.end(by_itself, &mut put);
+        for text in self.workspace.new_plans(true) {
+            self.shared.mailbox.put(text);
+        }
+        self.shared.mailbox.close();
+    }
+
+    /// What it said; of two lines about the same, the one that says more.
+    pub(super) fn sayings(&self) -> Sayings {
+        let (output, error) = (&self.output.sayings, &self.error.sayings);
+        let more = |output: &Option<String>, error: &Option<String>| {
+            let said = output.iter().chain(error);
+            said.max_by_key(|line| line.len()).cloned()
+        };
+        Sayings {
+            unsolvable: more(&output.unsolvable, &error.unsolvable),
+            gave_up: more(&output.gave_up, &error.gave_up),
+            unsupported: more(&output.unsupported, &error.unsupported),
+            missing: more(&output.missing, &error.missing),
+            out_of_memory: more(&output.out_of_memory, &error.out_of_memory),
+        }
+    }
+
+    /// The end of what it printed; its complaints, if there are any.
+    pub(super) fn excerpt(&self) -> String {
+        let error = self.error.excerpt();
+        if error.is_empty() {
+            self.output.excerpt()
+        } else {
+            error
+        }
+    }
+}
+
+impl Watcher for Reader<'_> {
+    fn printed(&mut self, stream: Stream, bytes: &[u8]) {
+        let mut put = |text| self.shared.mailbox.put(text);
+        match stream {
+            Stream::Output => self.output.feed(bytes, &mut put),
+            Stream::Error => self.error.feed(bytes, &mut put),
+        }
+    }
+
+    fn tick(&mut self, memory: u64) {
+        self.shared.memory.store(memory, Ordering::Relaxed);
+        self.is_even = !self.is_even;
+        if self.is_even {
+            for text in self.workspace.new_plans(false) {
+                self.shared.mailbox.put(text);
+            }
+        }
+    }
+}
