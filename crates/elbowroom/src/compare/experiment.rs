@@ -19,6 +19,8 @@ pub struct Experiment {
     pub problem: String,
     /// What to fill in: each name takes each of its values, with each value of the others.
     pub blanks: IndexMap<String, Vec<String>>,
+    /// More to fill in: several names together, row by row.
+    pub together: Vec<Together>,
     /// The columns.
     pub columns: Vec<Column>,
     /// The rows.
@@ -48,6 +50,22 @@ pub struct Column {
     pub world: String,
     /// What is left open.
     pub vary: Vec<VarySpec>,
+}
+
+/// Blanks that are filled in together.
+#[derive(Clone, Debug)]
+pub struct Together {
+    /// Their names.
+    pub names: Vec<String>,
+    /// A value for each, row by row.
+    pub rows: Vec<Vec<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TogetherFile {
+    names: Vec<String>,
+    rows: Vec<Spanned<Vec<toml::Value>>>,
 }
 
 /// Figures of a paper, one for each column.
@@ -106,6 +124,8 @@ struct File {
     planner_states: Option<u64>,
     #[serde(default)]
     blanks: IndexMap<String, Vec<toml::Value>>,
+    #[serde(default)]
+    together: Vec<TogetherFile>,
     column: Vec<ColumnFile>,
     #[serde(default)]
     published: Vec<Spanned<Published>>,
@@ -171,6 +191,19 @@ impl Experiment {
                 return Err(wrong(published.span().start, message.to_owned()));
             }
         }
+        let mut together = Vec::new();
+        for group in &read.together {
+            let width = group.names.len();
+            if let Some(row) = group.rows.iter().find(|row| row.get_ref().len() != width) {
+                let message = format!("write {width} values, one for each name");
+                return Err(wrong(row.span().start, message));
+            }
+            let rows = group.rows.iter();
+            together.push(Together {
+                names: group.names.clone(),
+                rows: rows.map(|row| row.get_ref().iter().map(text_of).collect()).collect(),
+            });
+        }
         let settings = read
             .settings()
             .map_err(|(at, message)| wrong(at, message))?;
@@ -189,6 +222,7 @@ impl Experiment {
                 .into_iter()
                 .map(|(name, values)| (name, values.iter().map(text_of).collect()))
                 .collect(),
+            together,
             columns,
             executors,
             clairvoyant: read.clairvoyant,
@@ -213,6 +247,16 @@ impl Experiment {
             fillings = fillings
                 .iter()
                 .flat_map(|filling| values.iter().map(move |value| longer(filling, value)))
+                .collect();
+        }
+        for group in &self.together {
+            let longer = |filling: &Vec<(String, String)>, row: &Vec<String>| {
+                let pairs = group.names.iter().cloned().zip(row.iter().cloned());
+                filling.iter().cloned().chain(pairs).collect::<Vec<_>>()
+            };
+            fillings = fillings
+                .iter()
+                .flat_map(|filling| group.rows.iter().map(move |row| longer(filling, row)))
                 .collect();
         }
         fillings
