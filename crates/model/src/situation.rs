@@ -107,12 +107,14 @@ impl Task {
         task
     }
 
-    fn symbol_of_fact(&self, fact: FactId) -> (PredicateId, Vec<ObjectId>) {
+    /// The predicate and the objects of a fact.
+    pub fn symbol_of_fact(&self, fact: FactId) -> (PredicateId, Vec<ObjectId>) {
         let symbol = self.facts.get_index(fact.index());
         symbol.expect("a fact of this task").clone()
     }
 
-    fn symbol_of_fluent(&self, fluent: FluentId) -> (FunctionId, Vec<ObjectId>) {
+    /// The function and the objects of a fluent.
+    pub fn symbol_of_fluent(&self, fluent: FluentId) -> (FunctionId, Vec<ObjectId>) {
         let symbol = self.fluents.get_index(fluent.index());
         symbol.expect("a fluent of this task").clone()
     }

@@ -26,6 +26,8 @@ mod network;
 mod relaxed;
 mod search;
 mod state;
+mod symbolic;
+mod symmetry;
 mod time;
 
 use std::ops::ControlFlow;
@@ -42,13 +44,20 @@ pub use compile::Unsupported;
 use apply::Step;
 use compile::Compiled;
 use search::{Search, Style, Turn};
+use symmetry::Symmetry;
 use time::NEVER;
 
-/// How many states are looked at between two reports.
-const REPORT_EVERY: u64 = 256;
+/// How much work lies between two reports, in operators of estimates: about ten milliseconds.
+const REPORT_WORK: u64 = 2_000_000;
+
+/// The most turns between two reports.
+const REPORT_TURNS: u64 = 256;
 
 /// How many states the hasty search may look at before the complete one gets its first turns.
 const HASTE: u64 = 20_000;
+
+/// How many turns the hasty search gets for each one of the complete search.
+const COMPLETE_SHARE: u64 = 10;
 
 /// Finds a plan from `situation`.
 ///
@@ -92,7 +101,9 @@ pub fn plan(
         Ok(compiled) => compiled,
         Err(unsupported) => return Answer::Unsupported(unsupported),
     };
+    let symmetry = Symmetry::of(grounded, &compiled);
     Planner {
+        symmetry: &symmetry,
         task,
         situation,
         settings,
@@ -126,6 +137,7 @@ struct Planner<'a> {
     settings: &'a Settings,
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     progress: Progress,
     best: Option<Found>,
 }
@@ -135,6 +147,7 @@ impl Planner<'_> {
         let compiled = self.compiled;
         let mut hasty = Search::new(
             compiled,
+            self.symmetry,
             Style {
                 is_hasty: true,
                 variants: 4,
@@ -142,6 +155,7 @@ impl Planner<'_> {
         );
         let mut complete = Search::new(
             compiled,
+            self.symmetry,
             Style {
                 is_hasty: false,
                 variants: usize::MAX,
@@ -162,7 +176,7 @@ impl Planner<'_> {
                 }
                 Outcome::BudgetSpent => {}
             }
-            match self.work(&mut complete, Phase::Complete, budget) {
+            match self.work(&mut complete, Phase::Complete, budget / COMPLETE_SHARE) {
                 Outcome::Stop(stopped) => break stopped,
                 Outcome::Over => break Stopped::Exhausted,
                 Outcome::BudgetSpent => {}
@@ -195,6 +209,7 @@ impl Planner<'_> {
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
         let before = (self.progress.counts, search.counts());
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, REPORT_TURNS);
         for turn in 0..budget {
             match search.turn() {
                 Turn::Over => return Outcome::Over,
@@ -206,7 +221,7 @@ impl Planner<'_> {
                     }
                 }
             }
-            if turn % REPORT_EVERY == REPORT_EVERY - 1 {
+            if turn % report_every == report_every - 1 {
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);

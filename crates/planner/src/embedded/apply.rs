@@ -7,6 +7,7 @@ use super::compile::{Action, Change, Compiled, NONE, Snap, Update};
 use super::formula::{Formula, set};
 use super::network::{NodeId, SETTLED};
 use super::state::{Open, State};
+use super::symbolic::{self, Form, Moment};
 use super::time::{NEVER, Ticks};
 
 /// A choice of the search.
@@ -28,10 +29,19 @@ pub(crate) struct Stepper<'a> {
     pub(crate) compiled: &'a Compiled,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
-    /// Whether all happenings stay in the network, to be read off at the end.
-    pub(crate) keeps_all: bool,
+    /// If present, all happenings stay in the network, to be read off at the end, and what is
+    /// needed to compute their times exactly is noted here.
+    pub(crate) log: Option<Log>,
     /// Whether a duration had to be rounded to a tick, so that nothing is proved.
     pub(crate) has_rounded: bool,
+}
+
+/// What the network does not say of its nodes, whose times are rounded to ticks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Log {
+    /// For each end of an action its node, that of its start if it started in the plan, and the
+    /// duration's exact bounds.
+    pub(crate) ends: Vec<(NodeId, NodeId, Rational, Option<Rational>)>,
 }
 
 /// When a happening may be.
@@ -46,7 +56,7 @@ impl<'a> Stepper<'a> {
         Self {
             compiled,
             horizon: NEVER,
-            keeps_all: false,
+            log: None,
             has_rounded: false,
         }
     }
@@ -86,7 +96,13 @@ impl<'a> Stepper<'a> {
             Step::Timed => self.timed(state)?,
         }
         self.keeps_conditions(state)?;
-        (state.earliest_end() <= self.horizon).then_some(())
+        let is_in_time = state.earliest_end() <= self.horizon;
+        (is_in_time && symbolic::is_possible(state, self.compiled.scale)).then_some(())
+    }
+
+    /// Whether happenings may leave the network.
+    fn settles(&self, state: &State) -> bool {
+        self.log.is_none() && state.symbolic.is_none()
     }
 
     /// Starts a durative action and returns its place among those under way, or lets an
@@ -95,15 +111,14 @@ impl<'a> Stepper<'a> {
         let action = self.compiled.action(number);
         let snap = self.compiled.snap(action.start);
         if action.end == NONE {
-            self.require(state, &snap.condition, None)?;
             let place = self.place(state, snap);
             let node = self.insert(state, snap, &place, false)?;
-            debug_assert!(self.keeps_all || node == SETTLED || !state.network.is_empty());
-            self.take_effect(state, snap, u64::MAX, None)?;
+            let moment = moment(state, || (Form::node(node), None));
+            self.demand(state, &snap.condition, None, &moment)?;
+            self.take_effect(state, snap, u64::MAX, None, &moment)?;
             return Some(0);
         }
         let (least, most, duration) = self.duration_bounds(state, action)?;
-        self.require(state, &snap.condition, duration.as_ref())?;
         let guards = self.guards(state, action, duration.as_ref());
         let mut place = self.place(state, snap);
         let next_timed = action.breaking_timed.iter().find(|&&t| t >= state.timed);
@@ -112,7 +127,40 @@ impl<'a> Stepper<'a> {
             place.latest = place.latest.min(time - least);
         }
         let node = self.insert(state, snap, &place, true)?;
-        self.take_effect(state, snap, guards, duration.as_ref())?;
+        let mut end = SETTLED;
+        if state.symbolic.is_some() {
+            let after = [(node, least)];
+            end = state
+                .network
+                .add_node(self.compiled.now, NEVER, &after)
+                .ok()?;
+            if most < NEVER {
+                state.network.add_edge(end, node, -most).ok()?;
+            }
+        }
+        let moment = moment(state, || {
+            let duration = duration_form(duration.as_ref(), node, end);
+            (Form::node(node), Some(duration))
+        });
+        self.demand(state, &snap.condition, duration.as_ref(), &moment)?;
+        if state.symbolic.is_some() {
+            self.demand_duration(state, action, false, &moment)?;
+        }
+        let mut flows = Vec::new();
+        for flow in &action.flows {
+            let takes_place = flow
+                .guard
+                .is_none_or(|guard| guards >> guard.min(63) & 1 == 1);
+            if takes_place {
+                let rate = flow.rate.value(&state.values, duration.as_ref())?;
+                flows.push((flow.fluent, rate));
+            }
+        }
+        self.take_effect(state, snap, guards, duration.as_ref(), &moment)?;
+        for (fluent, rate) in &flows {
+            symbolic::flow(state, *fluent, rate, &moment.time)?;
+            self.watch(state, &[*fluent], &moment)?;
+        }
         let open = Open {
             action: number,
             node,
@@ -121,41 +169,182 @@ impl<'a> Stepper<'a> {
             most,
             duration,
             guards,
+            end,
+            flows,
         };
+        self.watch_all(state, &open, &moment)?;
         let place = state.open.partition_point(|other| other.action <= number);
         state.open.insert(place, open);
         Some(place)
     }
 
     fn end(&mut self, state: &mut State, place: usize) -> Option<()> {
-        let mut open = state.open.remove(place);
+        let mut open = state.open[place].clone();
         let action = self.compiled.action(open.action);
         let snap = self.compiled.snap(action.end);
-        self.require(state, &snap.condition, open.duration.as_ref())?;
-        for bound in action.duration.bounds.iter().filter(|bound| bound.at_end) {
-            let value = bound.value.value(&state.values, None)?;
-            self.narrow(&mut open.least, &mut open.most, bound.comparison, &value);
+        if state.symbolic.is_none() {
+            for bound in action.duration.bounds.iter().filter(|bound| bound.at_end) {
+                let value = bound.value.value(&state.values, None)?;
+                self.narrow(&mut open.least, &mut open.most, bound.comparison, &value);
+            }
         }
         if open.least > open.most {
             return None;
         }
         let mut when = self.place(state, snap);
-        if open.node == SETTLED {
+        let node = if open.end != SETTLED {
+            self.reach_foreseen_end(state, snap, &when, open.end)?;
+            open.end
+        } else if open.node == SETTLED {
             when.earliest = when.earliest.max(open.start + open.least);
             if open.most < NEVER {
                 when.latest = when.latest.min(open.start + open.most);
             }
-            self.insert(state, snap, &when, false)?;
+            self.insert(state, snap, &when, false)?
         } else {
             when.after.push((open.node, open.least));
             let node = self.insert(state, snap, &when, true)?;
             if open.most < NEVER {
                 state.network.add_edge(node, open.node, -open.most).ok()?;
             }
+            node
+        };
+        if open.node != SETTLED {
+            self.note_end(&open, node);
         }
-        self.take_effect(state, snap, open.guards, open.duration.as_ref())?;
-        if !self.keeps_all {
+        let moment = moment(state, || {
+            let duration = if open.node == SETTLED {
+                let start = Form::constant(self.compiled.scale.units(open.start));
+                Form::node(node).plus(&Rational::from(-1), &start)
+            } else {
+                duration_form(open.duration.as_ref(), open.node, node)
+            };
+            (Form::node(node), Some(duration))
+        });
+        self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
+        if state.symbolic.is_some() {
+            self.watch_all(state, &open, &moment)?;
+            self.demand_duration(state, action, true, &moment)?;
+            for (fluent, _) in &open.flows {
+                self.watch(state, &[*fluent], &moment)?;
+            }
+        }
+        state.open.remove(place);
+        self.take_effect(state, snap, open.guards, open.duration.as_ref(), &moment)?;
+        for (fluent, rate) in &open.flows {
+            symbolic::flow(state, *fluent, &-rate, &moment.time)?;
+        }
+        if self.settles(state) {
             settle(state);
+        }
+        Some(())
+    }
+
+    /// Lets an action end whose end has been in the network since its start.
+    fn reach_foreseen_end(
+        &self,
+        state: &mut State,
+        snap: &Snap,
+        place: &Place,
+        end: NodeId,
+    ) -> Option<()> {
+        for &(from, distance) in &place.after {
+            state.network.add_edge(from, end, distance).ok()?;
+        }
+        state.network.delay(end, place.earliest).ok()?;
+        state.network.hurry(end, place.latest).ok()?;
+        for &stamp in &snap.marks {
+            state.network.mark(stamp, end);
+        }
+        Some(())
+    }
+
+    /// Notes the exact duration, for the times of the plan.
+    fn note_end(&mut self, open: &Open, node: NodeId) {
+        let scale = self.compiled.scale;
+        let Some(log) = &mut self.log else { return };
+        let (least, most) = match &open.duration {
+            Some(duration) => (duration.clone(), Some(duration.clone())),
+            None => {
+                let most = (open.most < NEVER).then(|| scale.units(open.most));
+                (scale.units(open.least), most)
+            }
+        };
+        log.ends.push((node, open.node, least, most));
+    }
+
+    /// Demands the goal of the times.
+    pub(crate) fn reach_goal(&mut self, state: &mut State) -> Option<()> {
+        let goal = &self.compiled.goal;
+        self.demand(state, goal, None, &Moment::default())?;
+        symbolic::is_possible(state, self.compiled.scale).then_some(())
+    }
+
+    /// Requires a condition, now or, where numbers depend on times, of the times.
+    fn demand(
+        &mut self,
+        state: &mut State,
+        condition: &Formula,
+        duration: Option<&Rational>,
+        moment: &Moment,
+    ) -> Option<()> {
+        if state.symbolic.is_none() {
+            return self.require(state, condition, duration);
+        }
+        let lost = &mut self.has_rounded;
+        symbolic::demand_formula(self.compiled, state, condition, moment, lost)
+    }
+
+    /// Demands the duration constraints that depend on the state.
+    fn demand_duration(
+        &self,
+        state: &mut State,
+        action: &Action,
+        at_end: bool,
+        moment: &Moment,
+    ) -> Option<()> {
+        for bound in action
+            .duration
+            .bounds
+            .iter()
+            .filter(|bound| bound.at_end == at_end)
+        {
+            let value = symbolic::value(state, &bound.value, moment)?;
+            let duration = moment.duration.clone()?;
+            let difference = duration.plus(&Rational::from(-1), &value);
+            symbolic::demand(state, difference, bound.comparison)?;
+        }
+        Some(())
+    }
+
+    /// Demands the over-all condition of an action at some moment.
+    fn watch_all(&mut self, state: &mut State, open: &Open, moment: &Moment) -> Option<()> {
+        if state.symbolic.is_none() {
+            return Some(());
+        }
+        let over_all = &self.compiled.action(open.action).over_all;
+        let moment = Moment {
+            time: moment.time.clone(),
+            duration: (open.end != SETTLED || open.duration.is_some())
+                .then(|| duration_form(open.duration.as_ref(), open.node, open.end)),
+        };
+        let lost = &mut self.has_rounded;
+        symbolic::demand_formula(self.compiled, state, over_all, &moment, lost)
+    }
+
+    /// Demands the over-all conditions that read one of the fluents, of all that is under way.
+    fn watch(&mut self, state: &mut State, fluents: &[u32], moment: &Moment) -> Option<()> {
+        for place in 0..state.open.len() {
+            let over_all = &self.compiled.action(state.open[place].action).over_all;
+            let mut reads = false;
+            over_all.visit_tests(&mut |test| {
+                let difference = &self.compiled.tests[test as usize].difference;
+                difference.visit_fluents(&mut |fluent| reads |= fluents.contains(&fluent));
+            });
+            if reads {
+                let open = state.open[place].clone();
+                self.watch_all(state, &open, moment)?;
+            }
         }
         Some(())
     }
@@ -169,8 +358,19 @@ impl<'a> Stepper<'a> {
         for &fact in &timed.adds {
             set(&mut state.facts, fact, true);
         }
+        let moment = Moment {
+            time: Form::constant(self.compiled.scale.units(timed.time)),
+            duration: None,
+        };
         for (fluent, value) in &timed.assigns {
-            state.values[*fluent as usize] = Some(value.clone());
+            if state.symbolic.is_some() {
+                self.watch(state, &[*fluent], &moment)?;
+                let value = Form::constant(value.clone());
+                symbolic::update(state, *fluent, UpdateOperator::Assign, &value, &moment)?;
+                self.watch(state, &[*fluent], &moment)?;
+            } else {
+                state.values[*fluent as usize] = Some(value.clone());
+            }
         }
         for &stamp in &timed.marks {
             let stamp = &mut state.stamps[stamp as usize];
@@ -213,7 +413,7 @@ impl<'a> Stepper<'a> {
         place: &Place,
         is_unsettled: bool,
     ) -> Option<NodeId> {
-        if !is_unsettled && place.after.is_empty() && !self.keeps_all {
+        if !is_unsettled && place.after.is_empty() && self.settles(state) {
             if place.earliest > place.latest {
                 return None;
             }
@@ -249,6 +449,9 @@ impl<'a> Stepper<'a> {
 
     /// What is under way still finds its over-all condition true.
     fn keeps_conditions(&self, state: &State) -> Option<()> {
+        if state.symbolic.is_some() {
+            return self.keeps_facts(state);
+        }
         state
             .open
             .iter()
@@ -256,6 +459,27 @@ impl<'a> Stepper<'a> {
                 let over_all = &self.compiled.action(open.action).over_all;
                 self.require(state, over_all, open.duration.as_ref())
                     .is_some()
+            })
+            .then_some(())
+    }
+
+    /// The same where numbers depend on times and are watched as they change.
+    fn keeps_facts(&self, state: &State) -> Option<()> {
+        let symbolic = state.symbolic.as_ref()?;
+        let may_pass = |test: u32, open: &Open| {
+            let mut is_governed = false;
+            let difference = &self.compiled.tests[test as usize].difference;
+            difference.visit_fluents(&mut |fluent| is_governed |= symbolic.governs(fluent));
+            is_governed
+                || difference.reads_duration()
+                || state.passes(self.compiled, test, open.duration.as_ref())
+        };
+        state
+            .open
+            .iter()
+            .all(|open| {
+                let over_all = &self.compiled.action(open.action).over_all;
+                over_all.holds(&state.facts, &mut |test| may_pass(test, open))
             })
             .then_some(())
     }
@@ -277,7 +501,11 @@ impl<'a> Stepper<'a> {
         let mut least = action.duration.least.clone();
         let mut most = action.duration.most.clone();
         for bound in action.duration.bounds.iter().filter(|bound| !bound.at_end) {
-            let value = bound.value.value(&state.values, None)?;
+            let value = match bound.value.value(&state.values, None) {
+                // It depends on times, and is demanded of them.
+                None if state.symbolic.is_some() => continue,
+                value => value?,
+            };
             let (raises, lowers) = sides(bound.comparison);
             if raises && value > least {
                 least.clone_from(&value);
@@ -326,21 +554,15 @@ impl<'a> Stepper<'a> {
 
     /// Carries out the effects: all read the state on arrival.
     fn take_effect(
-        &self,
+        &mut self,
         state: &mut State,
         snap: &Snap,
         guards: u64,
         duration: Option<&Rational>,
+        moment: &Moment,
     ) -> Option<()> {
-        let mut updates: Vec<(u32, UpdateOperator, Rational)> = Vec::new();
-        let read = |update: &Update, state: &State| {
-            let value = update.value.value(&state.values, duration)?;
-            Some((update.fluent, update.operator, value))
-        };
-        for update in &snap.updates {
-            updates.push(read(update, state)?);
-        }
         let (mut adds, mut deletes) = (Vec::new(), Vec::new());
+        let mut updates: Vec<&Update> = snap.updates.iter().collect();
         for effect in &snap.conditional {
             let was_chosen = effect
                 .at_start
@@ -349,9 +571,14 @@ impl<'a> Stepper<'a> {
                 match &effect.change {
                     Change::Add(fact) => adds.push(*fact),
                     Change::Delete(fact) => deletes.push(*fact),
-                    Change::Update(update) => updates.push(read(update, state)?),
+                    Change::Update(update) => updates.push(update),
                 }
             }
+        }
+        if state.symbolic.is_some() {
+            self.update_symbolic(state, &updates, moment)?;
+        } else {
+            update_values(state, &updates, duration)?;
         }
         for &fact in snap.deletes.iter().chain(&deletes) {
             set(&mut state.facts, fact, false);
@@ -359,21 +586,75 @@ impl<'a> Stepper<'a> {
         for &fact in snap.adds.iter().chain(&adds) {
             set(&mut state.facts, fact, true);
         }
-        for (fluent, operator, value) in updates {
-            let place = &mut state.values[fluent as usize];
-            *place = Some(match (operator, place.take()) {
-                (UpdateOperator::Assign, _) => value,
-                (_, None) => return None,
-                (UpdateOperator::Increase, Some(old)) => old + value,
-                (UpdateOperator::Decrease, Some(old)) => old - value,
-                (UpdateOperator::ScaleUp, Some(old)) => old * value,
-                (UpdateOperator::ScaleDown, Some(old)) => old.checked_div(&value)?,
-            });
-        }
         if !self.compiled.strata.is_empty() {
             state.derive(self.compiled);
         }
         Some(())
+    }
+
+    fn update_symbolic(
+        &mut self,
+        state: &mut State,
+        updates: &[&Update],
+        moment: &Moment,
+    ) -> Option<()> {
+        if updates.is_empty() {
+            return Some(());
+        }
+        let fluents: Vec<u32> = updates.iter().map(|update| update.fluent).collect();
+        self.watch(state, &fluents, moment)?;
+        let read: Option<Vec<_>> = updates
+            .iter()
+            .map(|update| symbolic::read(state, update, moment))
+            .collect();
+        for (fluent, operator, amount) in read? {
+            symbolic::update(state, fluent, operator, &amount, moment)?;
+        }
+        self.watch(state, &fluents, moment)
+    }
+}
+
+/// Carries out numeric effects; all read the state on arrival.
+fn update_values(
+    state: &mut State,
+    updates: &[&Update],
+    duration: Option<&Rational>,
+) -> Option<()> {
+    if updates.is_empty() {
+        return Some(());
+    }
+    let amounts: Option<Vec<Rational>> = updates
+        .iter()
+        .map(|update| update.value.value(&state.values, duration))
+        .collect();
+    for (update, amount) in updates.iter().zip(amounts?) {
+        let place = &mut state.values[update.fluent as usize];
+        *place = Some(match (update.operator, place.take()) {
+            (UpdateOperator::Assign, _) => amount,
+            (_, None) => return None,
+            (UpdateOperator::Increase, Some(old)) => old + amount,
+            (UpdateOperator::Decrease, Some(old)) => old - amount,
+            (UpdateOperator::ScaleUp, Some(old)) => old * amount,
+            (UpdateOperator::ScaleDown, Some(old)) => old.checked_div(&amount)?,
+        });
+    }
+    Some(())
+}
+
+/// A moment, where numbers depend on times; elsewhere nobody looks at it.
+fn moment(state: &State, form: impl FnOnce() -> (Form, Option<Form>)) -> Moment {
+    if state.symbolic.is_none() {
+        return Moment::default();
+    }
+    let (time, duration) = form();
+    Moment { time, duration }
+}
+
+/// The duration: the only one there is, or the distance from start to end.
+fn duration_form(duration: Option<&Rational>, start: NodeId, end: NodeId) -> Form {
+    match duration {
+        Some(duration) => Form::constant(duration.clone()),
+        None => Form::node(end).plus(&Rational::from(-1), &Form::node(start)),
     }
 }
 

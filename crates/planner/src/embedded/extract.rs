@@ -5,9 +5,10 @@ use elbowroom_model::{Situation, Step as PlanStep, Task, TimeTriggeredPlan, vali
 use elbowroom_num::Rational;
 
 use super::answer::Settings;
-use super::apply::{Step, Stepper};
+use super::apply::{Log, Step, Stepper};
 use super::compile::{Compiled, NONE};
-use super::network::NodeId;
+use super::network::{Network, NodeId, SETTLED};
+use super::symbolic;
 use super::time::NEVER;
 
 /// A step of the plan to be.
@@ -17,8 +18,6 @@ struct Timing {
     /// `None`: it was under way before.
     start: Option<NodeId>,
     end: Option<NodeId>,
-    /// The duration, if it leaves no choice.
-    duration: Option<Rational>,
 }
 
 /// The plan that the choices stand for, everything as early as possible; `None` if the judge does
@@ -31,7 +30,7 @@ pub(crate) fn plan_of(
     settings: &Settings,
 ) -> Option<(TimeTriggeredPlan, validate::Report)> {
     let mut stepper = Stepper::new(compiled);
-    stepper.keeps_all = true;
+    stepper.log = Some(Log::default());
     let mut state = compiled.initial.clone();
     let under_way = situation.running.len();
     let mut timings: Vec<Timing> = (0..under_way)
@@ -39,13 +38,16 @@ pub(crate) fn plan_of(
             action: u32::try_from(number).unwrap_or(NONE),
             start: None,
             end: None,
-            duration: None,
         })
         .collect();
     // For each action under way, its step.
     let mut open: Vec<usize> = (0..under_way).collect();
     for &step in steps {
         let node = NodeId::try_from(state.network.node_count()).ok()?;
+        let foreseen_end = match step {
+            Step::End(place) => state.open[place as usize].end,
+            _ => SETTLED,
+        };
         let ended = match step {
             Step::End(place) => Some(open.remove(place as usize)),
             _ => None,
@@ -59,19 +61,24 @@ pub(crate) fn plan_of(
                     action,
                     start: Some(node),
                     end: is_whole.then_some(node + 1),
-                    duration: None,
                 });
                 if let Some(place) = place {
-                    timings[under_way..]
-                        .last_mut()?
-                        .duration
-                        .clone_from(&state.open[place].duration);
                     open.insert(place, timings.len() - 1);
                 }
             }
-            Step::End(_) => timings[ended?].end = Some(node),
+            Step::End(_) => {
+                let node = if foreseen_end == SETTLED {
+                    node
+                } else {
+                    foreseen_end
+                };
+                timings[ended?].end = Some(node);
+            }
             Step::Timed => {}
         }
+    }
+    if state.symbolic.is_some() {
+        stepper.reach_goal(&mut state)?;
     }
     // The goal may need a timed initial that comes after all else: then something must wait.
     let needed = compiled
@@ -91,9 +98,14 @@ pub(crate) fn plan_of(
             })
             .next()?;
     }
+    let log = stepper.log.as_ref()?;
+    let times = match &state.symbolic {
+        None => exact_times(compiled, &state.network, log, settings)?,
+        Some(_) => symbolic::solve(&state, compiled.scale, &exact_distances(log))?,
+    };
     let mut plan = TimeTriggeredPlan::default();
     for (number, timing) in timings.iter().enumerate() {
-        let at = |node: NodeId| compiled.scale.units(state.network.earliest(node));
+        let at = |node: NodeId| times[node as usize].clone();
         if let Some(running) = situation.running.get(number) {
             let duration = at(timing.end?) - &running.start;
             plan.steps.push(running.step(duration));
@@ -101,10 +113,9 @@ pub(crate) fn plan_of(
         }
         let action = compiled.action(timing.action);
         let start = at(timing.start?);
-        let duration = match (&timing.duration, action.end) {
-            (_, NONE) => None,
-            (Some(duration), _) => Some(duration.clone()),
-            (None, _) => Some(at(timing.end?) - &start),
+        let duration = match action.end {
+            NONE => None,
+            _ => Some(at(timing.end?) - &start),
         };
         let ground = task.instantiate(action.schema, &action.arguments).ok()?;
         plan.steps.push(PlanStep {
@@ -122,4 +133,80 @@ pub(crate) fn plan_of(
         Verdict::Valid(report) => Some((plan, report)),
         Verdict::Invalid(_) | Verdict::Undecided(_) => None,
     }
+}
+
+/// The distances between starts and ends, exactly.
+fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
+    let mut distances = Vec::new();
+    for (end, start, least, most) in &log.ends {
+        distances.push((*start, *end, least.clone()));
+        distances.extend(most.as_ref().map(|most| (*end, *start, -most)));
+    }
+    distances
+}
+
+/// The earliest times of all happenings in exact numbers.
+///
+/// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
+/// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
+/// rounding.
+fn exact_times(
+    compiled: &Compiled,
+    network: &Network,
+    log: &Log,
+    settings: &Settings,
+) -> Option<Vec<Rational>> {
+    let scale = compiled.scale;
+    let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
+    let are_durations_on_grid = log
+        .ends
+        .iter()
+        .all(|(_, _, least, most)| is_on_grid(least) && most.as_ref().is_none_or(is_on_grid));
+    let is_exact = are_durations_on_grid && compiled.is_exact && is_on_grid(&settings.epsilon);
+    if is_exact {
+        let nodes = 0..network.node_count();
+        return nodes
+            .map(|node| Some(scale.units(network.earliest(NodeId::try_from(node).ok()?))))
+            .collect();
+    }
+    let slack = i64::from(!compiled.is_exact);
+    let mut times: Vec<Rational> = network
+        .bounds()
+        .map(|(floor, _)| {
+            let is_free = floor <= compiled.now;
+            scale.units(if is_free { floor } else { floor + slack })
+        })
+        .collect();
+    let exact = exact_distances(log);
+    let of_end = |from: NodeId, to: NodeId| {
+        let found = exact.iter().find(|known| (known.0, known.1) == (from, to));
+        found.map(|known| known.2.clone())
+    };
+    let edges: Vec<(usize, usize, Rational)> = network
+        .edges()
+        .map(|(from, to, distance)| {
+            let exact = of_end(from, to).unwrap_or_else(|| {
+                if distance == compiled.epsilon {
+                    settings.epsilon.clone()
+                } else {
+                    scale.units(distance)
+                }
+            });
+            (usize::from(from), usize::from(to), exact)
+        })
+        .collect();
+    for _ in 0..=times.len() {
+        let mut changed = false;
+        for (from, to, distance) in &edges {
+            let time = &times[*from] + distance;
+            if time > times[*to] {
+                times[*to] = time;
+                changed = true;
+            }
+        }
+        if !changed {
+            return Some(times);
+        }
+    }
+    None
 }

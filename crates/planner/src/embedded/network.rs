@@ -28,6 +28,8 @@ pub(crate) struct Network {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
+    /// Whatever else happens, not before.
+    floor: Ticks,
     earliest: Ticks,
     latest: Ticks,
 }
@@ -75,7 +77,8 @@ impl Network {
         if node == SETTLED {
             return Err(Inconsistent);
         }
-        let mut time = earliest;
+        let floor = earliest;
+        let mut time = floor;
         for &(from, distance) in after {
             time = time.max(self.earliest(from) + distance);
             self.edges.push(Edge {
@@ -88,6 +91,7 @@ impl Network {
             return Err(Inconsistent);
         }
         self.nodes.push(Node {
+            floor,
             earliest: time,
             latest,
         });
@@ -128,6 +132,8 @@ impl Network {
 
     /// Makes a node happen no earlier than `time`.
     pub(crate) fn delay(&mut self, node: NodeId, time: Ticks) -> Result<(), Inconsistent> {
+        let floor = &mut self.nodes[node as usize].floor;
+        *floor = (*floor).max(time);
         self.push(node, time, SETTLED)
     }
 
@@ -205,14 +211,16 @@ impl Network {
     pub(crate) fn distances_from(&self, origin: NodeId) -> Vec<Ticks> {
         let mut distances = vec![-NEVER; self.nodes.len()];
         distances[origin as usize] = 0;
-        let mut waiting = vec![origin];
-        while let Some(node) = waiting.pop() {
-            let reached = distances[node as usize];
-            for edge in self.edges.iter().filter(|edge| edge.from == node) {
+        // Edges stand in the order of happenings, so that few rounds are needed.
+        let mut changed = true;
+        while changed {
+            changed = false;
+            for edge in &self.edges {
+                let reached = distances[edge.from as usize];
                 let distance = reached + edge.distance;
-                if distance > distances[edge.to as usize] {
+                if reached > -NEVER && distance > distances[edge.to as usize] {
                     distances[edge.to as usize] = distance;
-                    waiting.push(edge.to);
+                    changed = true;
                 }
             }
         }
@@ -236,9 +244,10 @@ impl Network {
             .map(|edge| (edge.from, edge.to, edge.distance))
     }
 
-    /// The earliest and latest time of each node, by its own bounds and what pushes it.
+    /// The bounds of each node by itself: the time before which it cannot happen, whatever else
+    /// does, and the latest one.
     pub(crate) fn bounds(&self) -> impl Iterator<Item = (Ticks, Ticks)> + '_ {
-        self.nodes.iter().map(|node| (node.earliest, node.latest))
+        self.nodes.iter().map(|node| (node.floor, node.latest))
     }
 
     /// An estimate of the memory it takes, in bytes.

@@ -13,17 +13,17 @@ mod graph;
 mod numbers;
 
 use super::apply::Step;
-use super::compile::Compiled;
+use super::compile::{Compiled, NONE};
 use super::state::State;
 
-pub(crate) use graph::Graph;
 use super::network::SETTLED;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
+pub(crate) use graph::Graph;
 use graph::Kind;
 
 /// Beyond this, costs are all alike.
-const MOST: u32 = 1 << 20;
+const MOST: u32 = 1 << 15;
 
 /// Not reached.
 const UNREACHED: u32 = u32::MAX;
@@ -87,6 +87,11 @@ impl<'a> Relaxed<'a> {
         }
     }
 
+    /// The number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.graph.operators.len() as u64
+    }
+
     /// The estimate, or `None` if even the relaxed goal is out of reach.
     pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
         self.prepare(state);
@@ -121,10 +126,18 @@ impl<'a> Relaxed<'a> {
         self.applicable.clear();
         if self.horizon < NEVER
             || !self.graph.windows.is_empty()
-            || state.open.iter().any(|open| open.node == SETTLED && open.most < NEVER)
+            || state
+                .open
+                .iter()
+                .any(|open| open.node == SETTLED && open.most < NEVER)
         {
-            self.deadlines
-                .exclude_late(self.compiled, &self.graph, state, self.horizon, &mut self.missing);
+            self.deadlines.exclude_late(
+                self.compiled,
+                &self.graph,
+                state,
+                self.horizon,
+                &mut self.missing,
+            );
         }
         let mut reach = |proposition: u32, cost: &mut Vec<u32>, buckets: &mut Vec<Vec<u32>>| {
             if cost[proposition as usize] != 0 {
@@ -145,7 +158,8 @@ impl<'a> Relaxed<'a> {
         for (number, gap) in self.gaps.iter_mut().enumerate() {
             #[allow(clippy::cast_possible_truncation, reason = "tests are numbered by u32")]
             let test = number as u32;
-            let is_free = self.graph.is_free_test[number];
+            let is_free =
+                self.graph.is_free_test[number] || depends_on_times(self.compiled, test, state);
             if is_free || state.passes(self.compiled, test, None) {
                 reach(self.graph.test(test), cost, buckets);
             } else {
@@ -273,7 +287,8 @@ impl<'a> Relaxed<'a> {
                 if let Kind::Start(action) = data.kind {
                     // What starts must end.
                     let end = self.graph.end_of[action as usize];
-                    if self.missing[end as usize] == 0
+                    if end != NONE
+                        && self.missing[end as usize] == 0
                         && Self::use_operator(&mut self.is_used, &mut used, end)
                     {
                         let needs = self.graph.operators[end as usize].preconditions.clone();
@@ -320,6 +335,17 @@ impl<'a> Relaxed<'a> {
         estimate.applicable.sort_unstable();
         estimate.applicable.dedup();
     }
+}
+
+/// Whether times decide the test; then it is taken for granted.
+fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
+    let Some(symbolic) = &state.symbolic else {
+        return false;
+    };
+    let mut depends = false;
+    let difference = &compiled.tests[test as usize].difference;
+    difference.visit_fluents(&mut |fluent| depends |= symbolic.governs(fluent));
+    depends
 }
 
 /// The steps that an operator stands for.

@@ -11,7 +11,8 @@ use super::apply::{Step, Stepper};
 use super::compile::Compiled;
 use super::hash::Map;
 use super::relaxed::Relaxed;
-use super::state::State;
+use super::state::{Outlook, State};
+use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 
 /// How many turns the preferred successors get for a better estimate.
@@ -30,6 +31,7 @@ pub(crate) struct Style {
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     compiled: &'a Compiled,
+    symmetry: &'a Symmetry,
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
@@ -55,6 +57,8 @@ struct Node {
     parent: u32,
     step: Step,
     state: State,
+    /// What of the unsettled past matters, in a search that compares it exactly.
+    outlook: Option<Box<Outlook>>,
 }
 
 const ROOT: u32 = u32::MAX;
@@ -94,7 +98,7 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, style: Style) -> Self {
+    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, style: Style) -> Self {
         let has_deadline = |most: Ticks| most < NEVER;
         let is_timeless = compiled.timed.is_empty()
             && !compiled
@@ -104,6 +108,7 @@ impl<'a> Search<'a> {
                 .any(|open| has_deadline(open.most));
         Self {
             compiled,
+            symmetry,
             style,
             stepper: Stepper::new(compiled),
             relaxed: Relaxed::new(compiled, style.is_hasty),
@@ -143,6 +148,11 @@ impl<'a> Search<'a> {
             evaluated: self.evaluated,
             memory: self.memory,
         }
+    }
+
+    /// How much there is to an estimate: the number of operators.
+    pub(crate) fn size(&self) -> u64 {
+        self.relaxed.size()
     }
 
     /// Looks at one more state.
@@ -210,21 +220,31 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let hash = state.discrete_hash();
-        if self.is_known(hash, &state) {
+        let outlook =
+            (!self.style.is_hasty && !state.network.is_empty()).then(|| Box::new(state.outlook()));
+        if self.is_known(hash, &state, outlook.as_deref()) {
             return Turn::Nothing;
         }
         self.evaluated += 1;
-        let Some(estimate) = self.relaxed.evaluate(&state) else {
+        let Some(mut estimate) = self.relaxed.evaluate(&state) else {
             return Turn::Nothing;
         };
+        self.symmetry
+            .thin_out(&state, self.is_timeless, &mut estimate.applicable);
+        let kept = &estimate.applicable;
+        estimate
+            .preferred
+            .retain(|step| kept.binary_search(step).is_ok());
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         self.known.entry(hash).or_default().push(number);
-        self.memory += state.size() + size_of::<Node>() + 64;
+        let outlook_size = outlook.as_ref().map_or(0, |outlook| outlook.size());
+        self.memory += state.size() + outlook_size + size_of::<Node>() + 64;
         let is_goal = self.is_goal(&state);
         self.nodes.push(Node {
             parent,
             step,
             state,
+            outlook,
         });
         if is_goal {
             // A state in which the goal holds may still have successors worth looking at: the
@@ -253,15 +273,22 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a state that is at least as good has been looked at.
-    fn is_known(&mut self, hash: u64, state: &State) -> bool {
+    fn is_known(&mut self, hash: u64, state: &State, outlook: Option<&Outlook>) -> bool {
         let Some(similar) = self.known.get(&hash) else {
             return false;
         };
         let mut variants = 0;
         for &number in similar {
-            let other = &self.nodes[number as usize].state;
+            let node = &self.nodes[number as usize];
+            let other = &node.state;
             if other.is_discretely(state) {
-                if other.is_no_later_than(state, self.is_timeless) {
+                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
+                if self.style.is_hasty {
+                    self.has_lost |= is_no_later && !state.network.is_empty();
+                } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
+                    is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
+                }
+                if is_no_later {
                     return true;
                 }
                 variants += 1;
@@ -277,11 +304,17 @@ impl<'a> Search<'a> {
     /// Whether the plan could end here.
     fn is_goal(&self, state: &State) -> bool {
         let compiled = self.compiled;
-        if !state.open.is_empty()
-            || !compiled
-                .goal
-                .holds(&state.facts, &mut |test| state.passes(compiled, test, None))
-        {
+        if !state.open.is_empty() {
+            return false;
+        }
+        let holds = if state.symbolic.is_some() {
+            let mut stepper = Stepper::new(compiled);
+            stepper.reach_goal(&mut state.clone()).is_some()
+        } else {
+            let mut passes = |test| state.passes(compiled, test, None);
+            compiled.goal.holds(&state.facts, &mut passes)
+        };
+        if !holds {
             return false;
         }
         // What happens by itself before the last happening counts.

@@ -9,6 +9,7 @@ use super::compile::Compiled;
 use super::formula::set;
 use super::hash::Mixer;
 use super::network::{Network, NodeId, SETTLED};
+use super::symbolic::Symbolic;
 use super::time::{NEVER, Ticks};
 
 /// See the module.
@@ -31,6 +32,8 @@ pub(crate) struct State {
     pub(crate) network: Network,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
+    /// The numbers that depend on times, in a problem that has such.
+    pub(crate) symbolic: Option<Box<Symbolic>>,
 }
 
 /// An action under way.
@@ -48,6 +51,11 @@ pub(crate) struct Open {
     pub(crate) duration: Option<Rational>,
     /// Which of the action's guards held at the start.
     pub(crate) guards: u64,
+    /// The node of its end, where numbers depend on times and it started in the plan; else
+    /// [`SETTLED`].
+    pub(crate) end: NodeId,
+    /// What it changes continuously, at what rates.
+    pub(crate) flows: Vec<(u32, Rational)>,
 }
 
 impl Open {
@@ -61,6 +69,8 @@ impl Open {
             most: most.unwrap_or(NEVER),
             duration: None,
             guards: u64::MAX,
+            end: SETTLED,
+            flows: Vec::new(),
         }
     }
 
@@ -177,48 +187,45 @@ impl State {
             && self.open.len() == other.open.len()
             && self.open.iter().zip(&other.open).all(|(a, b)| a.is_like(b))
             && self.values == other.values
+            && self.symbolic == other.symbolic
     }
 
-    /// Whether all that can follow the other state can follow this one, in time: every schedule of
-    /// what matters of the other's past is one of this one's. Both must be discretely the same.
-    ///
-    /// Without anything that happens at a fixed time, only distances matter, and `is_timeless`
-    /// says so.
-    pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
-        if is_timeless && self.network.is_empty() {
-            return true;
+    /// What matters of the unsettled past: all that what follows can push, and how far.
+    pub(crate) fn outlook(&self) -> Outlook {
+        let unsettled = || self.open.iter().filter(|open| open.node != SETTLED);
+        let rows = unsettled().map(|open| {
+            let distances = self.network.distances_from(open.node);
+            let mut to_stamps: Vec<(u32, Ticks)> = self
+                .network
+                .marks
+                .iter()
+                .map(|&(stamp, node)| (stamp, distances[node as usize]))
+                .filter(|&(_, distance)| distance > -NEVER)
+                .collect();
+            to_stamps.sort_unstable_by_key(|&(stamp, distance)| (stamp, -distance));
+            to_stamps.dedup_by_key(|&mut (stamp, _)| stamp);
+            Row {
+                earliest: self.network.earliest(open.node),
+                latest: self.network.latest_given(&distances),
+                to_open: unsettled().map(|o| distances[o.node as usize]).collect(),
+                to_stamps,
+            }
+        });
+        Outlook {
+            rows: rows.collect(),
         }
-        if !is_timeless && !at_most(&self.latest_stamps(), &other.latest_stamps()) {
+    }
+
+    /// Whether everything settled was no later here, and what is not settled can be as early as
+    /// there. Both must be discretely the same.
+    pub(crate) fn has_no_later_stamps_than(&self, other: &Self) -> bool {
+        if self.settled_end > other.settled_end {
             return false;
         }
-        if !is_timeless && self.settled_end > other.settled_end {
-            return false;
+        if self.network.marks.is_empty() && other.network.marks.is_empty() {
+            return at_most(&self.stamps, &other.stamps);
         }
-        if self.network.is_empty() {
-            return true;
-        }
-        self.open
-            .iter()
-            .zip(&other.open)
-            .filter(|(open, _)| open.node != SETTLED)
-            .all(|(mine, theirs)| {
-                let (a, b) = (&self.network, &other.network);
-                let (from_mine, from_theirs) =
-                    (a.distances_from(mine.node), b.distances_from(theirs.node));
-                let no_later = is_timeless || a.earliest(mine.node) <= b.earliest(theirs.node);
-                no_later
-                    && a.latest_given(&from_mine) >= b.latest_given(&from_theirs)
-                    && self
-                        .open
-                        .iter()
-                        .zip(&other.open)
-                        .filter(|(open, _)| open.node != SETTLED)
-                        .all(|(i, j)| from_mine[i.node as usize] <= from_theirs[j.node as usize])
-                    && at_most(
-                        &stamp_distances(a, &from_mine, self.stamps.len()),
-                        &stamp_distances(b, &from_theirs, self.stamps.len()),
-                    )
-            })
+        at_most(&self.latest_stamps(), &other.latest_stamps())
     }
 
     /// The stamps, those of unsettled happenings at their earliest.
@@ -238,16 +245,56 @@ impl State {
             + size_of::<Option<Rational>>() * self.values.len()
             + size_of::<Open>() * self.open.len()
             + self.network.size()
+            + self.symbolic.as_ref().map_or(0, |symbolic| symbolic.size())
     }
 }
 
-fn stamp_distances(network: &Network, distances: &[Ticks], count: usize) -> Vec<Ticks> {
-    let mut stamps = vec![-NEVER; count];
-    for &(stamp, node) in &network.marks {
-        let stamp = &mut stamps[stamp as usize];
-        *stamp = (*stamp).max(distances[node as usize]);
+/// The network of a state, seen from what can still be pushed: the starts under way.
+///
+/// Later happenings only push these, and are only pushed by the stamps. So of two states that are
+/// discretely the same and whose settled pasts compare, the one with the smaller distances and the
+/// later latest times allows every schedule that the other allows.
+#[derive(Clone, Debug)]
+pub(crate) struct Outlook {
+    rows: Vec<Row>,
+}
+
+/// What one start under way pushes.
+#[derive(Clone, Debug)]
+struct Row {
+    earliest: Ticks,
+    /// How late it can be.
+    latest: Ticks,
+    /// The least distances to the starts under way.
+    to_open: Vec<Ticks>,
+    /// The least distances to the stamps, by stamp.
+    to_stamps: Vec<(u32, Ticks)>,
+}
+
+impl Outlook {
+    /// Whether what can follow the other, in time, can follow this. With `is_timeless`, only
+    /// distances matter, as nothing happens at a fixed time.
+    pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
+        self.rows.iter().zip(&other.rows).all(|(mine, theirs)| {
+            (is_timeless || mine.earliest <= theirs.earliest)
+                && mine.latest >= theirs.latest
+                && at_most(&mine.to_open, &theirs.to_open)
+                && mine.to_stamps.iter().all(|&(stamp, distance)| {
+                    theirs
+                        .to_stamps
+                        .binary_search_by_key(&stamp, |entry| entry.0)
+                        .is_ok_and(|found| distance <= theirs.to_stamps[found].1)
+                })
+        })
     }
-    stamps
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        let row = |row: &Row| {
+            size_of::<Row>() + 8 * row.to_open.capacity() + 16 * row.to_stamps.capacity()
+        };
+        self.rows.iter().map(row).sum()
+    }
 }
 
 fn at_most(these: &[Ticks], those: &[Ticks]) -> bool {

@@ -1,9 +1,9 @@
 //! Compiles a grounded task.
 
 use elbowroom_model::ground::{self, Body, Change as ModelChange, Condition, DurativeBody};
-use elbowroom_model::problem::Comparison;
+use elbowroom_model::problem::{self, Comparison};
 use elbowroom_model::reachability::Grounding;
-use elbowroom_model::{Footprint, Situation, Task};
+use elbowroom_model::{Situation, Task};
 use elbowroom_num::{End, Rational};
 
 use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
@@ -13,6 +13,7 @@ use super::{
 };
 use crate::embedded::formula::{Formula, Numeric};
 use crate::embedded::state::{Open, State};
+use crate::embedded::symbolic::{self, Form};
 use crate::embedded::time::{Scale, Ticks};
 
 /// A feature that the embedded planner does not handle, with the action or the like that uses it.
@@ -32,7 +33,7 @@ pub(crate) fn compile(
     situation: &Situation,
     epsilon: &Rational,
 ) -> Result<Compiled, Unsupported> {
-    let mut footprints = full_footprints(task, grounding);
+    let mut footprints = full_touches(task, grounding);
     let mut builder = Builder::new(task);
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
@@ -65,49 +66,71 @@ struct Builder<'a> {
     over_all: Vec<Condition>,
 }
 
-/// The footprints of start and end, as the judge sees them, of the actions from which grounding
-/// has dropped conditional effects: these interfere even where they never happen.
-fn full_footprints(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Touches, Touches)>> {
-    let problem = task.problem();
-    let is_conditional: Vec<bool> = problem
-        .schemas
-        .iter()
-        .map(|schema| {
-            let (first, second) = match &schema.body {
-                elbowroom_model::problem::Body::Instantaneous { effects, .. } => {
-                    (&effects[..], &[][..])
-                }
-                elbowroom_model::problem::Body::Durative {
-                    start_effects,
-                    end_effects,
-                    ..
-                } => (&start_effects[..], &end_effects[..]),
-            };
-            first.iter().chain(second).any(|effect| {
-                let guard = &effect.guard;
-                !(guard.at_start.is_trivial()
-                    && guard.over_all.is_trivial()
-                    && guard.now.is_trivial())
-            })
-        })
-        .collect();
-    if !is_conditional.contains(&true) {
+/// What start and end touch, as the judge sees it, of the actions of which grounding may have
+/// dropped something that reads or writes a changing fact: a conditional effect that never happens,
+/// or a part of a disjunction that other parts decide. These interfere all the same.
+fn full_touches(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Touches, Touches)>> {
+    let schemas = &task.problem().schemas;
+    let is_shortened: Vec<bool> = schemas.iter().map(may_be_shortened).collect();
+    if !is_shortened.contains(&true) {
         return Vec::new();
     }
     grounding
         .actions
         .iter()
         .map(|action| {
-            if !is_conditional[action.schema.index()] {
+            if !is_shortened[action.schema.index()] {
                 return None;
             }
             let full = task.instantiate(action.schema, &action.arguments).ok()?;
-            Some((
-                Touches::of_footprint(Footprint::of_start(task, &full)),
-                Touches::of_footprint(Footprint::of_end(task, &full)),
-            ))
+            let starts = Touches::of_start(task, &full);
+            Some((starts, Touches::of_end(task, &full)))
         })
         .collect()
+}
+
+fn may_be_shortened(schema: &problem::Schema) -> bool {
+    let is_conditional = |effect: &problem::Effect| {
+        let guard = &effect.guard;
+        !(guard.at_start.is_trivial() && guard.over_all.is_trivial() && guard.now.is_trivial())
+    };
+    match &schema.body {
+        problem::Body::Instantaneous { condition, effects } => {
+            !is_conjunction(condition) || effects.iter().any(is_conditional)
+        }
+        problem::Body::Durative {
+            at_start,
+            at_end,
+            start_effects,
+            end_effects,
+            continuous,
+            ..
+        } => {
+            let mut effects = start_effects.iter().chain(end_effects);
+            !is_conjunction(at_start)
+                || !is_conjunction(at_end)
+                || effects.any(is_conditional)
+                || continuous
+                    .iter()
+                    .any(|effect| !effect.guard.at_start.is_trivial())
+        }
+    }
+}
+
+/// Whether nothing but constants can be dropped from a condition.
+fn is_conjunction(condition: &problem::Condition) -> bool {
+    match condition {
+        problem::Condition::Atom(_)
+        | problem::Condition::Equal(..)
+        | problem::Condition::Compare(..) => true,
+        problem::Condition::Not(part) => matches!(
+            **part,
+            problem::Condition::Atom(_) | problem::Condition::Equal(..)
+        ),
+        problem::Condition::And(parts) => parts.iter().all(is_conjunction),
+        problem::Condition::Forall(_, part) => is_conjunction(part),
+        problem::Condition::Or(_) | problem::Condition::Exists(..) => false,
+    }
 }
 
 /// The grid for all times and constant durations.
@@ -427,8 +450,7 @@ impl<'a> Builder<'a> {
             duration,
             flows,
             breaking_timed: Vec::new(),
-            is_eager: start != NONE
-                && is_eager(&self.snaps[start as usize], &self.snaps[end as usize]),
+            is_eager: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }
@@ -470,6 +492,18 @@ impl<'a> Builder<'a> {
                 }
                 let breaking = waiting.before(&needs.makes);
                 action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
+            }
+        }
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.start != NONE && action.end != NONE {
+                let (start, end) = (
+                    &self.snaps[action.start as usize],
+                    &self.snaps[action.end as usize],
+                );
+                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                self.actions[number].is_eager = is_eager(start, end, &offers);
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
@@ -526,7 +560,12 @@ impl<'a> Builder<'a> {
             scale,
             epsilon,
             now: now.0,
-            fact_stamps: self.symbols.facts.iter().map(|&fact| stamps.of_fact(fact)).collect(),
+            fact_stamps: self
+                .symbols
+                .facts
+                .iter()
+                .map(|&fact| stamps.of_fact(fact))
+                .collect(),
             facts: self.symbols.facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,
@@ -544,6 +583,9 @@ impl<'a> Builder<'a> {
             is_symbolic: false,
         };
         compiled.is_symbolic = is_symbolic(&compiled);
+        if compiled.is_symbolic {
+            compiled.gap = Some("values that depend on when things happen");
+        }
         compiled.initial = initial(&mut compiled, situation);
         compiled
     }
@@ -574,13 +616,62 @@ impl Duration {
     }
 }
 
+/// Which actions need a fact to be true.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Readers {
+    None,
+    Only(u32),
+    Many,
+}
+
+impl Readers {
+    fn note(&mut self, action: u32) {
+        *self = match *self {
+            Self::None => Self::Only(action),
+            Self::Only(other) if other == action => Self::Only(action),
+            _ => Self::Many,
+        };
+    }
+
+    fn has_other_than(self, action: u32) -> bool {
+        !matches!(self, Self::None) && self != Self::Only(action)
+    }
+}
+
+/// For each fact, who needs it to be true.
+fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
+    let mut readers = vec![Readers::None; count];
+    for (number, action) in (0..).zip(actions) {
+        let mut note = |formula: &Formula| {
+            formula.visit_literals(&mut |literal| {
+                if literal.truth() {
+                    readers[literal.fact() as usize].note(number);
+                }
+            });
+        };
+        note(&action.over_all);
+        for snap in [action.start, action.end] {
+            if let Some(snap) = snaps.get(snap as usize) {
+                note(&snap.condition);
+                snap.conditional.iter().for_each(|effect| note(&effect.now));
+            }
+        }
+    }
+    readers
+}
+
 /// Whether it costs little to let the end follow the start at once in the order of happenings:
-/// unless the action offers something only while it runs.
-fn is_eager(start: &Snap, end: &Snap) -> bool {
-    let offers = end.deletes.iter().any(|fact| start.adds.contains(fact))
-        || end.conditional.iter().any(
-            |effect| matches!(effect.change, Change::Delete(fact) if start.adds.contains(&fact)),
-        );
+/// unless the action offers something to others only while it runs.
+fn is_eager(start: &Snap, end: &Snap, is_read_by_others: &dyn Fn(u32) -> bool) -> bool {
+    let conditional = end
+        .conditional
+        .iter()
+        .filter_map(|effect| match effect.change {
+            Change::Delete(fact) => Some(fact),
+            _ => None,
+        });
+    let mut withdrawn = end.deletes.iter().copied().chain(conditional);
+    let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
     let lends = end.updates.iter().any(|back| {
         back.operator.is_additive()
             && start
@@ -746,6 +837,21 @@ fn initial(compiled: &mut Compiled, situation: &Situation) -> State {
             .push(Open::under_way(narrow(number), start, least, most));
     }
     compiled.is_exact &= is_exact;
+    if compiled.is_symbolic {
+        state.symbolic = Some(Box::default());
+        let now = Form::constant(situation.time.clone());
+        for place in 0..state.open.len() {
+            for flow in &compiled.actions[place].flows {
+                if let Some(rate) = flow.rate.value(&state.values, None) {
+                    state.open[place].flows.push((flow.fluent, rate));
+                }
+            }
+            for (fluent, rate) in state.open[place].flows.clone() {
+                let flows = symbolic::flow(&mut state, fluent, &rate, &now);
+                compiled.is_exact &= flows.is_some();
+            }
+        }
+    }
     state
 }
 

@@ -80,7 +80,9 @@ impl Deadlines {
         }
         for test in 0..compiled.tests.len() {
             let number = u32::try_from(test).expect("few tests");
-            if graph.is_free_test[test] || state.passes(compiled, number, None) {
+            let is_free =
+                graph.is_free_test[test] || super::depends_on_times(compiled, number, state);
+            if is_free || state.passes(compiled, number, None) {
                 self.lower(graph.test(number) as usize, compiled.now);
             }
         }

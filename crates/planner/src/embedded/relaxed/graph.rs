@@ -368,15 +368,14 @@ impl Graph {
             is_changed[fact as usize] = true;
         }
         for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
-            let touches = |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
+            let touches =
+                |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
             if !compiled.timed.iter().any(|timed| touches(&timed)) {
                 continue;
             }
             for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
                 let mut spans = Vec::new();
-                let mut since = literal
-                    .holds(&compiled.initial.facts)
-                    .then_some(-NEVER);
+                let mut since = literal.holds(&compiled.initial.facts).then_some(-NEVER);
                 for timed in compiled.timed.iter().filter(touches) {
                     let is_true = timed.adds.contains(&fact);
                     match (since, is_true == literal.truth()) {

@@ -1,0 +1,376 @@
+//! Numbers that depend on when things happen: on durations that can be chosen, and on how far
+//! continuous changes have come.
+//!
+//! Such a number is a linear expression over the times of the happenings chosen so far (COLIN,
+//! Coles, Coles, Fox & Long, IJCAI 2009). What conditions demand of it are linear inequalities;
+//! together with the temporal network they are a linear program, and a state is possible only if
+//! that has a solution. Here the network keeps all happenings, since a choice made long ago may
+//! still matter.
+
+use elbowroom_model::problem::{Comparison, UpdateOperator};
+use elbowroom_num::simplex::{Simplex, VariableId};
+use elbowroom_num::{Delta, Rational};
+
+use super::compile::{Compiled, Update};
+use super::formula::{Formula, Linear, Numeric};
+use super::network::{Network, NodeId};
+use super::state::State;
+use super::time::{NEVER, Scale};
+
+/// `constant + Σ coefficient · time of node`, in units of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Form {
+    /// Ascending, without zeros.
+    terms: Vec<(NodeId, Rational)>,
+    constant: Rational,
+}
+
+/// A number that moves: `base + rate · now`.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Course {
+    base: Form,
+    rate: Rational,
+}
+
+/// The numbers of a state that depend on times, and what has been demanded of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Symbolic {
+    /// By fluent; those have no value in [`State::values`].
+    courses: Vec<(u32, Course)>,
+    /// `form comparison 0`.
+    demands: Vec<(Form, Comparison)>,
+}
+
+/// When something is read: the time, and the duration of the action that reads.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Moment {
+    pub(crate) time: Form,
+    pub(crate) duration: Option<Form>,
+}
+
+impl Form {
+    pub(crate) fn constant(constant: Rational) -> Self {
+        Self {
+            terms: Vec::new(),
+            constant,
+        }
+    }
+
+    /// The time of a node.
+    pub(crate) fn node(node: NodeId) -> Self {
+        Self {
+            terms: vec![(node, Rational::ONE)],
+            constant: Rational::ZERO,
+        }
+    }
+
+    fn as_constant(&self) -> Option<&Rational> {
+        self.terms.is_empty().then_some(&self.constant)
+    }
+
+    /// `self + factor · other`
+    pub(crate) fn plus(mut self, factor: &Rational, other: &Self) -> Self {
+        for (node, coefficient) in &other.terms {
+            let change = factor * coefficient;
+            match self.terms.binary_search_by_key(node, |term| term.0) {
+                Ok(found) => self.terms[found].1 += change,
+                Err(place) => self.terms.insert(place, (*node, change)),
+            }
+        }
+        self.terms.retain(|term| !term.1.is_zero());
+        self.constant += factor * &other.constant;
+        self
+    }
+
+    fn times(&self, factor: &Rational) -> Self {
+        Self::default().plus(factor, self)
+    }
+
+    fn at(&self, times: &[Rational]) -> Rational {
+        let terms = self.terms.iter();
+        terms.fold(self.constant.clone(), |sum, (node, coefficient)| {
+            sum + coefficient * &times[usize::from(*node)]
+        })
+    }
+}
+
+impl Symbolic {
+    fn course(&self, fluent: u32) -> Option<&Course> {
+        let place = self.courses.binary_search_by_key(&fluent, |entry| entry.0);
+        place.ok().map(|place| &self.courses[place].1)
+    }
+
+    /// Whether the fluent's value depends on times.
+    pub(crate) fn governs(&self, fluent: u32) -> bool {
+        self.course(fluent).is_some()
+    }
+
+    /// Whether there is anything to solve.
+    pub(crate) fn has_demands(&self) -> bool {
+        !self.demands.is_empty()
+    }
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        let term = size_of::<(NodeId, Rational)>();
+        let forms = self.courses.iter().map(|(_, course)| &course.base);
+        let forms = forms.chain(self.demands.iter().map(|(form, _)| form));
+        forms.map(|form| 80 + term * form.terms.capacity()).sum()
+    }
+}
+
+/// The value of an expression at some moment.
+pub(crate) fn value(state: &State, numeric: &Numeric, moment: &Moment) -> Option<Form> {
+    let symbolic = state.symbolic.as_ref()?;
+    let Numeric::Linear(linear) = numeric else {
+        let mut is_governed = numeric.reads_duration();
+        numeric.visit_fluents(&mut |fluent| is_governed |= symbolic.governs(fluent));
+        let duration = moment.duration.as_ref().and_then(Form::as_constant);
+        return if is_governed && duration.is_none() {
+            None
+        } else {
+            numeric.value(&state.values, duration).map(Form::constant)
+        };
+    };
+    linear_value(state, symbolic, linear, moment)
+}
+
+fn linear_value(
+    state: &State,
+    symbolic: &Symbolic,
+    linear: &Linear,
+    moment: &Moment,
+) -> Option<Form> {
+    let mut sum = Form::constant(linear.constant.clone());
+    for (fluent, coefficient) in &linear.terms {
+        match symbolic.course(*fluent) {
+            None => sum.constant += coefficient * state.values[*fluent as usize].as_ref()?,
+            Some(course) => {
+                sum = sum.plus(coefficient, &course.base);
+                sum = sum.plus(&(coefficient * &course.rate), &moment.time);
+            }
+        }
+    }
+    if !linear.duration.is_zero() {
+        sum = sum.plus(&linear.duration, moment.duration.as_ref()?);
+    }
+    Some(sum)
+}
+
+/// Demands `form comparison 0`; `None` if that is false whatever the times.
+pub(crate) fn demand(state: &mut State, form: Form, comparison: Comparison) -> Option<()> {
+    if let Some(constant) = form.as_constant() {
+        return comparison.holds(constant, &Rational::ZERO).then_some(());
+    }
+    let symbolic = state.symbolic.as_mut()?;
+    let demand = (form, comparison);
+    if !symbolic.demands.contains(&demand) {
+        symbolic.demands.push(demand);
+    }
+    Some(())
+}
+
+/// Demands a formula. Of a choice, the first alternative that is not plainly false is taken;
+/// `has_chosen` is set if another one might have been possible.
+pub(crate) fn demand_formula(
+    compiled: &Compiled,
+    state: &mut State,
+    formula: &Formula,
+    moment: &Moment,
+    has_chosen: &mut bool,
+) -> Option<()> {
+    if !formula.literals.iter().all(|l| l.holds(&state.facts)) {
+        return None;
+    }
+    for &test in &formula.tests {
+        let test = &compiled.tests[test as usize];
+        let form = value(state, &test.difference, moment)?;
+        demand(state, form, test.comparison)?;
+    }
+    for choice in &formula.choices {
+        let mut is_met = false;
+        for part in choice {
+            let mut attempt = state.clone();
+            if demand_formula(compiled, &mut attempt, part, moment, has_chosen).is_some() {
+                *has_chosen |= attempt.symbolic != state.symbolic;
+                *state = attempt;
+                is_met = true;
+                break;
+            }
+        }
+        if !is_met {
+            return None;
+        }
+    }
+    Some(())
+}
+
+/// Reads what an update will add or assign.
+pub(crate) fn read(
+    state: &State,
+    update: &Update,
+    moment: &Moment,
+) -> Option<(u32, UpdateOperator, Form)> {
+    let form = value(state, &update.value, moment)?;
+    Some((update.fluent, update.operator, form))
+}
+
+/// Carries out an update.
+pub(crate) fn update(
+    state: &mut State,
+    fluent: u32,
+    operator: UpdateOperator,
+    amount: &Form,
+    moment: &Moment,
+) -> Option<()> {
+    let old = course_of(state, fluent);
+    let rate = old.as_ref().map_or(Rational::ZERO, |old| old.rate.clone());
+    let now = |course: &Course| course.base.clone().plus(&course.rate, &moment.time);
+    let new = match operator {
+        UpdateOperator::Assign => amount.clone(),
+        UpdateOperator::Increase => now(&old?).plus(&Rational::ONE, amount),
+        UpdateOperator::Decrease => now(&old?).plus(&Rational::from(-1), amount),
+        UpdateOperator::ScaleUp => now(&old?).times(amount.as_constant()?),
+        UpdateOperator::ScaleDown => now(&old?).times(&amount.as_constant()?.reciprocal()?),
+    };
+    let base = new.plus(&-&rate, &moment.time);
+    set_course(state, fluent, Course { base, rate });
+    Some(())
+}
+
+/// Lets a fluent move at a rate from some time on, or end doing so with the opposite rate.
+pub(crate) fn flow(state: &mut State, fluent: u32, rate: &Rational, time: &Form) -> Option<()> {
+    let mut course = course_of(state, fluent)?;
+    course.base = course.base.plus(&-rate, time);
+    course.rate += rate;
+    set_course(state, fluent, course);
+    Some(())
+}
+
+fn course_of(state: &State, fluent: u32) -> Option<Course> {
+    if let Some(course) = state.symbolic.as_ref()?.course(fluent) {
+        return Some(course.clone());
+    }
+    let value = state.values[fluent as usize].clone()?;
+    Some(Course {
+        base: Form::constant(value),
+        rate: Rational::ZERO,
+    })
+}
+
+fn set_course(state: &mut State, fluent: u32, course: Course) {
+    let Some(symbolic) = &mut state.symbolic else {
+        return;
+    };
+    let place = symbolic
+        .courses
+        .binary_search_by_key(&fluent, |entry| entry.0);
+    let constant = course.base.as_constant().filter(|_| course.rate.is_zero());
+    let value = &mut state.values[fluent as usize];
+    match (constant.cloned(), place) {
+        (Some(constant), place) => {
+            *value = Some(constant);
+            if let Ok(place) = place {
+                symbolic.courses.remove(place);
+            }
+        }
+        (None, Ok(place)) => symbolic.courses[place].1 = course,
+        (None, Err(place)) => {
+            *value = None;
+            symbolic.courses.insert(place, (fluent, course));
+        }
+    }
+}
+
+/// Whether there are times that meet all demands and the network.
+pub(crate) fn is_possible(state: &State, scale: Scale) -> bool {
+    let Some(symbolic) = &state.symbolic else {
+        return true;
+    };
+    if !symbolic.has_demands() {
+        return true;
+    }
+    let (mut program, _, _) = program(&state.network, &symbolic.demands, scale, &[]);
+    program.check().is_ok()
+}
+
+/// Times that meet all demands and the network, the last one as early as possible; what `exact`
+/// says of distances from one node to another replaces the network's rounded numbers.
+pub(crate) fn solve(
+    state: &State,
+    scale: Scale,
+    exact: &[(NodeId, NodeId, Rational)],
+) -> Option<Vec<Rational>> {
+    let symbolic = state.symbolic.as_ref()?;
+    let (mut program, times, end) = program(&state.network, &symbolic.demands, scale, exact);
+    program.minimize(&[(end, Rational::ONE)]).ok()?;
+    let model = program.model();
+    let times: Vec<Rational> = times
+        .iter()
+        .map(|time| model[time.index()].clone())
+        .collect();
+    let is_met = |(form, comparison): &(Form, Comparison)| {
+        comparison.holds(&form.at(&times), &Rational::ZERO)
+    };
+    symbolic.demands.iter().all(is_met).then_some(times)
+}
+
+/// The linear program, the variables of its nodes, and one that is not before any of them.
+fn program(
+    network: &Network,
+    demands: &[(Form, Comparison)],
+    scale: Scale,
+    exact: &[(NodeId, NodeId, Rational)],
+) -> (Simplex, Vec<VariableId>, VariableId) {
+    let mut program = Simplex::new();
+    let times: Vec<VariableId> = network.bounds().map(|_| program.add_variable()).collect();
+    let end = program.add_variable();
+    for (&time, (floor, latest)) in times.iter().zip(network.bounds()) {
+        program.assert_lower(time, Delta::from(scale.units(floor)), 0);
+        if latest < NEVER {
+            program.assert_upper(time, Delta::from(scale.units(latest)), 0);
+        }
+        let after = [(end, Rational::ONE), (time, Rational::from(-1))];
+        let after = program.define(&after);
+        program.assert_lower(after, Delta::ZERO, 0);
+    }
+    let mut distances: Vec<(NodeId, NodeId, Rational)> = network
+        .edges()
+        .map(|(from, to, distance)| (from, to, scale.units(distance)))
+        .collect();
+    for (from, to, distance) in exact {
+        for edge in &mut distances {
+            if (edge.0, edge.1) == (*from, *to) {
+                edge.2.clone_from(distance);
+            }
+        }
+    }
+    for (from, to, distance) in distances {
+        let difference = [
+            (times[usize::from(to)], Rational::ONE),
+            (times[usize::from(from)], Rational::from(-1)),
+        ];
+        let difference = program.define(&difference);
+        program.assert_lower(difference, Delta::from(distance), 0);
+    }
+    for (form, comparison) in demands {
+        let row: Vec<(VariableId, Rational)> = form
+            .terms
+            .iter()
+            .map(|(node, coefficient)| (times[usize::from(*node)], coefficient.clone()))
+            .collect();
+        let row = program.define(&row);
+        let bound = -&form.constant;
+        match comparison {
+            Comparison::Less => program.assert_upper(row, Delta::just_below(bound), 0),
+            Comparison::AtMost => program.assert_upper(row, Delta::from(bound), 0),
+            Comparison::Equal => {
+                program.assert_upper(row, Delta::from(bound.clone()), 0);
+                program.assert_lower(row, Delta::from(bound), 0);
+            }
+            Comparison::AtLeast => program.assert_lower(row, Delta::from(bound), 0),
+            Comparison::Greater => program.assert_lower(row, Delta::just_above(bound), 0),
+        }
+    }
+    (program, times, end)
+}

@@ -1,0 +1,365 @@
+//! Objects that can stand for each other.
+//!
+//! Two objects are interchangeable if the problem stays the same when they change places. Where a
+//! state also stays the same, a step with one of them leads to nothing that a step with the other
+//! does not lead to, so only one is tried (Fox & Long, "The detection and exploitation of symmetry
+//! in planning problems", IJCAI 1999).
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::ObjectId;
+
+use super::apply::Step;
+use super::compile::{Action, Compiled, NONE, Snap};
+use super::formula::{Formula, Linear, Literal, Numeric, is_set};
+use super::hash::Map;
+use super::state::State;
+
+/// The most comparisons of actions spent on finding interchangeable objects.
+const MOST_COMPARISONS: usize = 2_000_000;
+
+/// A pair of interchangeable objects.
+#[derive(Clone, Debug)]
+struct Exchange {
+    /// The facts that change places.
+    facts: Vec<(u32, u32)>,
+    fluents: Vec<(u32, u32)>,
+    /// The stamps of these facts that change places.
+    stamps: Vec<(u32, u32)>,
+    /// The actions with one of the objects, and what they become; ascending.
+    actions: Vec<(u32, u32)>,
+}
+
+/// The pairs of interchangeable objects of a problem.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Symmetry {
+    exchanges: Vec<Exchange>,
+}
+
+impl Symmetry {
+    pub(crate) fn of(task: &Task, compiled: &Compiled) -> Self {
+        let problem = task.problem();
+        let mut finder = Finder::new(task, compiled);
+        let mut exchanges = Vec::new();
+        for second in 1..problem.objects.len() {
+            // The last object before this one that it can stand for: this makes chains.
+            let candidates = (0..second).rev().filter(|&first| {
+                let types = |object: usize| &problem.objects[object].types;
+                types(first) == types(second)
+            });
+            for first in candidates.take(4) {
+                let pair = (ObjectId::from(first), ObjectId::from(second));
+                if let Some(exchange) = finder.exchange(pair) {
+                    exchanges.push(exchange);
+                    break;
+                }
+            }
+        }
+        Self { exchanges }
+    }
+
+    /// Leaves out steps to which others in the list are equivalent.
+    pub(crate) fn thin_out(&self, state: &State, is_timeless: bool, steps: &mut Vec<Step>) {
+        for exchange in &self.exchanges {
+            if steps.len() < 2 {
+                return;
+            }
+            if !exchange.preserves(state, is_timeless) {
+                continue;
+            }
+            steps.retain(|step| match step {
+                Step::Start(action) | Step::Whole(action) => {
+                    let found = exchange.actions.binary_search_by_key(action, |pair| pair.0);
+                    found.map_or(true, |place| exchange.actions[place].1 >= *action)
+                }
+                _ => true,
+            });
+        }
+    }
+}
+
+impl Exchange {
+    fn preserves(&self, state: &State, is_timeless: bool) -> bool {
+        let touches = |action: u32| {
+            let found = self.actions.binary_search_by_key(&action, |pair| pair.0);
+            found.is_ok()
+        };
+        self.facts
+            .iter()
+            .all(|&(a, b)| is_set(&state.facts, a) == is_set(&state.facts, b))
+            && self
+                .fluents
+                .iter()
+                .all(|&(a, b)| state.values[a as usize] == state.values[b as usize])
+            && state.open.iter().all(|open| !touches(open.action))
+            && (is_timeless && state.network.is_empty()
+                || self.stamps.iter().all(|&(a, b)| {
+                    let is_marked = |stamp| state.network.marks.iter().any(|m| m.0 == stamp);
+                    state.stamps[a as usize] == state.stamps[b as usize]
+                        && (a == b || !is_marked(a) && !is_marked(b))
+                }))
+            && state
+                .symbolic
+                .as_ref()
+                .is_none_or(|symbolic| self.fluents.iter().all(|&(a, _)| !symbolic.governs(a)))
+    }
+}
+
+/// Finds interchangeable objects.
+struct Finder<'a> {
+    task: &'a Task,
+    compiled: &'a Compiled,
+    facts: Map<(u32, Vec<ObjectId>), u32>,
+    fluents: Map<(u32, Vec<ObjectId>), u32>,
+    actions: Map<(u32, Vec<ObjectId>), u32>,
+    budget: usize,
+}
+
+/// Where facts, fluents and actions go when two objects change places.
+struct Images {
+    facts: Vec<u32>,
+    fluents: Vec<u32>,
+}
+
+impl<'a> Finder<'a> {
+    fn new(task: &'a Task, compiled: &'a Compiled) -> Self {
+        let facts = compiled.facts.iter().map(|&fact| {
+            let (predicate, arguments) = task.symbol_of_fact(fact);
+            (predicate.0, arguments)
+        });
+        let fluents = compiled.fluents.iter().map(|&fluent| {
+            let (function, arguments) = task.symbol_of_fluent(fluent);
+            (function.0, arguments)
+        });
+        let actions = (0..).zip(&compiled.actions);
+        let actions = actions.filter(|(_, action)| action.start != NONE);
+        Self {
+            task,
+            compiled,
+            facts: facts.zip(0..).collect(),
+            fluents: fluents.zip(0..).collect(),
+            actions: actions
+                .map(|(number, action)| ((action.schema.0, action.arguments.clone()), number))
+                .collect(),
+            budget: MOST_COMPARISONS,
+        }
+    }
+
+    /// The exchange of two objects, if it leaves the problem as it is.
+    fn exchange(&mut self, pair: (ObjectId, ObjectId)) -> Option<Exchange> {
+        if self.budget < self.compiled.actions.len() {
+            return None;
+        }
+        let images = Images {
+            facts: images(&self.facts, pair)?,
+            fluents: images(&self.fluents, pair)?,
+        };
+        self.preserves_goal_and_timed(&images)?;
+        self.budget -= self.compiled.actions.len();
+        let mut actions = Vec::new();
+        for (number, action) in (0..).zip(&self.compiled.actions) {
+            if action.start == NONE {
+                // What is under way stays as it is.
+                let is_touched = action.arguments.iter().any(|&o| o == pair.0 || o == pair.1);
+                if is_touched {
+                    return None;
+                }
+                continue;
+            }
+            let key = (action.schema.0, swapped(&action.arguments, pair));
+            let image = *self.actions.get(&key)?;
+            let other = self.compiled.action(image);
+            if !images.are_alike(self.compiled, action, other) {
+                return None;
+            }
+            if image != number {
+                actions.push((number, image));
+            }
+        }
+        let moved = |images: &[u32]| -> Vec<(u32, u32)> {
+            let pairs = (0..).zip(images.iter().copied());
+            pairs.filter(|(from, to)| from < to).collect()
+        };
+        let facts = moved(&images.facts);
+        // The stamps of actions' marks: equal for snaps that change places.
+        let mut stamps: Vec<(u32, u32)> = Vec::new();
+        for &(from, to) in &actions {
+            let (from, to) = (self.compiled.action(from), self.compiled.action(to));
+            for (a, b) in [(from.start, to.start), (from.end, to.end)] {
+                if a != NONE && b != NONE {
+                    let (a, b) = (self.compiled.snap(a), self.compiled.snap(b));
+                    let all = |snap: &Snap| -> Vec<u32> {
+                        let after = snap.after.iter().map(|entry| entry.0);
+                        after.chain(snap.marks.iter().copied()).collect()
+                    };
+                    for stamp in all(a).into_iter().filter(|stamp| !all(b).contains(stamp)) {
+                        stamps.extend(all(b).into_iter().map(|other| (stamp, other)));
+                    }
+                }
+            }
+        }
+        stamps.sort_unstable();
+        stamps.dedup();
+        Some(Exchange {
+            facts,
+            fluents: moved(&images.fluents),
+            stamps,
+            actions,
+        })
+    }
+
+    fn preserves_goal_and_timed(&self, images: &Images) -> Option<()> {
+        let compiled = self.compiled;
+        let is_kept = images.formula_is_kept(compiled, &compiled.goal);
+        let are_kept = compiled.timed.iter().all(|timed| {
+            images.keeps_facts(&timed.adds)
+                && images.keeps_facts(&timed.deletes)
+                && timed
+                    .assigns
+                    .iter()
+                    .all(|(fluent, _)| images.fluents[*fluent as usize] == *fluent)
+        });
+        let has_rules = !self.task.rules().is_empty();
+        (is_kept && are_kept && !has_rules).then_some(())
+    }
+}
+
+impl Images {
+    fn literal(&self, literal: Literal) -> Literal {
+        Literal::new(self.facts[literal.fact() as usize], literal.truth())
+    }
+
+    fn keeps_facts(&self, facts: &[u32]) -> bool {
+        self.same_facts(facts, facts)
+    }
+
+    /// Whether the facts become the others.
+    fn same_facts(&self, facts: &[u32], others: &[u32]) -> bool {
+        facts.len() == others.len()
+            && facts
+                .iter()
+                .all(|&fact| others.contains(&self.facts[fact as usize]))
+    }
+
+    fn linear(&self, linear: &Linear) -> Linear {
+        let mut image = linear.clone();
+        for term in &mut image.terms {
+            term.0 = self.fluents[term.0 as usize];
+        }
+        image.terms.sort_by_key(|term| term.0);
+        image
+    }
+
+    fn numeric_is(&self, numeric: &Numeric, other: &Numeric) -> bool {
+        match (numeric, other) {
+            (Numeric::Linear(a), Numeric::Linear(b)) => self.linear(a) == *b,
+            (a, b) => {
+                let mut is_fixed = true;
+                a.visit_fluents(&mut |f| is_fixed &= self.fluents[f as usize] == f);
+                is_fixed && a == b
+            }
+        }
+    }
+
+    fn formula_is_kept(&self, compiled: &Compiled, formula: &Formula) -> bool {
+        self.formula_is(compiled, formula, formula)
+    }
+
+    /// Whether the formula becomes the other; what is not plain enough to tell counts as different,
+    /// unless nothing in it moves.
+    fn formula_is(&self, compiled: &Compiled, formula: &Formula, other: &Formula) -> bool {
+        let test_is = |a: u32, b: u32| {
+            let (a, b) = (&compiled.tests[a as usize], &compiled.tests[b as usize]);
+            a.comparison == b.comparison && self.numeric_is(&a.difference, &b.difference)
+        };
+        formula.literals.len() == other.literals.len()
+            && formula.tests.len() == other.tests.len()
+            && formula
+                .literals
+                .iter()
+                .all(|&literal| other.literals.contains(&self.literal(literal)))
+            && formula
+                .tests
+                .iter()
+                .all(|&test| other.tests.iter().any(|&image| test_is(test, image)))
+            && (formula.choices.is_empty() && other.choices.is_empty()
+                || formula.choices == other.choices && self.moves_nothing_in(compiled, formula))
+    }
+
+    fn moves_nothing_in(&self, compiled: &Compiled, formula: &Formula) -> bool {
+        let mut is_fixed = true;
+        formula.visit_literals(&mut |literal| is_fixed &= self.literal(literal) == literal);
+        formula.visit_tests(&mut |test| {
+            let difference = &compiled.tests[test as usize].difference;
+            difference.visit_fluents(&mut |f| is_fixed &= self.fluents[f as usize] == f);
+        });
+        is_fixed
+    }
+
+    fn are_alike(&self, compiled: &Compiled, action: &Action, other: &Action) -> bool {
+        let (mine, theirs) = (&action.duration, &other.duration);
+        mine.least == theirs.least
+            && mine.most == theirs.most
+            && mine.bounds.len() == theirs.bounds.len()
+            && mine.bounds.iter().zip(&theirs.bounds).all(|(a, b)| {
+                a.comparison == b.comparison
+                    && a.at_end == b.at_end
+                    && self.numeric_is(&a.value, &b.value)
+            })
+            && action.flows.len() == other.flows.len()
+            && action.flows.iter().zip(&other.flows).all(|(a, b)| {
+                self.fluents[a.fluent as usize] == b.fluent
+                    && self.numeric_is(&a.rate, &b.rate)
+                    && a.guard == b.guard
+            })
+            && (action.guards.is_empty() && other.guards.is_empty())
+            && self.formula_is(compiled, &action.over_all, &other.over_all)
+            && [(action.start, other.start), (action.end, other.end)]
+                .iter()
+                .all(|&(a, b)| {
+                    a == NONE && b == NONE
+                        || a != NONE
+                            && b != NONE
+                            && self.snap_is(compiled, compiled.snap(a), compiled.snap(b))
+                })
+    }
+
+    fn snap_is(&self, compiled: &Compiled, snap: &Snap, other: &Snap) -> bool {
+        self.formula_is(compiled, &snap.condition, &other.condition)
+            && self.same_facts(&snap.adds, &other.adds)
+            && self.same_facts(&snap.deletes, &other.deletes)
+            && snap.conditional.is_empty()
+            && other.conditional.is_empty()
+            && snap.before_timed == other.before_timed
+            && snap.after.len() == other.after.len()
+            && snap.marks.len() == other.marks.len()
+            && snap.updates.len() == other.updates.len()
+            && snap.updates.iter().all(|a| {
+                other.updates.iter().any(|b| {
+                    self.fluents[a.fluent as usize] == b.fluent
+                        && a.operator == b.operator
+                        && self.numeric_is(&a.value, &b.value)
+                })
+            })
+    }
+}
+
+/// Where the symbols go; `None` if some image is not among them.
+fn images(table: &Map<(u32, Vec<ObjectId>), u32>, pair: (ObjectId, ObjectId)) -> Option<Vec<u32>> {
+    let image = |(key, &number): (&(u32, Vec<ObjectId>), &u32)| {
+        if key.1.iter().any(|&o| o == pair.0 || o == pair.1) {
+            table.get(&(key.0, swapped(&key.1, pair))).copied()
+        } else {
+            Some(number)
+        }
+    };
+    table.iter().map(image).collect()
+}
+
+fn swapped(objects: &[ObjectId], (a, b): (ObjectId, ObjectId)) -> Vec<ObjectId> {
+    let image = |&object: &ObjectId| match object {
+        object if object == a => b,
+        object if object == b => a,
+        object => object,
+    };
+    objects.iter().map(image).collect()
+}
