@@ -3,5 +3,5 @@
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod envelope;
-pub(crate) mod stn;
 pub(crate) mod run;
+pub(crate) mod stn;

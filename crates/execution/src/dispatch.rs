@@ -84,7 +84,7 @@ impl Dispatch {
     ) -> Result<Self, Box<Reason>> {
         let plan = mission.plan.plan.clone();
         let at_nominal = plan.at(&mission.plan.nominal());
-                let ends = ends_of(&plan);
+        let ends = ends_of(&plan);
         let (network, sources) = network(&plan, bounds);
         let mut durations = vec![(None, None); plan.instances.len()];
         for constraint in &plan.constraints {
@@ -99,8 +99,8 @@ impl Dispatch {
                 Err(cycle) => {
                     let ids = cycle.constraints.iter();
                     let behind = ids.filter_map(|id| sources.get(id.index()).copied().flatten());
-                    let mut reason = Reason::new(Cause::Late)
-                        .about("no times satisfy the plan's constraints");
+                    let mut reason =
+                        Reason::new(Cause::Late).about("no times satisfy the plan's constraints");
                     reason.behind = behind
                         .map(|index| explain::words(&mission.task, &plan, index))
                         .collect();
@@ -133,7 +133,8 @@ impl Dispatch {
 
     /// Time 0 has happened, and so have the starts of what is running.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
-        self.progress.happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
+        self.progress
+            .happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
         for step in running.keys() {
             let id = InstanceId(step.0);
             let start = self.ends[id.index()][0];
@@ -218,7 +219,11 @@ impl Dispatch {
         for (node, _) in self.plan.nodes().skip(1) {
             if let Some(time) = self.happened(node) {
                 let node = network_node(node);
-                network.add(elbowroom_stn::Constraint::at_least(zero, node, time.clone()));
+                network.add(elbowroom_stn::Constraint::at_least(
+                    zero,
+                    node,
+                    time.clone(),
+                ));
                 network.add(elbowroom_stn::Constraint::at_most(zero, node, time.clone()));
             }
         }

@@ -143,9 +143,14 @@ impl fmt::Display for Reason {
                 }
             }
             Cause::Contradiction => write!(f, "reports on {action} contradict each other")?,
-            Cause::Surprise => write!(f, "{about} was not expected, and {action} needs it to be otherwise")?,
+            Cause::Surprise => write!(
+                f,
+                "{about} was not expected, and {action} needs it to be otherwise"
+            )?,
             Cause::Silence => write!(f, "nothing has been heard of {action} for too long")?,
-            Cause::GuaranteeLost => write!(f, "the rest of the plan is no longer guaranteed: {about}")?,
+            Cause::GuaranteeLost => {
+                write!(f, "the rest of the plan is no longer guaranteed: {about}")?
+            }
             Cause::Late => write!(f, "the plan came too late: {about}")?,
             Cause::PlanDone => write!(f, "the plan is done, but the goal is not reached: {about}")?,
             Cause::GoalReached => write!(f, "the goal is reached")?,

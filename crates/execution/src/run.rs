@@ -131,9 +131,7 @@ impl<'a> Run<'a> {
         }
         let verdict = match outcome {
             Err(Stop::Over(verdict)) => verdict,
-            Err(Stop::World(error)) => Verdict::WorldFailed {
-                why: error.message,
-            },
+            Err(Stop::World(error)) => Verdict::WorldFailed { why: error.message },
             Ok(()) => unreachable!("the loop ends with an error"),
         };
         let report = Report {
@@ -158,7 +156,9 @@ impl<'a> Run<'a> {
                     .iter()
                     .filter_map(|step| self.account.ticket(*step))
                     .collect();
-                tickets.into_iter().try_for_each(|ticket| self.cancel(ticket))
+                tickets
+                    .into_iter()
+                    .try_for_each(|ticket| self.cancel(ticket))
             }
             Decision::Wait { until } => self.wait(until),
             Decision::Replan => self.replan(decided.reason),
@@ -299,7 +299,10 @@ impl<'a> Run<'a> {
         }
         // What has ended while the plan was made, the plan still waits for.
         for (step, ticket) in &mission.running {
-            let ended = self.account.get(*ticket).and_then(|entry| entry.ended.clone());
+            let ended = self
+                .account
+                .get(*ticket)
+                .and_then(|entry| entry.ended.clone());
             if let Some((time, ending)) = ended {
                 self.news.push(News::Ended {
                     step: *step,

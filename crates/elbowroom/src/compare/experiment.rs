@@ -201,7 +201,9 @@ impl Experiment {
             let rows = group.rows.iter();
             together.push(Together {
                 names: group.names.clone(),
-                rows: rows.map(|row| row.get_ref().iter().map(text_of).collect()).collect(),
+                rows: rows
+                    .map(|row| row.get_ref().iter().map(text_of).collect())
+                    .collect(),
             });
         }
         let settings = read
@@ -231,7 +233,11 @@ impl Experiment {
             settings,
             precision,
             planner_states: read.planner_states.unwrap_or(20_000),
-            published: read.published.into_iter().map(Spanned::into_inner).collect(),
+            published: read
+                .published
+                .into_iter()
+                .map(Spanned::into_inner)
+                .collect(),
         })
     }
 
@@ -280,9 +286,12 @@ impl File {
             let names = RunningRule::NAMES.iter();
             let found = names.clone().find(|(_, name)| *name == running.get_ref());
             let known: Vec<&str> = names.map(|(_, name)| *name).collect();
-            settings.running = found
-                .map(|(rule, _)| *rule)
-                .ok_or_else(|| (running.span().start, format!("choose one of {}", known.join(", "))))?;
+            settings.running = found.map(|(rule, _)| *rule).ok_or_else(|| {
+                (
+                    running.span().start,
+                    format!("choose one of {}", known.join(", ")),
+                )
+            })?;
         }
         if let Some(time) = &self.planning_time {
             let number = match time.get_ref() {
@@ -293,7 +302,10 @@ impl File {
             // Measured times would make a result depend on the machine.
             let number = number.filter(|number| !number.is_negative());
             settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
-                (time.span().start, "write a number of seconds, so that results can be repeated".to_owned())
+                (
+                    time.span().start,
+                    "write a number of seconds, so that results can be repeated".to_owned(),
+                )
             })?);
         } else {
             settings.planning_time = PlanningTime::Seconds(Rational::ZERO);

@@ -84,11 +84,7 @@ impl Analyst {
         flow::open(task, freed, &specs, epsilon).map_err(|error| error.to_string())
     }
 
-    fn envelope(
-        &self,
-        task: &Task,
-        plan: &ParametrizedPlan,
-    ) -> Result<DecoupledEnvelope, String> {
+    fn envelope(&self, task: &Task, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, String> {
         let mut oracle =
             Oracle::new(task, plan, &self.settings.epsilon).map_err(|error| error.to_string())?;
         let search = &self.settings.search;
@@ -195,5 +191,9 @@ fn reads_numbers(task: &Task, plan: &ParametrizedPlan) -> bool {
 fn is_about_actions(task: &Task, spec: &VarySpec) -> bool {
     let schemas = &task.problem().schemas;
     let mut words = spec.text.split([' ', '(', ')']);
-    words.any(|word| schemas.iter().any(|schema| schema.name.eq_ignore_ascii_case(word)))
+    words.any(|word| {
+        schemas
+            .iter()
+            .any(|schema| schema.name.eq_ignore_ascii_case(word))
+    })
 }

@@ -130,12 +130,18 @@ impl Account {
 
     /// Since when an action is overdue at `now` beyond what patience allows.
     pub(super) fn silent(&self, patience: &Patience, now: &Rational) -> Vec<(Ticket, Rational)> {
-        let open = self.open.keys().map(|ticket| (*ticket, self.limit(*ticket, patience)));
+        let open = self
+            .open
+            .keys()
+            .map(|ticket| (*ticket, self.limit(*ticket, patience)));
         open.filter(|(_, limit)| limit <= now).collect()
     }
 
     pub(super) fn next_silence(&self, patience: &Patience) -> Option<Rational> {
-        self.open.keys().map(|ticket| self.limit(*ticket, patience)).min()
+        self.open
+            .keys()
+            .map(|ticket| self.limit(*ticket, patience))
+            .min()
     }
 
     /// Until when to wait for a word of an action.
@@ -157,7 +163,10 @@ impl Account {
             let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
             let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
             let is_whole = ending == Some(Ending::Succeeded);
-            let duration = entry.planned.as_ref().map(|_| (end - &start).max(Rational::ZERO));
+            let duration = entry
+                .planned
+                .as_ref()
+                .map(|_| (end - &start).max(Rational::ZERO));
             Some(ExecutedStep {
                 ticket: Ticket(index as u64),
                 ending,

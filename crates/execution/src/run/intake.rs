@@ -125,7 +125,8 @@ impl Run<'_> {
         };
         if let Some((_, earlier)) = &entry.ended {
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);
-            let are_both_without_end = *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
+            let are_both_without_end =
+                *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
             if is_same || are_both_without_end {
                 return Some("it had ended already");
             }

@@ -167,10 +167,16 @@ impl Reader<'_> {
         let mut found: Vec<(Range<usize>, Distribution, Option<f64>, Option<f64>)> = Vec::new();
         let plain = |span, distribution| (span, distribution, given.minimum, given.maximum);
         if let Some(value) = &given.constant {
-            found.push(plain(value.span(), Distribution::Constant(*value.get_ref())));
+            found.push(plain(
+                value.span(),
+                Distribution::Constant(*value.get_ref()),
+            ));
         }
         if let Some(values) = &given.values {
-            found.push(plain(values.span(), Distribution::Empirical(values.get_ref().clone())));
+            found.push(plain(
+                values.span(),
+                Distribution::Empirical(values.get_ref().clone()),
+            ));
         }
         let shapes = [
             ("normal", &given.normal),
@@ -251,8 +257,10 @@ impl Reader<'_> {
             }
             _ => {
                 excess(&["mean", "deviation"])?;
-                let (mean, deviation) =
-                    (need(given.mean, "mean")?, need(given.deviation, "deviation")?);
+                let (mean, deviation) = (
+                    need(given.mean, "mean")?,
+                    need(given.deviation, "deviation")?,
+                );
                 if name == "normal" {
                     Distribution::Normal { mean, deviation }
                 } else {
@@ -325,7 +333,10 @@ impl Reader<'_> {
         };
         let words = name.trim_matches(['(', ')']).split_whitespace();
         if words.clone().any(|word| word == "_" || word == "*") {
-            return Err(self.wrong(&text.span(), "name one fact or fluent, with all its objects"));
+            return Err(self.wrong(
+                &text.span(),
+                "name one fact or fluent, with all its objects",
+            ));
         }
         Ok(format!("({})", words.collect::<Vec<_>>().join(" ")))
     }
