@@ -168,6 +168,7 @@ impl Choices {
                 ..embedded::Settings::default()
             },
             most_states: arguments.planner_states,
+            improve_states: arguments.improve_states,
             clock: Some(&seconds),
         };
         let planner: &mut dyn Planner = match arguments.planner {

@@ -37,6 +37,8 @@ pub struct Experiment {
     pub precision: Rational,
     /// How many states the planner looks at for one plan.
     pub planner_states: u64,
+    /// How many of them for a better plan than the first.
+    pub improve_states: u64,
     /// Figures to stand beside ours.
     pub published: Vec<Published>,
 }
@@ -122,6 +124,7 @@ struct File {
     max_replans: Option<usize>,
     precision: Option<Spanned<f64>>,
     planner_states: Option<u64>,
+    improve_states: Option<u64>,
     #[serde(default)]
     blanks: IndexMap<String, Vec<toml::Value>>,
     #[serde(default)]
@@ -233,6 +236,7 @@ impl Experiment {
             settings,
             precision,
             planner_states: read.planner_states.unwrap_or(20_000),
+            improve_states: read.improve_states.unwrap_or(20_000),
             published: read
                 .published
                 .into_iter()

@@ -167,6 +167,7 @@ impl Setting<'_> {
                 ..embedded::Settings::default()
             },
             most_states: self.experiment.planner_states,
+            improve_states: self.experiment.improve_states,
             clock: None,
         }
     }

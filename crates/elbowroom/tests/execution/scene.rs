@@ -78,6 +78,7 @@ impl Scene {
         Embedded {
             settings: embedded::Settings::default(),
             most_states: self.states,
+            improve_states: 256,
             clock: None,
         }
     }
