@@ -3,7 +3,7 @@
 ; Written after the description in Cashmore et al. (2020), section 5, "Resource-Uncertain Flexible
 ; Execution": steps of the base draw on the battery, and the second step adds material. Rings can be
 ; mounted up to a weight of 110, and a product is delivered from a weight of 60 on and with a charge
-; of 30 left. Throwing the workpiece away comes with a fresh battery.
+; of 30 left. Throwing the workpiece away comes with a full battery.
 
 (define (domain order-delivery-resources)
   (:requirements :strips :typing :fluents :durative-actions :timed-initial-literals)
@@ -115,4 +115,4 @@
                  (at end (not (step-1 ?o))) (at end (not (step-2 ?o))) (at end (not (step-3 ?o)))
                  (at end (not (step-4 ?o))) (at end (not (step-5 ?o))) (at end (not (step-6 ?o)))
                  (at end (not (mounted ?o)))
-                 (at end (assign (charge ?r) 150)) (at end (assign (weight ?o) 0)))))
+                 (at end (assign (charge ?r) (capacity ?r))) (at end (assign (weight ?o) 0)))))

@@ -317,7 +317,11 @@ impl Progress {
 ///
 /// Ends may fall together and are reported one after the other; the plan then orders only one of
 /// them before the start.
-fn with_ends_before(plan: &StnPlan, before: &[BTreeSet<NodeId>], start: NodeId) -> BTreeSet<NodeId> {
+fn with_ends_before(
+    plan: &StnPlan,
+    before: &[BTreeSet<NodeId>],
+    start: NodeId,
+) -> BTreeSet<NodeId> {
     let mut all = before[start.index()].clone();
     let mut frontier: Vec<NodeId> = all.iter().copied().collect();
     while let Some(node) = frontier.pop() {

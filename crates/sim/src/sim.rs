@@ -101,17 +101,17 @@ impl<'a> SimWorld<'a> {
     }
 
     /// Something happens at `time`; conditions over intervals are looked at before and after.
-    fn happen(&mut self, time: Rational, coming: Option<Coming>) {
+    fn happen(&mut self, time: Rational, coming: Option<&Coming>) {
         // A fluent without a value that should move stays without.
         let _ = self.truth.advance(&time);
         self.now = time;
         self.fail_broken();
         match coming {
             None => {}
-            Some(Coming::Start(ticket)) => self.start(ticket),
-            Some(Coming::End(ticket)) => self.end(ticket),
-            Some(Coming::Fail(ticket)) => self.fail(ticket, "it broke down"),
-            Some(Coming::Exogenous(index)) => self.change(index),
+            Some(Coming::Start(ticket)) => self.start(*ticket),
+            Some(Coming::End(ticket)) => self.end(*ticket),
+            Some(Coming::Fail(ticket)) => self.fail(*ticket, "it broke down"),
+            Some(Coming::Exogenous(index)) => self.change(*index),
         }
         self.fail_broken();
     }
@@ -325,7 +325,7 @@ impl World for SimWorld<'_> {
                 if delay.is_positive() {
                     self.put(&self.now + delay, Coming::Start(*ticket));
                 } else {
-                    self.happen(self.now.clone(), Some(Coming::Start(*ticket)));
+                    self.happen(self.now.clone(), Some(&Coming::Start(*ticket)));
                 }
             }
             Command::Cancel { ticket } => {
@@ -361,7 +361,7 @@ impl World for SimWorld<'_> {
             } else {
                 self.agenda.pop_first().map(|(_, coming)| coming)
             };
-            self.happen(time.max(self.now.clone()), coming);
+            self.happen(time.max(self.now.clone()), coming.as_ref());
         }
         Ok(Passage {
             now: self.now.clone(),

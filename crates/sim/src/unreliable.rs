@@ -139,8 +139,8 @@ fn opposite(event: &Event) -> Event {
         measured: Vec::new(),
     };
     match event {
-        Event::Started { ticket, .. } => failed(*ticket),
-        Event::Ended {
+        Event::Started { ticket, .. }
+        | Event::Ended {
             ticket,
             ending: Ending::Succeeded,
             ..

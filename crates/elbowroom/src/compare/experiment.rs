@@ -153,10 +153,7 @@ impl Experiment {
         file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, ExperimentError> {
         let wrong = |at: usize, message: String| ExperimentError::File {
-            line: 1 + text.as_bytes()[..at.min(text.len())]
-                .iter()
-                .filter(|byte| **byte == b'\n')
-                .count(),
+            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
             message: message.trim().replace('\n', " "),
         };
         let read: File = toml::from_str(text).map_err(|error| {

@@ -114,12 +114,13 @@ impl Preparer for Analyst {
         let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
         let nominal = freed.deordered.nominal.clone();
         let plan = match need {
+            Need::Orderings => ParametrizedPlan::closed(task, freed.deordered.plan),
             Need::Network => flow::closed(task, freed, epsilon),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         };
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan)?),
-            Need::Network | Need::OpenNetwork => None,
+            Need::Orderings | Need::Network | Need::OpenNetwork => None,
         };
         Ok(Prepared {
             plan,

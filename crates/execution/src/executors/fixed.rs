@@ -17,7 +17,7 @@ pub(super) const REGISTERED: Registered = Registered {
               value by more than X %. It looks no further than the constraints at each time \
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
-    need: Need::Network,
+    need: Need::Orderings,
     make: |percentage, _| Box::new(Fixed::new(percentage)),
 };
 

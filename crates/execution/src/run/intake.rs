@@ -1,6 +1,6 @@
 //! Taking in what the world reports: each report once, and no report against reason.
 
-use elbowroom_model::ground::Body;
+use elbowroom_model::ground::{Body, Change};
 use elbowroom_num::Rational;
 
 use super::{Run, Stop};
@@ -199,7 +199,6 @@ impl Run<'_> {
             Body::Durative(body) if is_end => &body.end.effects,
             Body::Durative(body) => &body.start.effects,
         };
-        use elbowroom_model::ground::Change;
         for effect in effects {
             self.news.push(match &effect.change {
                 Change::Add(fact) | Change::Delete(fact) => News::Fact(*fact),

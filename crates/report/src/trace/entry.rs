@@ -1,7 +1,7 @@
 //! One entry as JSON.
 
 use elbowroom_execution::run::{ExecutedStep, Report};
-use elbowroom_execution::{Decided, Decision, Entry, Mission, Order, Planned, Reason};
+use elbowroom_execution::{Decided, Decision, Ending, Entry, Mission, Order, Planned, Reason};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, ParametrizedPlan};
@@ -123,7 +123,7 @@ fn executed(executed: &ExecutedStep) -> Value {
         executed.step.duration.as_ref(),
     );
     value["ticket"] = executed.ticket.0.into();
-    value["outcome"] = executed.ending.as_ref().map(|ending| ending.name()).into();
+    value["outcome"] = executed.ending.as_ref().map(Ending::name).into();
     value
 }
 
