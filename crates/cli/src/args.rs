@@ -206,6 +206,9 @@ pub(crate) struct RunArgs {
     /// How many states the embedded planner may look at for one plan
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub(crate) planner_states: u64,
+    /// How many of them for a better plan than the first
+    #[arg(long, value_name = "N", default_value_t = 2_000)]
+    pub(crate) improve_states: u64,
     /// The world to execute in (docs/formats/world.md); without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml")]
     pub(crate) world: Option<PathBuf>,

@@ -4,5 +4,5 @@ pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod envelope;
 pub(crate) mod plan;
-pub(crate) mod stn;
 pub(crate) mod run;
+pub(crate) mod stn;

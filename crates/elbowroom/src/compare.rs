@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-pub use experiment::{Column, Experiment, ExperimentError, Published};
+pub use experiment::{Column, Experiment, ExperimentError, Published, Together};
 pub use results::{Cell, Pair, Results, ResultsError};
 
 use trials::Setting;

@@ -84,7 +84,7 @@ impl Dispatch {
     ) -> Result<Self, Box<Reason>> {
         let plan = mission.plan.plan.clone();
         let at_nominal = plan.at(&mission.plan.nominal());
-                let ends = ends_of(&plan);
+        let ends = ends_of(&plan);
         let (network, sources) = network(&plan, bounds);
         let mut durations = vec![(None, None); plan.instances.len()];
         for constraint in &plan.constraints {
@@ -99,8 +99,8 @@ impl Dispatch {
                 Err(cycle) => {
                     let ids = cycle.constraints.iter();
                     let behind = ids.filter_map(|id| sources.get(id.index()).copied().flatten());
-                    let mut reason = Reason::new(Cause::Late)
-                        .about("no times satisfy the plan's constraints");
+                    let mut reason =
+                        Reason::new(Cause::Late).about("no times satisfy the plan's constraints");
                     reason.behind = behind
                         .map(|index| explain::words(&mission.task, &plan, index))
                         .collect();
@@ -133,7 +133,8 @@ impl Dispatch {
 
     /// Time 0 has happened, and so have the starts of what is running.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
-        self.progress.happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
+        self.progress
+            .happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
         for step in running.keys() {
             let id = InstanceId(step.0);
             let start = self.ends[id.index()][0];
@@ -218,7 +219,11 @@ impl Dispatch {
         for (node, _) in self.plan.nodes().skip(1) {
             if let Some(time) = self.happened(node) {
                 let node = network_node(node);
-                network.add(elbowroom_stn::Constraint::at_least(zero, node, time.clone()));
+                network.add(elbowroom_stn::Constraint::at_least(
+                    zero,
+                    node,
+                    time.clone(),
+                ));
                 network.add(elbowroom_stn::Constraint::at_most(zero, node, time.clone()));
             }
         }
@@ -251,14 +256,14 @@ impl Progress {
             running: BTreeSet::new(),
             left: plan.instances.len(),
         };
-        let mut order = |before: NodeId, after: NodeId, least: &Rational| {
-            let is_end = matches!(plan.nodes[before.index()], Node::End(_));
-            let is_timed = matches!(plan.nodes[before.index()], Node::Timed(_));
+        let mut before = vec![BTreeSet::new(); count];
+        let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
+            let is_end = matches!(plan.nodes[earlier.index()], Node::End(_));
+            let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
             // A start that may fall together with another one does not wait for it.
             let waits = least.is_positive() || (least.is_zero() && is_end);
-            if waits && !is_timed && before != NodeId::ZERO {
-                progress.successors[before.index()].push(after);
-                progress.missing[after.index()] += 1;
+            if waits && !is_timed && earlier != NodeId::ZERO {
+                before[later.index()].insert(earlier);
             }
         };
         for constraint in constraints {
@@ -271,6 +276,15 @@ impl Progress {
             }
             if let Bound::Finite(upper) = &constraint.upper {
                 order(constraint.to, constraint.from, &-upper);
+            }
+        }
+        for (node, what) in plan.nodes() {
+            if !matches!(what, Node::Start(_) | Node::Instant(_)) {
+                continue;
+            }
+            for earlier in with_ends_before(plan, &before, node) {
+                progress.successors[earlier.index()].push(node);
+                progress.missing[node.index()] += 1;
             }
         }
         for (node, what) in plan.nodes() {
@@ -297,6 +311,30 @@ impl Progress {
             }
         }
     }
+}
+
+/// What a start waits for: what comes before it, and the ends that come before ends among these.
+///
+/// Ends may fall together and are reported one after the other; the plan then orders only one of
+/// them before the start.
+fn with_ends_before(
+    plan: &StnPlan,
+    before: &[BTreeSet<NodeId>],
+    start: NodeId,
+) -> BTreeSet<NodeId> {
+    let mut all = before[start.index()].clone();
+    let mut frontier: Vec<NodeId> = all.iter().copied().collect();
+    while let Some(node) = frontier.pop() {
+        if !matches!(plan.nodes[node.index()], Node::End(_)) {
+            continue;
+        }
+        for &earlier in &before[node.index()] {
+            if matches!(plan.nodes[earlier.index()], Node::End(_)) && all.insert(earlier) {
+                frontier.push(earlier);
+            }
+        }
+    }
+    all
 }
 
 /// The instance whose duration a constraint bounds.

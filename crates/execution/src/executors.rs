@@ -165,7 +165,10 @@ mod tests {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);
         }
-        assert_eq!("fixed(30%)".parse::<ExecutorSpec>().unwrap().to_string(), "fixed:30");
+        assert_eq!(
+            "fixed(30%)".parse::<ExecutorSpec>().unwrap().to_string(),
+            "fixed:30"
+        );
     }
 
     #[test]

@@ -41,9 +41,7 @@ pub mod run;
 mod world;
 
 pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
-pub use executor::{
-    Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId,
-};
+pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};

@@ -11,7 +11,10 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Schedule};
 /// What an executor needs to know of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// Which orderings matter. Nothing is left open.
+    /// Which orderings matter. Nothing is left open, and nothing is guaranteed where conditions on
+    /// numbers depend on times: what dispatchers commonly have.
+    Orderings,
+    /// The same, with as many differences of times fixed as it takes for every schedule to work.
     Network,
     /// The same, with quantities left open.
     OpenNetwork,

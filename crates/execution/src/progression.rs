@@ -197,7 +197,12 @@ impl Progression {
             return Ok(());
         };
         let duration = &self.time - &underway.start;
-        self.happen(&body.end, Some(&duration), Some(&underway.end_guards), measured)
+        self.happen(
+            &body.end,
+            Some(&duration),
+            Some(&underway.end_guards),
+            measured,
+        )
     }
 
     /// A running action stops without its end taking place.
@@ -415,12 +420,15 @@ impl Progression {
 /// Leaves out the effects that will not take place, and what is decided of the others' guards.
 fn decide_guards(body: &mut DurativeBody, underway: &Underway) {
     let mut on = underway.end_guards.iter();
-    body.end.effects.retain(|_| on.next().copied().unwrap_or(true));
+    body.end
+        .effects
+        .retain(|_| on.next().copied().unwrap_or(true));
     for effect in &mut body.end.effects {
         effect.guard.at_start = Condition::TRUE;
     }
     let mut on = underway.continuous.iter();
-    body.continuous.retain(|_| on.next().copied().unwrap_or(true));
+    body.continuous
+        .retain(|_| on.next().copied().unwrap_or(true));
     for effect in &mut body.continuous {
         effect.guard.at_start = Condition::TRUE;
     }
@@ -441,9 +449,7 @@ fn updated(
         UpdateOperator::Increase => old + amount,
         UpdateOperator::Decrease => old - amount,
         UpdateOperator::ScaleUp => old * amount,
-        UpdateOperator::ScaleDown => old
-            .checked_div(amount)
-            .ok_or(Unreadable::DivisionByZero)?,
+        UpdateOperator::ScaleDown => old.checked_div(amount).ok_or(Unreadable::DivisionByZero)?,
     })
 }
 

@@ -127,30 +127,7 @@ impl Reason {
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let action = self.action.as_deref().unwrap_or("the plan");
-        let about = self.about.as_deref().unwrap_or("something");
-        match self.cause {
-            Cause::Due => write!(f, "{action} is due")?,
-            Cause::NothingDue => write!(f, "nothing is due before {about}")?,
-            Cause::OutsideInterval => write!(f, "the {about} of {action} is not in its interval")?,
-            Cause::Outlived => write!(f, "{action} has not ended in time")?,
-            Cause::Unreachable => write!(f, "too little time is left for {about}")?,
-            Cause::Condition => write!(f, "{action} needs {about}, which does not hold")?,
-            Cause::Failed => {
-                write!(f, "{action} failed")?;
-                if let Some(why) = self.about.as_deref().filter(|why| !why.is_empty()) {
-                    write!(f, ": {why}")?;
-                }
-            }
-            Cause::Contradiction => write!(f, "reports on {action} contradict each other")?,
-            Cause::Surprise => write!(f, "{about} was not expected, and {action} needs it to be otherwise")?,
-            Cause::Silence => write!(f, "nothing has been heard of {action} for too long")?,
-            Cause::GuaranteeLost => write!(f, "the rest of the plan is no longer guaranteed: {about}")?,
-            Cause::Late => write!(f, "the plan came too late: {about}")?,
-            Cause::PlanDone => write!(f, "the plan is done, but the goal is not reached: {about}")?,
-            Cause::GoalReached => write!(f, "the goal is reached")?,
-            Cause::NewPlan => write!(f, "there is a new plan")?,
-        }
+        f.write_str(&self.statement())?;
         if let Some(observed) = &self.observed {
             write!(f, "; observed {}", observed.to_decimal(3))?;
         }
@@ -167,6 +144,38 @@ impl fmt::Display for Reason {
             write!(f, " (behind it: {})", self.behind.join("; "))?;
         }
         Ok(())
+    }
+}
+
+impl Reason {
+    /// The reason without its numbers.
+    fn statement(&self) -> String {
+        let action = self.action.as_deref().unwrap_or("the plan");
+        let about = self.about.as_deref().unwrap_or("something");
+        match self.cause {
+            Cause::Due => format!("{action} is due"),
+            Cause::NothingDue => format!("nothing is due before {about}"),
+            Cause::OutsideInterval => format!("the {about} of {action} is not in its interval"),
+            Cause::Outlived => format!("{action} has not ended in time"),
+            Cause::Unreachable => format!("too little time is left for {about}"),
+            Cause::Condition => format!("{action} needs {about}, which does not hold"),
+            Cause::Failed => match self.about.as_deref() {
+                Some(why) if !why.is_empty() => format!("{action} failed: {why}"),
+                _ => format!("{action} failed"),
+            },
+            Cause::Contradiction => format!("reports on {action} contradict each other"),
+            Cause::Surprise => {
+                format!("{about} was not expected, and {action} needs it to be otherwise")
+            }
+            Cause::Silence => format!("nothing has been heard of {action} for too long"),
+            Cause::GuaranteeLost => {
+                format!("the rest of the plan is no longer guaranteed: {about}")
+            }
+            Cause::Late => format!("the plan came too late: {about}"),
+            Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
+            Cause::GoalReached => "the goal is reached".to_owned(),
+            Cause::NewPlan => "there is a new plan".to_owned(),
+        }
     }
 }
 

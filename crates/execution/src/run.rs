@@ -123,7 +123,7 @@ impl<'a> Run<'a> {
     pub fn go(mut self, first: Option<&TimeTriggeredPlan>) -> Report {
         let begun = match first {
             Some(plan) => self.take_up(plan, &Situation::initial(&self.task), &[]),
-            None => self.replan(Reason::new(Cause::NewPlan)),
+            None => self.replan(&Reason::new(Cause::NewPlan)),
         };
         let mut outcome = begun;
         while outcome.is_ok() {
@@ -131,9 +131,7 @@ impl<'a> Run<'a> {
         }
         let verdict = match outcome {
             Err(Stop::Over(verdict)) => verdict,
-            Err(Stop::World(error)) => Verdict::WorldFailed {
-                why: error.message,
-            },
+            Err(Stop::World(error)) => Verdict::WorldFailed { why: error.message },
             Ok(()) => unreachable!("the loop ends with an error"),
         };
         let report = Report {
@@ -142,7 +140,7 @@ impl<'a> Run<'a> {
             replans: self.replans,
             reasons: std::mem::take(&mut self.reasons),
             starts: self.account.started(),
-            executed: self.account.executed(&self.belief, &self.now),
+            executed: self.account.executed(&self.now),
         };
         self.ports.recorder.record(&Entry::Over(&report));
         report
@@ -158,10 +156,12 @@ impl<'a> Run<'a> {
                     .iter()
                     .filter_map(|step| self.account.ticket(*step))
                     .collect();
-                tickets.into_iter().try_for_each(|ticket| self.cancel(ticket))
+                tickets
+                    .into_iter()
+                    .try_for_each(|ticket| self.cancel(ticket))
             }
             Decision::Wait { until } => self.wait(until),
-            Decision::Replan => self.replan(decided.reason),
+            Decision::Replan => self.replan(&decided.reason),
             Decision::GoalReached => self.goal_reached(),
         }
     }
@@ -218,7 +218,7 @@ impl<'a> Run<'a> {
         let until = until.into_iter().chain(silence).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
-            return self.replan(Reason::new(Cause::Late).about("the plan waits for nothing"));
+            return self.replan(&Reason::new(Cause::Late).about("the plan waits for nothing"));
         };
         self.pass(&until)?;
         self.give_up_the_silent()
@@ -257,7 +257,7 @@ impl<'a> Run<'a> {
             return Err(Stop::Over(Verdict::GoalReached));
         }
         self.news.clear();
-        self.replan(Reason::new(Cause::Surprise).about("what the world looks like at the end"))
+        self.replan(&Reason::new(Cause::Surprise).about("what the world looks like at the end"))
     }
 
     fn is_goal_certain(&self) -> bool {
@@ -265,7 +265,7 @@ impl<'a> Run<'a> {
     }
 
     /// Plans from here; see [`RunningRule`] for what becomes of what is running.
-    fn replan(&mut self, reason: Reason) -> Result<(), Stop> {
+    fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         if reason.cause != Cause::NewPlan {
             self.reasons.push(reason.clone());
             self.replans += 1;
@@ -275,7 +275,7 @@ impl<'a> Run<'a> {
             }
         }
         self.settle()?;
-        self.plan_from_here(&reason)
+        self.plan_from_here(reason)
     }
 
     /// Makes a plan ready and begins with it. `running` are the tickets of what the situation has
@@ -295,11 +295,14 @@ impl<'a> Run<'a> {
         self.news.clear();
         self.ports.recorder.record(&Entry::Mission(&mission));
         if let Err(reason) = self.ports.executor.adopt(&mission) {
-            return self.replan(*reason);
+            return self.replan(&reason);
         }
         // What has ended while the plan was made, the plan still waits for.
         for (step, ticket) in &mission.running {
-            let ended = self.account.get(*ticket).and_then(|entry| entry.ended.clone());
+            let ended = self
+                .account
+                .get(*ticket)
+                .and_then(|entry| entry.ended.clone());
             if let Some((time, ending)) = ended {
                 self.news.push(News::Ended {
                     step: *step,

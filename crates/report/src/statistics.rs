@@ -27,7 +27,10 @@ impl Proportion {
         let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
         let scale = 1.0 + z * z / n;
         let clamp = |value: f64| value.clamp(0.0, 1.0);
-        Some((clamp((middle - half) / scale), clamp((middle + half) / scale)))
+        Some((
+            clamp((middle - half) / scale),
+            clamp((middle + half) / scale),
+        ))
     }
 
     /// One more.
@@ -71,7 +74,10 @@ impl Mean {
     }
 }
 
-#[allow(clippy::cast_precision_loss, reason = "counts of runs are far below 2^52")]
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "counts of runs are far below 2^52"
+)]
 fn float(count: u64) -> f64 {
     count as f64
 }
@@ -83,9 +89,19 @@ mod tests {
     #[test]
     fn wilsons_interval_is_that_of_the_books() {
         // Newcombe (1998), table I: 81 of 263, and 0 of 20, without continuity correction.
-        let (lower, upper) = Proportion { successes: 81, count: 263 }.wilson().unwrap();
+        let (lower, upper) = Proportion {
+            successes: 81,
+            count: 263,
+        }
+        .wilson()
+        .unwrap();
         assert!((lower - 0.2553).abs() < 5e-5 && (upper - 0.3662).abs() < 5e-5);
-        let (lower, upper) = Proportion { successes: 0, count: 20 }.wilson().unwrap();
+        let (lower, upper) = Proportion {
+            successes: 0,
+            count: 20,
+        }
+        .wilson()
+        .unwrap();
         assert!(lower.abs() < 1e-12 && (upper - 0.1611).abs() < 5e-5);
         assert_eq!(Proportion::default().wilson(), None);
     }

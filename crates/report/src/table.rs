@@ -91,7 +91,10 @@ mod tests {
             headings: vec!["a".to_owned(), "long".to_owned()],
             rows: vec![vec!["x, y".to_owned(), "1".to_owned()]],
         };
-        assert_eq!(table.markdown(), "Two\n\n| a    | long |\n| ---- | ---- |\n| x, y | 1    |\n");
+        assert_eq!(
+            table.markdown(),
+            "Two\n\n| a    | long |\n| ---- | ---- |\n| x, y | 1    |\n"
+        );
         assert_eq!(table.csv(), "a,long\r\n\"x, y\",1\r\n");
         assert_eq!(table.plain(), "Two\n\na     long\nx, y  1\n");
     }

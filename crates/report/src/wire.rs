@@ -49,6 +49,9 @@ pub fn read_number(value: &Value) -> Option<Rational> {
 }
 
 /// The field `name` as a number.
+///
+/// # Errors
+/// When it is missing, or no number.
 pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> {
     let value = message
         .get(name)
@@ -57,6 +60,9 @@ pub fn field_number(message: &Value, name: &str) -> Result<Rational, WireError> 
 }
 
 /// The field `name` as a text.
+///
+/// # Errors
+/// When it is missing, or no text.
 pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireError> {
     let value = message
         .get(name)

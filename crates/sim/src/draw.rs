@@ -176,10 +176,36 @@ mod tests {
     #[test]
     fn means_and_spreads_are_as_stated() {
         let cases = [
-            (Distribution::Normal { mean: 170.0, deviation: 70.0 }, 170.0, 70.0),
-            (Distribution::LogNormal { mean: 20.0, deviation: 5.0 }, 20.0, 5.0),
-            (Distribution::Uniform { from: 2.0, to: 8.0 }, 5.0, 3.0_f64.sqrt()),
-            (Distribution::Triangular { from: 0.0, mode: 3.0, to: 6.0 }, 3.0, 1.5_f64.sqrt()),
+            (
+                Distribution::Normal {
+                    mean: 170.0,
+                    deviation: 70.0,
+                },
+                170.0,
+                70.0,
+            ),
+            (
+                Distribution::LogNormal {
+                    mean: 20.0,
+                    deviation: 5.0,
+                },
+                20.0,
+                5.0,
+            ),
+            (
+                Distribution::Uniform { from: 2.0, to: 8.0 },
+                5.0,
+                3.0_f64.sqrt(),
+            ),
+            (
+                Distribution::Triangular {
+                    from: 0.0,
+                    mode: 3.0,
+                    to: 6.0,
+                },
+                3.0,
+                1.5_f64.sqrt(),
+            ),
             (Distribution::Empirical(vec![1.0, 3.0]), 2.0, 1.0),
             (Distribution::Constant(4.0), 4.0, 0.0),
         ];
@@ -190,9 +216,15 @@ mod tests {
             let count = 40_000.0;
             let found = values.iter().sum::<f64>() / count;
             let spread = values.iter().map(|v| (v - found).powi(2)).sum::<f64>() / count;
-            assert!((found - mean).abs() < 0.03 * mean.max(1.0), "{distribution:?}: {found}");
+            assert!(
+                (found - mean).abs() < 0.03 * mean.max(1.0),
+                "{distribution:?}: {found}"
+            );
             let difference = (spread.sqrt() - deviation).abs();
-            assert!(difference < 0.03 * deviation.max(1.0), "{distribution:?}: {spread}");
+            assert!(
+                difference < 0.03 * deviation.max(1.0),
+                "{distribution:?}: {spread}"
+            );
         }
     }
 

@@ -39,7 +39,9 @@ mod sim;
 mod unreliable;
 
 pub use draw::{Distribution, Purpose};
-pub use model::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldFileError, WorldModel};
+pub use model::{
+    Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldFileError, WorldModel,
+};
 pub use pattern::ActionPattern;
 pub use sim::SimWorld;
 pub use unreliable::Unreliable;

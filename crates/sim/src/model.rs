@@ -162,8 +162,13 @@ impl WorldModel {
 
     /// How the amount by which an action changes a fluent is distributed.
     pub fn amount(&self, action: &str, fluent: &str) -> Option<&Rule> {
-        let matching = |amount: &&Amount| amount.action.matches(action) && amount.fluent.matches(fluent);
-        self.amounts.iter().rev().find(matching).map(|amount| &amount.rule)
+        let matching =
+            |amount: &&Amount| amount.action.matches(action) && amount.fluent.matches(fluent);
+        self.amounts
+            .iter()
+            .rev()
+            .find(matching)
+            .map(|amount| &amount.rule)
     }
 
     /// How often an action fails.

@@ -29,15 +29,17 @@ impl ActionPattern {
                 arguments: None,
             });
         }
-        let (inner, has_arguments) = match text.strip_prefix('(').and_then(|t| t.strip_suffix(')')) {
+        let (inner, has_arguments) = match text.strip_prefix('(').and_then(|t| t.strip_suffix(')'))
+        {
             Some(inner) => (inner, true),
             None => (text, false),
         };
         let mut words = inner.split_whitespace().map(str::to_ascii_lowercase);
-        let name = words
-            .next()
-            .ok_or_else(|| format!("`{text}` names nothing; write a name, `(name _ object)` or `*`"))?;
-        let arguments: Vec<Option<String>> = words.map(|word| (word != "_").then_some(word)).collect();
+        let name = words.next().ok_or_else(|| {
+            format!("`{text}` names nothing; write a name, `(name _ object)` or `*`")
+        })?;
+        let arguments: Vec<Option<String>> =
+            words.map(|word| (word != "_").then_some(word)).collect();
         if !has_arguments && !arguments.is_empty() {
             return Err(format!("write `({text})` with parentheses"));
         }
@@ -67,7 +69,10 @@ impl ActionPattern {
             return true;
         };
         let mut words = ground.trim_matches(['(', ')']).split_whitespace();
-        if !words.next().is_some_and(|word| word.eq_ignore_ascii_case(name)) {
+        if !words
+            .next()
+            .is_some_and(|word| word.eq_ignore_ascii_case(name))
+        {
             return false;
         }
         self.arguments.as_ref().is_none_or(|arguments| {
@@ -86,22 +91,37 @@ impl Names {
         let (what, found, all): (_, _, Vec<&str>) = match self {
             Self::Actions => (
                 "action",
-                problem.schemas.iter().find(|s| same(&s.name)).map(|s| s.parameters.len()),
+                problem
+                    .schemas
+                    .iter()
+                    .find(|s| same(&s.name))
+                    .map(|s| s.parameters.len()),
                 problem.schemas.iter().map(|s| s.name.as_str()).collect(),
             ),
             Self::Functions => (
                 "function",
-                problem.functions.iter().find(|f| same(&f.name)).map(|f| f.parameters.len()),
+                problem
+                    .functions
+                    .iter()
+                    .find(|f| same(&f.name))
+                    .map(|f| f.parameters.len()),
                 problem.functions.iter().map(|f| f.name.as_str()).collect(),
             ),
             Self::Predicates => (
                 "predicate",
-                problem.predicates.iter().find(|p| same(&p.name)).map(|p| p.parameters.len()),
+                problem
+                    .predicates
+                    .iter()
+                    .find(|p| same(&p.name))
+                    .map(|p| p.parameters.len()),
                 problem.predicates.iter().map(|p| p.name.as_str()).collect(),
             ),
         };
         found.ok_or_else(|| {
-            format!("the domain has no {what} `{name}`; it has {}", all.join(", "))
+            format!(
+                "the domain has no {what} `{name}`; it has {}",
+                all.join(", ")
+            )
         })
     }
 }

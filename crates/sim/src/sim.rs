@@ -73,7 +73,9 @@ impl<'a> SimWorld<'a> {
             };
             let mut rng = keyed(seed, name, index as u64, Purpose::Exogenous);
             let happens = rng.random::<f64>() < exogenous.probability;
-            let time = exogenous.time.draw(&Rational::ZERO, &model.resolution, &mut rng);
+            let time = exogenous
+                .time
+                .draw(&Rational::ZERO, &model.resolution, &mut rng);
             if happens {
                 world.put(time.max(Rational::ZERO), Coming::Exogenous(index));
             }
@@ -99,17 +101,17 @@ impl<'a> SimWorld<'a> {
     }
 
     /// Something happens at `time`; conditions over intervals are looked at before and after.
-    fn happen(&mut self, time: Rational, coming: Option<Coming>) {
+    fn happen(&mut self, time: Rational, coming: Option<&Coming>) {
         // A fluent without a value that should move stays without.
         let _ = self.truth.advance(&time);
         self.now = time;
         self.fail_broken();
         match coming {
             None => {}
-            Some(Coming::Start(ticket)) => self.start(ticket),
-            Some(Coming::End(ticket)) => self.end(ticket),
-            Some(Coming::Fail(ticket)) => self.fail(ticket, "it broke down"),
-            Some(Coming::Exogenous(index)) => self.change(index),
+            Some(Coming::Start(ticket)) => self.start(*ticket),
+            Some(Coming::End(ticket)) => self.end(*ticket),
+            Some(Coming::Fail(ticket)) => self.fail(*ticket, "it broke down"),
+            Some(Coming::Exogenous(index)) => self.change(*index),
         }
         self.fail_broken();
     }
@@ -138,7 +140,12 @@ impl<'a> SimWorld<'a> {
             Body::Instantaneous(snap) => snap,
             Body::Durative(body) => &body.start,
         };
-        let mut failure = keyed(self.seed, &action.name, commanded.occurrence, Purpose::Failure);
+        let mut failure = keyed(
+            self.seed,
+            &action.name,
+            commanded.occurrence,
+            Purpose::Failure,
+        );
         let fails = self
             .model
             .failing(&action.name)
@@ -166,7 +173,12 @@ impl<'a> SimWorld<'a> {
         if let Some(commanded) = self.actions.get_mut(&ticket) {
             commanded.has_started = true;
         }
-        let mut rng = keyed(self.seed, &action.name, commanded.occurrence, Purpose::Duration);
+        let mut rng = keyed(
+            self.seed,
+            &action.name,
+            commanded.occurrence,
+            Purpose::Duration,
+        );
         let duration = self.model.duration(&action.name, &planned, &mut rng);
         let end = &self.now + &duration;
         match fails {
@@ -187,7 +199,11 @@ impl<'a> SimWorld<'a> {
         let Some(body) = commanded.action.durative() else {
             return;
         };
-        let started = self.truth.running().get(&ticket).map(|underway| underway.start.clone());
+        let started = self
+            .truth
+            .running()
+            .get(&ticket)
+            .map(|underway| underway.start.clone());
         let duration = &self.now - started.unwrap_or_default();
         let unmet = self.truth.unmet(&body.end.condition, Some(&duration));
         if !unmet.is_empty() {
@@ -240,8 +256,11 @@ impl<'a> SimWorld<'a> {
             });
             let instance = format!("{action} {name} {place}");
             let mut rng = keyed(self.seed, &instance, commanded.occurrence, Purpose::Amount);
-            let amount =
-                rule.draw(&nominal.unwrap_or_default(), &self.model.resolution, &mut rng);
+            let amount = rule.draw(
+                &nominal.unwrap_or_default(),
+                &self.model.resolution,
+                &mut rng,
+            );
             Some(Measured { fluent, amount })
         });
         measured.collect()
@@ -306,7 +325,7 @@ impl World for SimWorld<'_> {
                 if delay.is_positive() {
                     self.put(&self.now + delay, Coming::Start(*ticket));
                 } else {
-                    self.happen(self.now.clone(), Some(Coming::Start(*ticket)));
+                    self.happen(self.now.clone(), Some(&Coming::Start(*ticket)));
                 }
             }
             Command::Cancel { ticket } => {
@@ -328,9 +347,9 @@ impl World for SimWorld<'_> {
             let first = self.agenda.keys().next().map(|(time, _)| time.clone());
             // Timed initials can break what is under way.
             let timed = self.truth.next_timed().cloned();
-            let is_timed = timed.as_ref().is_some_and(|timed| {
-                first.as_ref().is_none_or(|first| timed < first)
-            });
+            let is_timed = timed
+                .as_ref()
+                .is_some_and(|timed| first.as_ref().is_none_or(|first| timed < first));
             let next = if is_timed { timed } else { first };
             let Some(time) = next.filter(|time| time <= until) else {
                 let _ = self.truth.advance(until);
@@ -342,7 +361,7 @@ impl World for SimWorld<'_> {
             } else {
                 self.agenda.pop_first().map(|(_, coming)| coming)
             };
-            self.happen(time.max(self.now.clone()), coming);
+            self.happen(time.max(self.now.clone()), coming.as_ref());
         }
         Ok(Passage {
             now: self.now.clone(),

@@ -73,7 +73,11 @@ impl<W: World> Unreliable<W> {
         if self.chance(self.reports.lost) {
             return;
         }
-        let copies = if self.chance(self.reports.duplicated) { 2 } else { 1 };
+        let copies = if self.chance(self.reports.duplicated) {
+            2
+        } else {
+            1
+        };
         for _ in 0..copies {
             self.send(observation.clone());
         }
@@ -135,8 +139,8 @@ fn opposite(event: &Event) -> Event {
         measured: Vec::new(),
     };
     match event {
-        Event::Started { ticket, .. } => failed(*ticket),
-        Event::Ended {
+        Event::Started { ticket, .. }
+        | Event::Ended {
             ticket,
             ending: Ending::Succeeded,
             ..

@@ -17,7 +17,11 @@ enum Limit {
 }
 
 fn limits() -> impl Strategy<Value = Vec<(Limit, Index, i64)>> {
-    let limit = prop_oneof![Just(Limit::Fix), Just(Limit::NotBefore), Just(Limit::NotAfter)];
+    let limit = prop_oneof![
+        Just(Limit::Fix),
+        Just(Limit::NotBefore),
+        Just(Limit::NotAfter)
+    ];
     prop::collection::vec((limit, any::<Index>(), -25..25_i64), 1..20)
 }
 

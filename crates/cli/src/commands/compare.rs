@@ -16,7 +16,11 @@ use crate::{input, output};
 pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     let name = arguments.experiment.display().to_string();
     let text = input::source(&arguments.experiment, "experiment")?;
-    let folder = arguments.experiment.parent().map(Path::to_path_buf).unwrap_or_default();
+    let folder = arguments
+        .experiment
+        .parent()
+        .map(Path::to_path_buf)
+        .unwrap_or_default();
     let file = |name: &str| {
         let path = folder.join(name);
         fs::read_to_string(&path)
@@ -87,12 +91,19 @@ fn merged(paths: &[PathBuf]) -> Result<Results, Failure> {
 fn write(folder: &Path, experiment: &Experiment, results: &Results) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| {
         Failure::new(
-            format!("cannot make the folder {}: {}", folder.display(), output::plain(&error)),
+            format!(
+                "cannot make the folder {}: {}",
+                folder.display(),
+                output::plain(&error)
+            ),
             "",
         )
     })?;
     let table = results.table(experiment);
-    output::write_file(&folder.join("results.json"), &format!("{:#}\n", results.json()))?;
+    output::write_file(
+        &folder.join("results.json"),
+        &format!("{:#}\n", results.json()),
+    )?;
     output::write_file(&folder.join("table.md"), &table.markdown())?;
     output::write_file(&folder.join("table.csv"), &table.csv())
 }

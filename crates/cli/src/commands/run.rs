@@ -10,7 +10,9 @@ use std::sync::Arc;
 
 use elbowroom::execute::{Analyst, Embedded, WholeRegion};
 use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict};
+use elbowroom::execution::run::{
+    self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
+};
 use elbowroom::execution::{NoPlanner, Planner, World};
 use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -57,12 +59,20 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         writer.header(header);
         match &arguments.world_process {
             Some(command) => {
-                let mut world = process::ProcessWorld::start(command, &task, &arguments.answer_within)?;
+                let mut world =
+                    process::ProcessWorld::start(command, &task, &arguments.answer_within)?;
                 let report = choices.run(arguments, &task, first.as_ref(), &mut world, &mut writer);
                 world.stop();
                 report
             }
-            None => simulated(arguments, &choices, &task, first.as_ref(), world.as_deref(), &mut writer)?,
+            None => simulated(
+                arguments,
+                &choices,
+                &task,
+                first.as_ref(),
+                world.as_deref(),
+                &mut writer,
+            )?,
         }
     };
     file.close()?;
@@ -125,9 +135,9 @@ impl Choices {
             .parse()
             .map_err(|error| Failure::new(error, "`elbowroom run --help` describes them all"))?;
         let specs = vary.iter().map(|spec| spec.parse());
-        let vary = specs
-            .collect::<Result<_, _>>()
-            .map_err(|error: elbowroom::plan::parametrize::ParametrizeError| Failure::new(error, ""))?;
+        let vary = specs.collect::<Result<_, _>>().map_err(
+            |error: elbowroom::plan::parametrize::ParametrizeError| Failure::new(error, ""),
+        )?;
         let mut flow = flow::Settings {
             epsilon: settings.epsilon.clone(),
             vary,
@@ -158,6 +168,7 @@ impl Choices {
                 ..embedded::Settings::default()
             },
             most_states: arguments.planner_states,
+            improve_states: arguments.improve_states,
             clock: Some(&seconds),
         };
         let planner: &mut dyn Planner = match arguments.planner {
@@ -201,7 +212,10 @@ fn simulated(
 ) -> Result<Report, Failure> {
     let model = match world {
         Some(text) => WorldModel::read(text, task.problem()).map_err(|error| {
-            let path = arguments.world.as_deref().unwrap_or(std::path::Path::new("-"));
+            let path = arguments
+                .world
+                .as_deref()
+                .unwrap_or(std::path::Path::new("-"));
             Failure::new(
                 format!("{}, {error}", path.display()),
                 "docs/formats/world.md describes world files",
@@ -229,10 +243,7 @@ fn simulated(
     })
 }
 
-fn time_triggered(
-    task: &mut Task,
-    path: &std::path::Path,
-) -> Result<TimeTriggeredPlan, Failure> {
+fn time_triggered(task: &mut Task, path: &std::path::Path) -> Result<TimeTriggeredPlan, Failure> {
     match input::any_plan(task, path)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(

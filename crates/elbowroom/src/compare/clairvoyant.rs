@@ -23,7 +23,10 @@ pub(super) fn can_reach(
 ) -> bool {
     let mut known = Task::new(with_foreknowledge(task, world, seed));
     let situation = Situation::initial(&known);
-    matches!(planner.plan(&mut known, &situation).answer, PlanAnswer::Plan(_))
+    matches!(
+        planner.plan(&mut known, &situation).answer,
+        PlanAnswer::Plan(_)
+    )
 }
 
 /// The problem with the durations and amounts of the world of that seed.
@@ -48,11 +51,13 @@ fn know_duration(
         return;
     };
     // Where the plan has a say in the duration, it keeps it.
-    let [DurationConstraint {
-        comparison: Comparison::Equal,
-        bound: Expression::Constant(planned),
-        ..
-    }] = duration.as_slice()
+    let [
+        DurationConstraint {
+            comparison: Comparison::Equal,
+            bound: Expression::Constant(planned),
+            ..
+        },
+    ] = duration.as_slice()
     else {
         return;
     };
@@ -82,7 +87,9 @@ fn know_amounts(
                 fluent,
                 value: Expression::Constant(planned),
                 ..
-            }) = effects.and_then(|effects| effects.get(index)).map(|it| &it.change)
+            }) = effects
+                .and_then(|effects| effects.get(index))
+                .map(|it| &it.change)
             else {
                 continue;
             };
@@ -118,10 +125,7 @@ fn know_amounts(
     }
 }
 
-fn effects(
-    schema: &mut Schema,
-    place: u64,
-) -> Option<&mut Vec<elbowroom_model::problem::Effect>> {
+fn effects(schema: &mut Schema, place: u64) -> Option<&mut Vec<elbowroom_model::problem::Effect>> {
     match (&mut schema.body, place) {
         (Body::Instantaneous { effects, .. }, 0) => Some(effects),
         (Body::Durative { start_effects, .. }, 0) => Some(start_effects),

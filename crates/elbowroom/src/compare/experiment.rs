@@ -19,6 +19,8 @@ pub struct Experiment {
     pub problem: String,
     /// What to fill in: each name takes each of its values, with each value of the others.
     pub blanks: IndexMap<String, Vec<String>>,
+    /// More to fill in: several names together, row by row.
+    pub together: Vec<Together>,
     /// The columns.
     pub columns: Vec<Column>,
     /// The rows.
@@ -35,6 +37,8 @@ pub struct Experiment {
     pub precision: Rational,
     /// How many states the planner looks at for one plan.
     pub planner_states: u64,
+    /// How many of them for a better plan than the first.
+    pub improve_states: u64,
     /// Figures to stand beside ours.
     pub published: Vec<Published>,
 }
@@ -48,6 +52,22 @@ pub struct Column {
     pub world: String,
     /// What is left open.
     pub vary: Vec<VarySpec>,
+}
+
+/// Blanks that are filled in together.
+#[derive(Clone, Debug)]
+pub struct Together {
+    /// Their names.
+    pub names: Vec<String>,
+    /// A value for each, row by row.
+    pub rows: Vec<Vec<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TogetherFile {
+    names: Vec<String>,
+    rows: Vec<Spanned<Vec<toml::Value>>>,
 }
 
 /// Figures of a paper, one for each column.
@@ -104,8 +124,11 @@ struct File {
     max_replans: Option<usize>,
     precision: Option<Spanned<f64>>,
     planner_states: Option<u64>,
+    improve_states: Option<u64>,
     #[serde(default)]
     blanks: IndexMap<String, Vec<toml::Value>>,
+    #[serde(default)]
+    together: Vec<TogetherFile>,
     column: Vec<ColumnFile>,
     #[serde(default)]
     published: Vec<Spanned<Published>>,
@@ -130,10 +153,7 @@ impl Experiment {
         file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, ExperimentError> {
         let wrong = |at: usize, message: String| ExperimentError::File {
-            line: 1 + text.as_bytes()[..at.min(text.len())]
-                .iter()
-                .filter(|byte| **byte == b'\n')
-                .count(),
+            line: 1 + text.get(..at).unwrap_or(text).matches('\n').count(),
             message: message.trim().replace('\n', " "),
         };
         let read: File = toml::from_str(text).map_err(|error| {
@@ -171,6 +191,21 @@ impl Experiment {
                 return Err(wrong(published.span().start, message.to_owned()));
             }
         }
+        let mut together = Vec::new();
+        for group in &read.together {
+            let width = group.names.len();
+            if let Some(row) = group.rows.iter().find(|row| row.get_ref().len() != width) {
+                let message = format!("write {width} values, one for each name");
+                return Err(wrong(row.span().start, message));
+            }
+            let rows = group.rows.iter();
+            together.push(Together {
+                names: group.names.clone(),
+                rows: rows
+                    .map(|row| row.get_ref().iter().map(text_of).collect())
+                    .collect(),
+            });
+        }
         let settings = read
             .settings()
             .map_err(|(at, message)| wrong(at, message))?;
@@ -189,6 +224,7 @@ impl Experiment {
                 .into_iter()
                 .map(|(name, values)| (name, values.iter().map(text_of).collect()))
                 .collect(),
+            together,
             columns,
             executors,
             clairvoyant: read.clairvoyant,
@@ -197,7 +233,12 @@ impl Experiment {
             settings,
             precision,
             planner_states: read.planner_states.unwrap_or(20_000),
-            published: read.published.into_iter().map(Spanned::into_inner).collect(),
+            improve_states: read.improve_states.unwrap_or(20_000),
+            published: read
+                .published
+                .into_iter()
+                .map(Spanned::into_inner)
+                .collect(),
         })
     }
 
@@ -213,6 +254,16 @@ impl Experiment {
             fillings = fillings
                 .iter()
                 .flat_map(|filling| values.iter().map(move |value| longer(filling, value)))
+                .collect();
+        }
+        for group in &self.together {
+            let longer = |filling: &Vec<(String, String)>, row: &Vec<String>| {
+                let pairs = group.names.iter().cloned().zip(row.iter().cloned());
+                filling.iter().cloned().chain(pairs).collect::<Vec<_>>()
+            };
+            fillings = fillings
+                .iter()
+                .flat_map(|filling| group.rows.iter().map(move |row| longer(filling, row)))
                 .collect();
         }
         fillings
@@ -236,9 +287,12 @@ impl File {
             let names = RunningRule::NAMES.iter();
             let found = names.clone().find(|(_, name)| *name == running.get_ref());
             let known: Vec<&str> = names.map(|(_, name)| *name).collect();
-            settings.running = found
-                .map(|(rule, _)| *rule)
-                .ok_or_else(|| (running.span().start, format!("choose one of {}", known.join(", "))))?;
+            settings.running = found.map(|(rule, _)| *rule).ok_or_else(|| {
+                (
+                    running.span().start,
+                    format!("choose one of {}", known.join(", ")),
+                )
+            })?;
         }
         if let Some(time) = &self.planning_time {
             let number = match time.get_ref() {
@@ -249,7 +303,10 @@ impl File {
             // Measured times would make a result depend on the machine.
             let number = number.filter(|number| !number.is_negative());
             settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
-                (time.span().start, "write a number of seconds, so that results can be repeated".to_owned())
+                (
+                    time.span().start,
+                    "write a number of seconds, so that results can be repeated".to_owned(),
+                )
             })?);
         } else {
             settings.planning_time = PlanningTime::Seconds(Rational::ZERO);

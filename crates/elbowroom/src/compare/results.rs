@@ -71,7 +71,11 @@ impl Results {
     /// No trial has been made.
     pub fn empty(experiment: &Experiment, part: Part) -> Self {
         let rows = experiment.rows();
-        let columns: Vec<String> = experiment.columns.iter().map(|it| it.name.clone()).collect();
+        let columns: Vec<String> = experiment
+            .columns
+            .iter()
+            .map(|it| it.name.clone())
+            .collect();
         Self {
             format: FORMAT.to_owned(),
             version: 1,
@@ -92,10 +96,12 @@ impl Results {
     /// # Errors
     /// When they are none.
     pub fn read(text: &str) -> Result<Self, ResultsError> {
-        let results: Self =
-            serde_json::from_str(text).map_err(|error| ResultsError(format!("no results: {error}")))?;
+        let results: Self = serde_json::from_str(text)
+            .map_err(|error| ResultsError(format!("no results: {error}")))?;
         if results.format != FORMAT || results.version != 1 {
-            return Err(ResultsError("this program reads elbowroom-results, version 1".to_owned()));
+            return Err(ResultsError(
+                "this program reads elbowroom-results, version 1".to_owned(),
+            ));
         }
         let (height, width) = (results.rows.len(), results.columns.len());
         let cells: Vec<usize> = results.cells.iter().map(Vec::len).collect();
@@ -113,14 +119,24 @@ impl Results {
 
     /// Adds the counts of another part.
     pub(crate) fn add(&mut self, other: &Self) {
-        for (mine, theirs) in self.cells.iter_mut().flatten().zip(other.cells.iter().flatten()) {
+        for (mine, theirs) in self
+            .cells
+            .iter_mut()
+            .flatten()
+            .zip(other.cells.iter().flatten())
+        {
             mine.runs += theirs.runs;
             mine.successes += theirs.successes;
             mine.replans += theirs.replans;
             merge(&mut mine.verdicts, &theirs.verdicts);
             merge(&mut mine.causes, &theirs.causes);
         }
-        for (mine, theirs) in self.pairs.iter_mut().flatten().zip(other.pairs.iter().flatten()) {
+        for (mine, theirs) in self
+            .pairs
+            .iter_mut()
+            .flatten()
+            .zip(other.pairs.iter().flatten())
+        {
             mine.only_first += theirs.only_first;
             mine.only_this += theirs.only_this;
         }
@@ -139,7 +155,9 @@ impl Results {
             let same = (&part.fingerprint, part.shards) == (&whole.fingerprint, whole.shards)
                 && (&part.rows, &part.columns) == (&whole.rows, &whole.columns);
             if !same {
-                return Err(ResultsError("these are parts of different experiments".to_owned()));
+                return Err(ResultsError(
+                    "these are parts of different experiments".to_owned(),
+                ));
             }
             if let Some(twice) = part.parts.iter().find(|shard| whole.parts.contains(shard)) {
                 return Err(ResultsError(format!("part {twice} is there twice")));
@@ -197,11 +215,18 @@ impl Cell {
         let percent = |share: f64| format!("{:.1}", share * 100.0);
         let coverage = match (coverage.share(), coverage.wilson()) {
             (Some(share), Some((lower, upper))) => {
-                format!("{} [{}, {}]", percent(share), percent(lower), percent(upper))
+                format!(
+                    "{} [{}, {}]",
+                    percent(share),
+                    percent(lower),
+                    percent(upper)
+                )
             }
             _ => "-".to_owned(),
         };
-        let replans = replans.value().map_or("-".to_owned(), |mean| format!("{mean:.2}"));
+        let replans = replans
+            .value()
+            .map_or("-".to_owned(), |mean| format!("{mean:.2}"));
         [coverage, replans]
     }
 }
@@ -211,7 +236,10 @@ impl Experiment {
         let Some(published) = self.published.iter().find(|it| it.executor == row) else {
             return "-".to_owned();
         };
-        let replans = published.replans.get(column).filter(|mean| mean.is_finite());
+        let replans = published
+            .replans
+            .get(column)
+            .filter(|mean| mean.is_finite());
         match replans {
             Some(replans) => format!("{:.1} ({replans:.1})", published.coverage[column]),
             None => format!("{:.1}", published.coverage[column]),
@@ -228,8 +256,10 @@ fn merge(mine: &mut BTreeMap<String, u64>, theirs: &BTreeMap<String, u64>) {
 /// A number that is different for different experiments: FNV-1a over all that they depend on.
 fn fingerprint(experiment: &Experiment, trials: u64) -> String {
     let everything = format!("{trials} {experiment:?}");
-    let hash = everything.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let hash = everything
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
     format!("{hash:016x}")
 }

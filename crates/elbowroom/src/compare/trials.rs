@@ -38,8 +38,9 @@ impl Setting<'_> {
         let experiment = self.experiment;
         let mut task = self.task()?;
         let column = &experiment.columns[self.column];
-        let world = WorldModel::read(&column.world, task.problem())
-            .map_err(|error| ExperimentError::other(format!("the world of {}: {error}", column.name)))?;
+        let world = WorldModel::read(&column.world, task.problem()).map_err(|error| {
+            ExperimentError::other(format!("the world of {}: {error}", column.name))
+        })?;
         let situation = Situation::initial(&task);
         let first = match self.planner().plan(&mut task, &situation).answer {
             PlanAnswer::Plan(plan) => plan,
@@ -143,9 +144,15 @@ impl Setting<'_> {
     fn count(&self, row: usize, report: &Report, results: &mut Results) {
         let cell = &mut results.cells[row][self.column];
         cell.runs += 1;
-        *cell.verdicts.entry(report.verdict.name().to_owned()).or_default() += 1;
+        *cell
+            .verdicts
+            .entry(report.verdict.name().to_owned())
+            .or_default() += 1;
         for reason in &report.reasons {
-            *cell.causes.entry(reason.cause.name().to_owned()).or_default() += 1;
+            *cell
+                .causes
+                .entry(reason.cause.name().to_owned())
+                .or_default() += 1;
         }
         if report.verdict == Verdict::GoalReached {
             cell.successes += 1;
@@ -160,6 +167,7 @@ impl Setting<'_> {
                 ..embedded::Settings::default()
             },
             most_states: self.experiment.planner_states,
+            improve_states: self.experiment.improve_states,
             clock: None,
         }
     }
@@ -194,7 +202,12 @@ impl Setting<'_> {
 
     fn wrong(&self, message: &str) -> ExperimentError {
         let filling = self.filling.iter();
-        let filling: Vec<_> = filling.map(|(name, value)| format!("{name} = {value}")).collect();
-        ExperimentError::other(format!("the problem with {}: {message}", filling.join(", ")))
+        let filling: Vec<_> = filling
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        ExperimentError::other(format!(
+            "the problem with {}: {message}",
+            filling.join(", ")
+        ))
     }
 }

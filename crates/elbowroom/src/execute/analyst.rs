@@ -84,11 +84,7 @@ impl Analyst {
         flow::open(task, freed, &specs, epsilon).map_err(|error| error.to_string())
     }
 
-    fn envelope(
-        &self,
-        task: &Task,
-        plan: &ParametrizedPlan,
-    ) -> Result<DecoupledEnvelope, String> {
+    fn envelope(&self, task: &Task, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, String> {
         let mut oracle =
             Oracle::new(task, plan, &self.settings.epsilon).map_err(|error| error.to_string())?;
         let search = &self.settings.search;
@@ -118,12 +114,13 @@ impl Preparer for Analyst {
         let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
         let nominal = freed.deordered.nominal.clone();
         let plan = match need {
+            Need::Orderings => ParametrizedPlan::closed(task, freed.deordered.plan),
             Need::Network => flow::closed(task, freed, epsilon),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         };
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan)?),
-            Need::Network | Need::OpenNetwork => None,
+            Need::Orderings | Need::Network | Need::OpenNetwork => None,
         };
         Ok(Prepared {
             plan,
@@ -195,5 +192,9 @@ fn reads_numbers(task: &Task, plan: &ParametrizedPlan) -> bool {
 fn is_about_actions(task: &Task, spec: &VarySpec) -> bool {
     let schemas = &task.problem().schemas;
     let mut words = spec.text.split([' ', '(', ')']);
-    words.any(|word| schemas.iter().any(|schema| schema.name.eq_ignore_ascii_case(word)))
+    words.any(|word| {
+        schemas
+            .iter()
+            .any(|schema| schema.name.eq_ignore_ascii_case(word))
+    })
 }

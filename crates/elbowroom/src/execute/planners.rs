@@ -24,8 +24,10 @@ impl<F: FnMut(&mut Task, &Situation) -> PlanAnswer> Planner for Clockless<F> {
 pub struct Embedded<'a> {
     /// How to plan.
     pub settings: embedded::Settings,
-    /// How many states to look at.
+    /// How many states to look at for a plan at all.
     pub most_states: u64,
+    /// How many states to look at for a better plan than the first.
+    pub improve_states: u64,
     /// What time it is, in seconds since whenever: where planning time is measured.
     pub clock: Option<&'a dyn Fn() -> Rational>,
 }
@@ -33,33 +35,34 @@ pub struct Embedded<'a> {
 impl Planner for Embedded<'_> {
     fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.clock.map(|clock| clock());
-        let answer = embedded_answer(task, situation, &self.settings, self.most_states);
+        let answer = self.answer(task, situation);
         let seconds = self.clock.map(|clock| clock() - begun.unwrap_or_default());
         PlannerAnswer { answer, seconds }
     }
 }
 
-fn embedded_answer(
-    task: &mut Task,
-    situation: &Situation,
-    settings: &embedded::Settings,
-    most_states: u64,
-) -> PlanAnswer {
-    let answer = embedded::plan(task, situation, settings, &mut |progress| {
-        if progress.counts.evaluated >= most_states {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+impl Embedded<'_> {
+    fn answer(&self, task: &mut Task, situation: &Situation) -> PlanAnswer {
+        let answer = embedded::plan(task, situation, &self.settings, &mut |progress| {
+            let limit = match progress.best {
+                Some(_) => self.improve_states.min(self.most_states),
+                None => self.most_states,
+            };
+            if progress.counts.evaluated >= limit {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        match answer {
+            embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
+            embedded::Answer::Unsolvable { .. } => PlanAnswer::Unsolvable,
+            embedded::Answer::NoneFound { .. } => PlanAnswer::NotFound {
+                why: format!("no plan was found among {} states", self.most_states),
+            },
+            embedded::Answer::Unsupported(unsupported) => PlanAnswer::NotFound {
+                why: unsupported.to_string(),
+            },
         }
-    });
-    match answer {
-        embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
-        embedded::Answer::Unsolvable { .. } => PlanAnswer::Unsolvable,
-        embedded::Answer::NoneFound { .. } => PlanAnswer::NotFound {
-            why: format!("no plan was found among {most_states} states"),
-        },
-        embedded::Answer::Unsupported(unsupported) => PlanAnswer::NotFound {
-            why: unsupported.to_string(),
-        },
     }
 }

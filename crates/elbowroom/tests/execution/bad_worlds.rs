@@ -38,14 +38,20 @@ fn no_report_is_believed_against_reason() {
         assert!(report.time <= scene.settings.time_limit);
         *ends.entry(report.verdict.name()).or_insert(0) += 1;
     }
-    assert!(reached > count / 10, "hardly any run came through: {ends:?}");
+    assert!(
+        reached > count / 10,
+        "hardly any run came through: {ends:?}"
+    );
     assert!(ends.len() > 1, "no run was disturbed: {ends:?}");
 }
 
 /// Each kind of mistake by itself, and all of them together.
 fn bad(run: u64) -> Reports {
     let mut reports = Reports {
-        lateness: Distribution::Uniform { from: 0.0, to: 40.0 },
+        lateness: Distribution::Uniform {
+            from: 0.0,
+            to: 40.0,
+        },
         ..Reports::default()
     };
     match run % 5 {

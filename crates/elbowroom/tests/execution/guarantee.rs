@@ -30,8 +30,16 @@ fn within_the_envelope_the_goal_is_always_reached() {
         for seed in 0..count {
             let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
             let report = scene.run_in("guarded", &mut world, &mut analyst, &mut NoRecord);
-            assert_eq!(report.verdict, Verdict::GoalReached, "{name}, seed {seed}: {report:#?}");
-            assert_eq!(report.replans, 0, "{name}, seed {seed}: {:?}", report.reasons);
+            assert_eq!(
+                report.verdict,
+                Verdict::GoalReached,
+                "{name}, seed {seed}: {report:#?}"
+            );
+            assert_eq!(
+                report.replans, 0,
+                "{name}, seed {seed}: {:?}",
+                report.reasons
+            );
             let verdict = scene.judged(&report);
             assert!(verdict.is_valid(), "{name}, seed {seed}: {verdict:?}");
         }

@@ -12,8 +12,16 @@ fn when_everything_goes_as_planned_so_does_every_executor() {
         let model = scene.world("");
         for executor in EXECUTORS {
             let report = scene.run(executor, &model, 0);
-            assert_eq!(report.verdict, Verdict::GoalReached, "{name}, {executor}: {report:#?}");
-            assert_eq!(report.replans, 0, "{name}, {executor}: {:?}", report.reasons);
+            assert_eq!(
+                report.verdict,
+                Verdict::GoalReached,
+                "{name}, {executor}: {report:#?}"
+            );
+            assert_eq!(
+                report.replans, 0,
+                "{name}, {executor}: {:?}",
+                report.reasons
+            );
             let verdict = scene.judged(&report);
             assert!(verdict.is_valid(), "{name}, {executor}: {verdict:?}");
         }
@@ -28,7 +36,11 @@ fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
     let model = scene.world("[[duration]]\naction = \"burn\"\nconstant = 15\n");
     for executor in EXECUTORS {
         let report = scene.run(executor, &model, 0);
-        assert_eq!(report.verdict, Verdict::Unsolvable, "{executor}: {report:#?}");
+        assert_eq!(
+            report.verdict,
+            Verdict::Unsolvable,
+            "{executor}: {report:#?}"
+        );
     }
 }
 
@@ -52,7 +64,10 @@ fn a_drive_that_outlives_its_interval_is_noticed_while_it_runs() {
 #[test]
 fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     let scene = Scene::case("delivery");
-    for (drive, verdict) in [("39.9", Verdict::GoalReached), ("40.1", Verdict::Unsolvable)] {
+    for (drive, verdict) in [
+        ("39.9", Verdict::GoalReached),
+        ("40.1", Verdict::Unsolvable),
+    ] {
         let model = scene.world(&format!(
             "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = {drive}\n"
         ));
@@ -64,7 +79,10 @@ fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     let reason = &report.reasons[0];
     assert_eq!(reason.cause, Cause::Unreachable, "{reason}");
     let deadline = "(counter-open office) becomes false at 60";
-    assert!(reason.behind.iter().any(|it| it.contains(deadline)), "{reason}");
+    assert!(
+        reason.behind.iter().any(|it| it.contains(deadline)),
+        "{reason}"
+    );
 }
 
 #[test]
@@ -78,7 +96,11 @@ fn fixed_replans_when_a_duration_leaves_the_percentage() {
     assert_eq!(report.reasons[0].cause, Cause::Outlived);
     let early = "[[duration]]\naction = \"(drive _ depot _)\"\nconstant = 6.5\n";
     let report = scene.run("fixed:30", &scene.world(early), 0);
-    assert_eq!(report.reasons[0].cause, Cause::OutsideInterval, "{report:#?}");
+    assert_eq!(
+        report.reasons[0].cause,
+        Cause::OutsideInterval,
+        "{report:#?}"
+    );
     assert_eq!(report.verdict, Verdict::GoalReached);
 }
 
@@ -108,11 +130,21 @@ fn what_runs_may_be_cancelled_awaited_or_kept() {
     ] {
         scene.settings.running = rule;
         let report = scene.run("fixed:20", &model, 0);
-        assert_eq!(report.verdict, Verdict::GoalReached, "{rule:?}: {report:#?}");
+        assert_eq!(
+            report.verdict,
+            Verdict::GoalReached,
+            "{rule:?}: {report:#?}"
+        );
         let steps = report.executed.iter();
-        let unlocked = steps.filter(|it| it.step.action.name == "(unlock office)").count();
+        let unlocked = steps
+            .filter(|it| it.step.action.name == "(unlock office)")
+            .count();
         assert_eq!(unlocked, unlocks, "{rule:?}: {report:#?}");
-        assert!(scene.judged(&report).is_valid(), "{rule:?}: {:?}", scene.judged(&report));
+        assert!(
+            scene.judged(&report).is_valid(),
+            "{rule:?}: {:?}",
+            scene.judged(&report)
+        );
     }
 }
 
@@ -136,7 +168,9 @@ fn what_happens_by_itself_changes_the_plan() {
 #[test]
 fn planning_takes_time_from_the_deadline() {
     let mut scene = Scene::case("delivery");
-    let model = scene.world("[[failure]]\naction = \"(drive _ depot _)\"\nprobability = 0.6\nwhen = \"start\"\n");
+    let model = scene.world(
+        "[[failure]]\naction = \"(drive _ depot _)\"\nprobability = 0.6\nwhen = \"start\"\n",
+    );
     let seeds = 0..40;
     let reached = |scene: &Scene| {
         let seeds = seeds.clone();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use elbowroom::execute::{Analyst, Embedded, WholeRegion};
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
-use elbowroom::execution::{NoRecord, Planner, Preparer, Prepared, Recorder, World};
+use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
@@ -30,7 +30,11 @@ impl Scene {
     /// One of the folders in `cases`.
     pub(crate) fn case(name: &str) -> Self {
         let file = |file: &str| read(&format!("cases/{name}/{file}"));
-        Self::new(&file("domain.pddl"), &file("problem.pddl"), Some(&file("plan.plan")))
+        Self::new(
+            &file("domain.pddl"),
+            &file("problem.pddl"),
+            Some(&file("plan.plan")),
+        )
     }
 
     /// The problem of table 1 with these deadlines.
@@ -74,6 +78,7 @@ impl Scene {
         Embedded {
             settings: embedded::Settings::default(),
             most_states: self.states,
+            improve_states: 256,
             clock: None,
         }
     }
@@ -82,7 +87,9 @@ impl Scene {
     pub(crate) fn prepared(&self, executor: &str) -> Prepared {
         let spec: ExecutorSpec = executor.parse().unwrap();
         let mut analyst = Analyst::new(self.flow.clone());
-        analyst.prepare(&self.task, &self.plan, spec.registered.need).unwrap()
+        analyst
+            .prepare(&self.task, &self.plan, spec.registered.need)
+            .unwrap()
     }
 
     /// Runs with an executor in any world.

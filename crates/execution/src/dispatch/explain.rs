@@ -72,10 +72,13 @@ impl Dispatch {
 
     /// Whether what limits an end is the duration of its own action.
     pub(super) fn is_limited_by_duration(&self, id: InstanceId, end: WindowEnd) -> bool {
-        let ids = self.horizon.grounds(network_node(self.ends[id.index()][1]), end);
+        let ids = self
+            .horizon
+            .grounds(network_node(self.ends[id.index()][1]), end);
         let last = ids.last();
         let index = last.and_then(|id| self.sources.get(id.index()).copied().flatten());
-        index.is_some_and(|index| duration_of(&self.plan, &self.plan.constraints[index]) == Some(id))
+        index
+            .is_some_and(|index| duration_of(&self.plan, &self.plan.constraints[index]) == Some(id))
     }
 }
 

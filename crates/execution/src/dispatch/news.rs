@@ -88,7 +88,9 @@ impl Dispatch {
             }
             Ending::Cancelled => {
                 self.finish(id);
-                let reason = Reason::new(Cause::Failed).of(&name).about("it was cancelled");
+                let reason = Reason::new(Cause::Failed)
+                    .of(&name)
+                    .about("it was cancelled");
                 return Some(reason.since(time.clone()));
             }
         }

@@ -17,7 +17,7 @@ pub(super) const REGISTERED: Registered = Registered {
               value by more than X %. It looks no further than the constraints at each time \
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
-    need: Need::Network,
+    need: Need::Orderings,
     make: |percentage, _| Box::new(Fixed::new(percentage)),
 };
 
@@ -48,12 +48,19 @@ impl Executor for Fixed {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
-            if duration_of(plan, constraint).is_none() {
+            let Some(instance) = duration_of(plan, constraint) else {
                 return given(constraint);
-            }
+            };
             let time = |node: elbowroom_plan::NodeId| &mission.nominal[node.index()];
             let room = self.around(&(time(constraint.to) - time(constraint.from)));
-            (room.lower.value().cloned(), room.upper.value().cloned())
+            // What is left of a running action is a guess; it may well end sooner.
+            let is_rest = mission.running.contains_key(&StepId::from(instance));
+            let lower = if is_rest {
+                Some(Rational::ZERO)
+            } else {
+                room.lower.value().cloned()
+            };
+            (lower, room.upper.value().cloned())
         };
         let dispatch = Dispatch::new(mission, Sight::OneHop, &bounds)?;
         self.state = Some((dispatch, mission.clone()));

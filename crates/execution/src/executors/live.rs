@@ -20,7 +20,12 @@ pub(super) const REGISTERED: Registered = Registered {
               even if nothing deviates any more.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
-    make: |_, region| Box::new(Live { region, state: None }),
+    make: |_, region| {
+        Box::new(Live {
+            region,
+            state: None,
+        })
+    },
 };
 
 /// See [`REGISTERED`].
@@ -151,7 +156,8 @@ impl Rest {
                 continue;
             };
             let [start, end] = self.dispatch.nodes_of(instance);
-            if let (Some(start), None) = (self.dispatch.happened(start), self.dispatch.happened(end))
+            if let (Some(start), None) =
+                (self.dispatch.happened(start), self.dispatch.happened(end))
             {
                 let elapsed = &now - start;
                 values[index] = elapsed.max(values[index].clone());

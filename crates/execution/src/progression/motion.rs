@@ -45,11 +45,11 @@ pub(super) fn moved(
             .ok_or(Unreadable::Circular(first))?;
         let mut speed = Polynomial(Vec::new());
         for rate in waiting.remove(&ready).into_iter().flatten() {
-            let term = Polynomial::of(rate.per_time, rate.duration, &|fluent| {
-                match motion.get(&fluent) {
-                    Some(polynomial) => Ok(polynomial.clone()),
-                    None => Ok(Polynomial(vec![now(fluent)?])),
-                }
+            let term = Polynomial::of(rate.per_time, rate.duration, &|fluent| match motion
+                .get(&fluent)
+            {
+                Some(polynomial) => Ok(polynomial.clone()),
+                None => Ok(Polynomial(vec![now(fluent)?])),
             })?;
             speed = speed.plus(&term);
         }
@@ -87,7 +87,9 @@ impl Polynomial {
                 }
                 product
             }
-            Expression::Subtract(left, right) => of(left)?.plus(&of(right)?.scaled(&-Rational::ONE)),
+            Expression::Subtract(left, right) => {
+                of(left)?.plus(&of(right)?.scaled(&-Rational::ONE))
+            }
             Expression::Negate(part) => of(part)?.scaled(&-Rational::ONE),
             Expression::Divide(left, right) => {
                 let divisor = of(right)?;

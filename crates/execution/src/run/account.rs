@@ -1,6 +1,6 @@
 //! What was started in a run, and what became of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::Step;
@@ -12,7 +12,6 @@ use elbowroom_num::Rational;
 use super::Patience;
 use crate::event::{Ending, Measured, Ticket};
 use crate::executor::{Order, StepId};
-use crate::progression::Progression;
 
 /// Everything that was started.
 #[derive(Clone, Debug, Default)]
@@ -22,7 +21,7 @@ pub struct Account {
     /// The steps of the present plan.
     steps: BTreeMap<StepId, Ticket>,
     /// Those that have not ended.
-    open: BTreeMap<Ticket, ()>,
+    open: BTreeSet<Ticket>,
 }
 
 /// One start.
@@ -62,7 +61,7 @@ impl Account {
 
     /// What has not ended.
     pub fn open_tickets(&self) -> impl Iterator<Item = Ticket> + '_ {
-        self.open.keys().copied()
+        self.open.iter().copied()
     }
 
     pub(super) fn open(&mut self, order: &Order, now: &Rational) -> Ticket {
@@ -78,7 +77,7 @@ impl Account {
             measured: [Vec::new(), Vec::new()],
         });
         self.steps.insert(order.step, ticket);
-        self.open.insert(ticket, ());
+        self.open.insert(ticket);
         ticket
     }
 
@@ -130,12 +129,18 @@ impl Account {
 
     /// Since when an action is overdue at `now` beyond what patience allows.
     pub(super) fn silent(&self, patience: &Patience, now: &Rational) -> Vec<(Ticket, Rational)> {
-        let open = self.open.keys().map(|ticket| (*ticket, self.limit(*ticket, patience)));
+        let open = self
+            .open
+            .iter()
+            .map(|ticket| (*ticket, self.limit(*ticket, patience)));
         open.filter(|(_, limit)| limit <= now).collect()
     }
 
     pub(super) fn next_silence(&self, patience: &Patience) -> Option<Rational> {
-        self.open.keys().map(|ticket| self.limit(*ticket, patience)).min()
+        self.open
+            .iter()
+            .map(|ticket| self.limit(*ticket, patience))
+            .min()
     }
 
     /// Until when to wait for a word of an action.
@@ -150,19 +155,22 @@ impl Account {
     }
 
     /// All that was started and did start, as steps for the judge.
-    pub(super) fn executed(&self, belief: &Progression, now: &Rational) -> Vec<ExecutedStep> {
+    pub(super) fn executed(&self, now: &Rational) -> Vec<ExecutedStep> {
         let numbered = self.entries.iter().enumerate();
         let steps = numbered.filter_map(|(index, entry)| {
             let start = entry.started.clone()?;
             let end = entry.ended.as_ref().map_or(now, |(time, _)| time);
             let ending = entry.ended.as_ref().map(|(_, ending)| ending.clone());
             let is_whole = ending == Some(Ending::Succeeded);
-            let duration = entry.planned.as_ref().map(|_| (end - &start).max(Rational::ZERO));
+            let duration = entry
+                .planned
+                .as_ref()
+                .map(|_| (end - &start).max(Rational::ZERO));
             Some(ExecutedStep {
                 ticket: Ticket(index as u64),
                 ending,
                 step: Step {
-                    action: as_it_was(entry, is_whole, belief),
+                    action: as_it_was(entry, is_whole),
                     start,
                     duration,
                 },
@@ -173,7 +181,7 @@ impl Account {
 }
 
 /// The action with what was measured, and without what did not happen.
-fn as_it_was(entry: &Opened, is_whole: bool, _belief: &Progression) -> Action {
+fn as_it_was(entry: &Opened, is_whole: bool) -> Action {
     let mut action = Action::clone(&entry.action);
     match &mut action.body {
         Body::Instantaneous(snap) => put_in(snap, &entry.measured[0]),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
-use elbowroom_num::Interval;
+use elbowroom_num::{Interval, Rational};
 
 use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::Ticket;
@@ -128,7 +128,12 @@ impl Run<'_> {
             .values()
             .map(|underway| {
                 let elapsed = &time - &underway.start;
-                let expected = underway.planned.clone().max(elapsed + epsilon);
+                // Who guesses "any moment now" again and again plans again and again.
+                let expected = if underway.planned > elapsed {
+                    underway.planned.clone()
+                } else {
+                    elapsed * Rational::new(5, 4)
+                };
                 state.running_action(underway, Interval::point(expected))
             })
             .collect::<Vec<RunningAction>>();

@@ -1,6 +1,6 @@
 //! Taking in what the world reports: each report once, and no report against reason.
 
-use elbowroom_model::ground::Body;
+use elbowroom_model::ground::{Body, Change};
 use elbowroom_num::Rational;
 
 use super::{Run, Stop};
@@ -125,7 +125,8 @@ impl Run<'_> {
         };
         if let Some((_, earlier)) = &entry.ended {
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);
-            let are_both_without_end = *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
+            let are_both_without_end =
+                *earlier != Ending::Succeeded && *ending != Ending::Succeeded;
             if is_same || are_both_without_end {
                 return Some("it had ended already");
             }
@@ -198,7 +199,6 @@ impl Run<'_> {
             Body::Durative(body) if is_end => &body.end.effects,
             Body::Durative(body) => &body.start.effects,
         };
-        use elbowroom_model::ground::Change;
         for effect in effects {
             self.news.push(match &effect.change {
                 Change::Add(fact) | Change::Delete(fact) => News::Fact(*fact),

@@ -46,7 +46,7 @@ pub enum RunningRule {
     /// They are awaited, and the plan begins when they have ended.
     Await,
     /// They go on, and the plan goes on with them: it takes them to last as long as they were
-    /// planned to, or, if they are overdue, to end at once.
+    /// planned to, or, if they are overdue, a quarter longer than so far.
     Keep,
 }
 

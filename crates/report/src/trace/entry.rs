@@ -1,9 +1,7 @@
 //! One entry as JSON.
 
 use elbowroom_execution::run::{ExecutedStep, Report};
-use elbowroom_execution::{
-    Decided, Decision, Entry, Mission, Order, Planned, Reason,
-};
+use elbowroom_execution::{Decided, Decision, Ending, Entry, Mission, Order, Planned, Reason};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, ParametrizedPlan};
@@ -119,9 +117,13 @@ pub(crate) fn reason(reason: &Reason) -> Value {
 }
 
 fn executed(executed: &ExecutedStep) -> Value {
-    let mut value = step(&executed.step.start, &executed.step.action.name, executed.step.duration.as_ref());
+    let mut value = step(
+        &executed.step.start,
+        &executed.step.action.name,
+        executed.step.duration.as_ref(),
+    );
     value["ticket"] = executed.ticket.0.into();
-    value["outcome"] = executed.ending.as_ref().map(|ending| ending.name()).into();
+    value["outcome"] = executed.ending.as_ref().map(Ending::name).into();
     value
 }
 
@@ -183,9 +185,11 @@ fn network(plan: &ParametrizedPlan) -> Value {
             "upper": bound(&constraint.upper),
         })
     });
-    let instances = plan.plan.instances.iter().map(
-        |instance| json!({ "label": instance.label, "action": instance.action.name }),
-    );
+    let instances = plan
+        .plan
+        .instances
+        .iter()
+        .map(|instance| json!({ "label": instance.label, "action": instance.action.name }));
     json!({
         "instances": instances.collect::<Value>(),
         "constraints": constraints.collect::<Value>(),
@@ -230,7 +234,11 @@ fn step(start: &Rational, action: &str, duration: Option<&Rational>) -> Value {
 }
 
 fn situation_entry(task: &Task, situation: &Situation) -> Value {
-    let facts = situation.state.facts.iter().map(|&fact| task.fact_name(fact));
+    let facts = situation
+        .state
+        .facts
+        .iter()
+        .map(|&fact| task.fact_name(fact));
     let values = situation.state.values.iter();
     let values = values.map(|(&fluent, value)| (task.fluent_name(fluent), number(value)));
     let running = situation.running.iter().map(|running| {

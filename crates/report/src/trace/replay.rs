@@ -120,7 +120,8 @@ impl ReplayWorld {
             .passages
             .pop_front()
             .ok_or_else(|| WorldError::new(END))?;
-        let error = |message: String| WorldError::new(format!("line {line} of the trace: {message}"));
+        let error =
+            |message: String| WorldError::new(format!("line {line} of the trace: {message}"));
         let now = field_number(&entry, "now").map_err(|wrong| error(wrong.message))?;
         let reported = entry.get("observations").and_then(Value::as_array);
         let observations = reported.map(Vec::as_slice).unwrap_or_default().iter();
@@ -214,7 +215,10 @@ fn read_plan(
     let mut plan = TimeTriggeredPlan::default();
     let running = situation.map_or(&[][..], |situation| &situation.running);
     for (index, step) in steps.as_array().into_iter().flatten().enumerate() {
-        let name = step.get("action").and_then(Value::as_str).unwrap_or_default();
+        let name = step
+            .get("action")
+            .and_then(Value::as_str)
+            .unwrap_or_default();
         let action = match running.get(index) {
             Some(running) => running.action.clone(),
             None => instantiate(name, task).map_err(wrong)?,
@@ -228,10 +232,7 @@ fn read_plan(
     Ok(plan)
 }
 
-fn instantiate(
-    name: &str,
-    task: &mut Task,
-) -> Result<elbowroom_model::ground::Action, String> {
+fn instantiate(name: &str, task: &mut Task) -> Result<elbowroom_model::ground::Action, String> {
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
     let problem = task.problem();
     let schema = words.next().and_then(|word| problem.schema(word));

@@ -79,6 +79,9 @@ enum Becomes {
     Value(f64),
 }
 
+/// A distribution where it stands, with its minimum and maximum.
+type Found = (Range<usize>, Distribution, Option<f64>, Option<f64>);
+
 /// The text, to find lines in.
 struct Reader<'a> {
     text: &'a str,
@@ -135,9 +138,9 @@ pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
 
 impl Reader<'_> {
     fn wrong(&self, at: &Range<usize>, message: impl Into<String>) -> WorldFileError {
-        let before = &self.text.as_bytes()[..at.start.min(self.text.len())];
+        let before = self.text.get(..at.start).unwrap_or(self.text);
         WorldFileError {
-            line: 1 + before.iter().filter(|byte| **byte == b'\n').count(),
+            line: 1 + before.matches('\n').count(),
             message: message.into().trim().replace('\n', " "),
         }
     }
@@ -164,13 +167,19 @@ impl Reader<'_> {
     /// The one distribution that a section has.
     fn rule(&self, section: &Spanned<Section>) -> Read<Rule> {
         let given = section.get_ref();
-        let mut found: Vec<(Range<usize>, Distribution, Option<f64>, Option<f64>)> = Vec::new();
+        let mut found: Vec<Found> = Vec::new();
         let plain = |span, distribution| (span, distribution, given.minimum, given.maximum);
         if let Some(value) = &given.constant {
-            found.push(plain(value.span(), Distribution::Constant(*value.get_ref())));
+            found.push(plain(
+                value.span(),
+                Distribution::Constant(*value.get_ref()),
+            ));
         }
         if let Some(values) = &given.values {
-            found.push(plain(values.span(), Distribution::Empirical(values.get_ref().clone())));
+            found.push(plain(
+                values.span(),
+                Distribution::Empirical(values.get_ref().clone()),
+            ));
         }
         let shapes = [
             ("normal", &given.normal),
@@ -251,8 +260,10 @@ impl Reader<'_> {
             }
             _ => {
                 excess(&["mean", "deviation"])?;
-                let (mean, deviation) =
-                    (need(given.mean, "mean")?, need(given.deviation, "deviation")?);
+                let (mean, deviation) = (
+                    need(given.mean, "mean")?,
+                    need(given.deviation, "deviation")?,
+                );
                 if name == "normal" {
                     Distribution::Normal { mean, deviation }
                 } else {
@@ -325,7 +336,10 @@ impl Reader<'_> {
         };
         let words = name.trim_matches(['(', ')']).split_whitespace();
         if words.clone().any(|word| word == "_" || word == "*") {
-            return Err(self.wrong(&text.span(), "name one fact or fluent, with all its objects"));
+            return Err(self.wrong(
+                &text.span(),
+                "name one fact or fluent, with all its objects",
+            ));
         }
         Ok(format!("({})", words.collect::<Vec<_>>().join(" ")))
     }

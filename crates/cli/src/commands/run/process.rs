@@ -43,7 +43,9 @@ impl ProcessWorld {
             )
         };
         let mut words = command.split_whitespace();
-        let program = words.next().ok_or_else(|| cannot("it is empty".to_owned()))?;
+        let program = words
+            .next()
+            .ok_or_else(|| cannot("it is empty".to_owned()))?;
         let mut child = Program::new(program)
             .args(words)
             .stdin(Stdio::piped())
@@ -51,7 +53,9 @@ impl ProcessWorld {
             .spawn()
             .map_err(|error| cannot(plain(&error)))?;
         let (Some(stdin), Some(stdout)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(cannot("its standard input and output are not there".to_owned()));
+            return Err(cannot(
+                "its standard input and output are not there".to_owned(),
+            ));
         };
         let (sender, lines) = channel();
         // Reading blocks; a thread of its own lets us stop waiting.
@@ -103,12 +107,15 @@ impl ProcessWorld {
     fn hear(&mut self) -> Result<Passage, WorldError> {
         let mut observations = Vec::new();
         loop {
-            let line = self.lines.recv_timeout(self.patience).map_err(|error| match error {
-                RecvTimeoutError::Timeout => WorldError::new(
-                    "the world has not answered in time; --answer-within says how long to wait",
-                ),
-                RecvTimeoutError::Disconnected => WorldError::new("the world has ended"),
-            })?;
+            let line = self
+                .lines
+                .recv_timeout(self.patience)
+                .map_err(|error| match error {
+                    RecvTimeoutError::Timeout => WorldError::new(
+                        "the world has not answered in time; --answer-within says how long to wait",
+                    ),
+                    RecvTimeoutError::Disconnected => WorldError::new("the world has ended"),
+                })?;
             if line.trim().is_empty() {
                 continue;
             }

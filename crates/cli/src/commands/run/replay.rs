@@ -21,8 +21,12 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     let stored = Stored::read(text.text()).map_err(|error| unreadable(error.to_string()))?;
     let header = Header(&stored.header);
     let texts = Texts {
-        domain: header.source("domain").ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
-        problem: header.source("problem").ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
+        domain: header
+            .source("domain")
+            .ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
+        problem: header
+            .source("problem")
+            .ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
     };
     let mut task = texts.task()?;
     let first = if header.0.get("has_plan").and_then(Value::as_bool) == Some(true) {
@@ -57,7 +61,11 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
             None => format!(
                 "{}: {name} comes to the same decisions ({agreed} entries{})\n",
                 styled(GOOD, "agrees"),
-                if ends(&stored) { "" } else { "; the run was cut short" }
+                if ends(&stored) {
+                    ""
+                } else {
+                    "; the run was cut short"
+                }
             ),
             Some(difference) => format!(
                 "{}: {name} differs at line {}\n  stored    {}\n  replayed  {}\n",
@@ -78,7 +86,9 @@ const NO_PROBLEM: &str = "line 1: domain or problem is missing";
 
 fn ends(stored: &Stored) -> bool {
     let last = stored.entries.last();
-    last.and_then(|entry| entry.get("event")).and_then(Value::as_str) == Some("over")
+    last.and_then(|entry| entry.get("event"))
+        .and_then(Value::as_str)
+        == Some("over")
 }
 
 /// The first line of a trace.

@@ -22,24 +22,36 @@ pub(super) fn human(report: &Report) -> String {
     let time = nearest(&report.time);
     let mut text = match &report.verdict {
         Verdict::GoalReached => {
-            format!("{}: goal reached at {time}, with {replans}\n", styled(GOOD, "done"))
+            format!(
+                "{}: goal reached at {time}, with {replans}\n",
+                styled(GOOD, "done")
+            )
         }
         Verdict::Unsolvable => format!(
             "{}: unsolvable from here, at {time}, after {replans}\n",
             styled(BAD, "failed")
         ),
         Verdict::NoPlan { why } => {
-            format!("{}: no plan to go on with at {time}: {why}\n", styled(BAD, "failed"))
+            format!(
+                "{}: no plan to go on with at {time}: {why}\n",
+                styled(BAD, "failed")
+            )
         }
         Verdict::ReplanLimit => format!(
             "{}: given up at {time}, after {replans}; --max-replans allows no more\n",
             styled(HINT, "limit")
         ),
         Verdict::TimeLimit => {
-            format!("{}: the time was up at {time}, after {replans}\n", styled(HINT, "limit"))
+            format!(
+                "{}: the time was up at {time}, after {replans}\n",
+                styled(HINT, "limit")
+            )
         }
         Verdict::WorldFailed { why } => {
-            format!("{}: the world failed at {time}: {why}\n", styled(BAD, "failed"))
+            format!(
+                "{}: the world failed at {time}: {why}\n",
+                styled(BAD, "failed")
+            )
         }
     };
     if !report.reasons.is_empty() {
