@@ -13,7 +13,9 @@ use crate::oracle::{Objection, Oracle};
 /// How to search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The search ends when no end can move by this much (β of Algorithm 1); positive.
+    /// The search ends when all steps are below this (β of Algorithm 1); positive. A step is halved
+    /// when both ends of its parameter have refused it, so an end may still have room for almost
+    /// twice as much: [`sharpen`](crate::sharpen()) moves each end onto its limit.
     pub precision: Rational,
     /// How steps change after a success.
     pub growth: Growth,
@@ -45,7 +47,7 @@ pub struct Widening<'a> {
 /// Why a search for an envelope ended. The envelope is sound in every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// No end can move by the precision or more.
+    /// All steps are below the precision, or no end can move at all.
     Converged,
     /// The limit on box checks was reached.
     CheckLimit,

@@ -125,6 +125,44 @@ fn given(nodes: usize, constraints: Vec<PickedConstraint>) -> Vec<Constraint> {
         .collect()
 }
 
+/// The file with some of its bytes replaced, and stretches of it copied to other places.
+fn mutated() -> impl Strategy<Value = Vec<u8>> {
+    let replaced = prop::collection::vec((any::<Pick>(), any::<u8>()), 0..4);
+    let copied = prop::collection::vec((any::<Pick>(), any::<Pick>(), 0..80_usize), 0..4);
+    (replaced, copied).prop_map(|(replaced, copied)| {
+        let mut bytes = PAPER.as_bytes().to_vec();
+        for (at, byte) in replaced {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        for (from, to, length) in copied {
+            let from = from.index(bytes.len());
+            let stretch = bytes[from..(from + length).min(bytes.len())].to_vec();
+            let to = to.index(bytes.len());
+            bytes.splice(to..to, stretch);
+        }
+        bytes
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn a_mutated_file_is_refused_or_stays_as_it_is_written(bytes in mutated()) {
+        let mut task = rover();
+        match read(&bytes, &mut task) {
+            Ok(plan) => {
+                // Bounds on the same difference are merged the first time.
+                let written = write(&task, &plan).expect("what was read can be written");
+                let again = read(written.as_bytes(), &mut task).expect("what is written is right");
+                prop_assert_eq!(write(&task, &again).expect("again"), written);
+            }
+            Err(errors) => prop_assert!(!errors.to_string().is_empty()),
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn writing_and_reading_gives_the_plan_back(plan in plans()) {
