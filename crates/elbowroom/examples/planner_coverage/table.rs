@@ -170,9 +170,9 @@ fn contradictions(results: &Results<'_>) -> String {
             let says_no = runs.values().filter(|row| row.outcome == "unsolvable");
             let is_solved = runs.values().any(|row| row.is_solved());
             for row in says_no.filter(|_| is_solved) {
-                let _ = write!(
+                let _ = writeln!(
                     text,
-                    "- {} says that {domain} {instance} has no plan, and another planner has one\n",
+                    "- {} says that {domain} {instance} has no plan, and another planner has one",
                     row.planner
                 );
             }
