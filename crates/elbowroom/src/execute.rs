@@ -2,6 +2,7 @@
 //! behind them.
 
 mod analyst;
+mod facts_only;
 mod planners;
 
 pub use analyst::{Analyst, WholeRegion};

@@ -11,8 +11,8 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Schedule};
 /// What an executor needs to know of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// Which orderings matter. Nothing is left open, and nothing is guaranteed where conditions on
-    /// numbers depend on times: what dispatchers commonly have.
+    /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
+    /// guaranteed: what `ROSPlan`'s dispatcher has.
     Orderings,
     /// The same, with as many differences of times fixed as it takes for every schedule to work.
     Network,

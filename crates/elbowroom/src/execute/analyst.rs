@@ -8,9 +8,11 @@ use elbowroom_execution::{Need, Prepared, Preparer, Region};
 use elbowroom_model::ground::{Body, Condition};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
+use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
+use super::facts_only::{facts_only, sorted};
 use crate::flow;
 
 /// Makes plans ready with [`flow`], and remembers the last first plan: many runs begin with the
@@ -84,6 +86,23 @@ impl Analyst {
         flow::open(task, freed, &specs, epsilon).map_err(|error| error.to_string())
     }
 
+    /// What facts alone order: see [`Need::Orderings`].
+    fn orderings(&self, task: &Task, plan: &TimeTriggeredPlan) -> Result<Prepared, String> {
+        let settings = deorder::Settings {
+            epsilon: self.settings.epsilon.clone(),
+        };
+        let deordered = deorder::deorder(task, &facts_only(plan), &settings);
+        let mut deordered = deordered.map_err(|error| error.to_string())?;
+        for (instance, step) in deordered.plan.instances.iter_mut().zip(sorted(plan)) {
+            instance.action = step.action;
+        }
+        Ok(Prepared {
+            plan: ParametrizedPlan::closed(task, deordered.plan),
+            nominal: deordered.nominal,
+            envelope: None,
+        })
+    }
+
     fn envelope(&self, task: &Task, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, String> {
         let mut oracle =
             Oracle::new(task, plan, &self.settings.epsilon).map_err(|error| error.to_string())?;
@@ -112,10 +131,12 @@ impl Preparer for Analyst {
         }
         let epsilon = &self.settings.epsilon;
         let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
+        if need == Need::Orderings {
+            return self.orderings(task, plan);
+        }
         let nominal = freed.deordered.nominal.clone();
         let plan = match need {
-            Need::Orderings => ParametrizedPlan::closed(task, freed.deordered.plan),
-            Need::Network => flow::closed(task, freed, epsilon),
+            Need::Orderings | Need::Network => flow::closed(task, freed, epsilon),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         };
         let envelope = match need {

@@ -1,5 +1,6 @@
 //! Within the guarantee nothing fails.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
 
 use elbowroom::execute::Analyst;
@@ -26,7 +27,9 @@ fn within_the_envelope_the_goal_is_always_reached() {
         let model = world_of_the_envelope(&scene);
         let mut analyst = Analyst::new(scene.flow.clone());
         let need = elbowroom::execution::Need::Envelope;
-        analyst.remember(&scene.task, &scene.plan, need).unwrap();
+        analyst
+            .remember(&scene.task, &scene.plan, need)
+            .expect("a correct test");
         for seed in 0..count {
             let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
             let report = scene.run_in("guarded", &mut world, &mut analyst, &mut NoRecord);
@@ -49,7 +52,7 @@ fn within_the_envelope_the_goal_is_always_reached() {
 /// Every duration is anywhere in its interval of the first plan's envelope, all values alike.
 fn world_of_the_envelope(scene: &Scene) -> WorldModel {
     let prepared = scene.prepared("guarded");
-    let envelope = prepared.envelope.unwrap();
+    let envelope = prepared.envelope.expect("a correct test");
     let mut sections = String::new();
     for (index, parameter) in prepared.plan.parameters.iter().enumerate() {
         let ParameterKind::Duration(instance) = parameter.kind else {
@@ -57,18 +60,18 @@ fn world_of_the_envelope(scene: &Scene) -> WorldModel {
         };
         let thousand = Rational::from(1000);
         let interval = &envelope.intervals[index];
-        let lower = interval.lower.value().unwrap();
+        let lower = interval.lower.value().expect("a correct test");
         let farthest = &parameter.nominal * Rational::from(3);
         let upper = interval.upper.value().unwrap_or(&farthest);
         // Thousandths, rounded inwards.
         let from = (lower * &thousand).ceil() / &thousand;
         let to = (upper * &thousand).floor() / &thousand;
         let name = &prepared.plan.plan.instance(instance).action.name;
-        sections.push_str(&format!(
-            "[[duration]]\naction = \"{name}\"\nuniform = {{ from = {}, to = {} }}\n",
-            from.to_f64(),
-            to.to_f64()
-        ));
+        let (from, to) = (from.to_f64(), to.to_f64());
+        let _ = writeln!(
+            sections,
+            "[[duration]]\naction = \"{name}\"\nuniform = {{ from = {from}, to = {to} }}"
+        );
     }
     scene.world(&sections)
 }

@@ -47,7 +47,8 @@ impl Scene {
     /// A problem; without a plan, one is made.
     pub(crate) fn new(domain: &str, problem: &str, plan: Option<&str>) -> Self {
         let source = |text: &str| Source::new("test", text);
-        let (problem, _) = pddl::read_problem(&source(domain), &source(problem)).unwrap();
+        let (problem, _) =
+            pddl::read_problem(&source(domain), &source(problem)).expect("a correct test");
         let mut task = Task::new(problem);
         let mut scene = Self {
             plan: TimeTriggeredPlan::default(),
@@ -60,14 +61,14 @@ impl Scene {
             task: Arc::new(task.clone()),
             states: 400,
         };
-        scene.plan = match plan {
-            Some(text) => pddl::read_plan(&source(text), &mut task).unwrap().0,
-            None => {
-                let situation = Situation::initial(&task);
-                match scene.planner().plan(&mut task, &situation).answer {
-                    elbowroom::execution::PlanAnswer::Plan(plan) => plan,
-                    other => panic!("no plan: {other:?}"),
-                }
+        scene.plan = if let Some(text) = plan {
+            let read = pddl::read_plan(&source(text), &mut task);
+            read.expect("a correct test").0
+        } else {
+            let situation = Situation::initial(&task);
+            match scene.planner().plan(&mut task, &situation).answer {
+                elbowroom::execution::PlanAnswer::Plan(plan) => plan,
+                other => panic!("no plan: {other:?}"),
             }
         };
         scene.task = Arc::new(task);
@@ -85,11 +86,11 @@ impl Scene {
 
     /// The first plan made ready.
     pub(crate) fn prepared(&self, executor: &str) -> Prepared {
-        let spec: ExecutorSpec = executor.parse().unwrap();
+        let spec: ExecutorSpec = executor.parse().expect("a correct test");
         let mut analyst = Analyst::new(self.flow.clone());
         analyst
             .prepare(&self.task, &self.plan, spec.registered.need)
-            .unwrap()
+            .expect("a correct test")
     }
 
     /// Runs with an executor in any world.
@@ -100,7 +101,7 @@ impl Scene {
         analyst: &mut Analyst,
         recorder: &mut dyn Recorder,
     ) -> Report {
-        let spec: ExecutorSpec = executor.parse().unwrap();
+        let spec: ExecutorSpec = executor.parse().expect("a correct test");
         let mut decider = spec.build(Box::new(WholeRegion {
             epsilon: self.settings.epsilon.clone(),
         }));
@@ -158,14 +159,14 @@ impl Scene {
 
     pub(crate) fn world(&self, sections: &str) -> WorldModel {
         let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
-        WorldModel::read(&text, self.task.problem()).unwrap()
+        WorldModel::read(&text, self.task.problem()).expect("a correct test")
     }
 }
 
 /// A file of the project, by its path from the root.
 pub(crate) fn read(path: &str) -> String {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    std::fs::read_to_string(root.join(path)).unwrap()
+    std::fs::read_to_string(root.join(path)).expect("a correct test")
 }
 
 /// How many runs a long test makes: a few, or as many as the variable says.

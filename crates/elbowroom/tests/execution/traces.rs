@@ -29,8 +29,8 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
     use elbowroom::execute::WholeRegion;
     use elbowroom::execution::executors::ExecutorSpec;
     use elbowroom::execution::run::{self, Ports};
-    let stored = Stored::read(text).unwrap();
-    let spec: ExecutorSpec = executor.parse().unwrap();
+    let stored = Stored::read(text).expect("a correct test");
+    let spec: ExecutorSpec = executor.parse().expect("a correct test");
     let mut decider = spec.build(Box::new(WholeRegion {
         epsilon: scene.settings.epsilon.clone(),
     }));
@@ -71,7 +71,7 @@ fn a_run_can_be_played_back_from_its_trace_alone() {
 fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
     let scene = Scene::case("delivery");
     let text = traced(&scene, "guarded", 1);
-    let first = text.find('\n').unwrap() + 1;
+    let first = text.find('\n').expect("a correct test") + 1;
     for cut in (first..text.len()).step_by(997) {
         replayed(&scene, "guarded", &text[..cut]);
     }

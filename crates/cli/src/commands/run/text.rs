@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::report::trace;
 use serde_json::Value;
@@ -67,7 +68,7 @@ pub(super) fn human(report: &Report) -> String {
         if let Some(duration) = &step.duration {
             let _ = write!(text, " [{}]", nearest(duration));
         }
-        match executed.ending.as_ref().map(|ending| ending.name()) {
+        match executed.ending.as_ref().map(Ending::name) {
             Some("succeeded") => {}
             Some(other) => {
                 let _ = write!(text, " {other}");
