@@ -3,6 +3,7 @@
 mod reading;
 
 use elbowroom_model::problem::{ObjectId, TimedChange};
+use elbowroom_pddl::{Source, read_problem};
 use insta::assert_snapshot;
 use reading::{Printer, read_sections};
 
@@ -35,6 +36,23 @@ fn what_happens_at_time_zero_is_initial() {
     assert!(problem.initial_facts.is_empty());
     assert_eq!(problem.initial_values.len(), 1);
     assert_eq!(warnings.len(), 2);
+}
+
+#[test]
+fn costs_begin_at_0() {
+    let domain = "(define (domain d) (:functions (total-cost))
+        (:action work :parameters () :effect (increase (total-cost) 1)))";
+    let read = |init: &str| {
+        let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (and)))");
+        let source = |name: &str, text: &str| Source::new(name, text);
+        read_problem(&source("domain", domain), &source("problem", &problem)).unwrap()
+    };
+    let (problem, warnings) = read("");
+    assert_eq!(problem.initial_values[0].2.to_string(), "0");
+    assert_eq!(warnings.len(), 1);
+    let (problem, warnings) = read("(= (total-cost) 5)");
+    assert_eq!(problem.initial_values[0].2.to_string(), "5");
+    assert!(warnings.is_empty());
 }
 
 #[test]

@@ -22,6 +22,25 @@ impl Reader {
         for node in section.content {
             self.initial(node, &mut valued);
         }
+        self.initial_cost(section.span, &valued);
+    }
+
+    /// Costs begin at 0 (PDDL 3.1 has them say so); where a problem forgets to say it, nothing
+    /// that costs anything could ever be done.
+    fn initial_cost(&mut self, init: Span, valued: &Valued) {
+        let Some(cost) = self.problem.function("total-cost") else {
+            return;
+        };
+        let has_arguments = !self.problem.functions[cost.index()].parameters.is_empty();
+        if has_arguments || valued.contains_key(&(cost, Vec::new())) {
+            return;
+        }
+        self.report
+            .warning(init, "`(total-cost)` has no initial value: read as 0")
+            .help("say `(= (total-cost) 0)`");
+        self.problem
+            .initial_values
+            .push((cost, Vec::new(), Rational::ZERO));
     }
 
     fn initial(&mut self, node: &Node, valued: &mut Valued) {
