@@ -51,6 +51,9 @@ use time::NEVER;
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
 
+/// The most turns between two reports where each state is a linear program.
+const REPORT_SYMBOLIC_TURNS: u64 = 8;
+
 /// The most turns between two reports.
 const REPORT_TURNS: u64 = 256;
 
@@ -211,7 +214,12 @@ impl Planner<'_> {
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
         let before = (self.progress.counts, search.counts());
-        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, REPORT_TURNS);
+        let most_turns = if self.compiled.is_symbolic {
+            REPORT_SYMBOLIC_TURNS
+        } else {
+            REPORT_TURNS
+        };
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
         for turn in 0..budget {
             match search.turn() {
                 Turn::Over => return Outcome::Over,
