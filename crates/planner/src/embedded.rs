@@ -222,7 +222,10 @@ impl Planner<'_> {
         let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
         for turn in 0..budget {
             match search.turn() {
-                Turn::Over => return Outcome::Over,
+                Turn::Over => {
+                    self.count(&before, search);
+                    return Outcome::Over;
+                }
                 Turn::Nothing => {}
                 Turn::Goal(steps) => {
                     self.count(&before, search);

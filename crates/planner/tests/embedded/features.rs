@@ -165,7 +165,8 @@ fn what_is_not_handled_is_named() {
         (:requirements :adl :durative-actions)
         (:predicates (p) (q) (r))
         (:durative-action a :parameters () :duration (= ?duration 1) :condition ()
-          :effect (when (over all (p)) (at end (q))))";
+          :effect (when (over all (p)) (at end (q))))
+        (:action b :parameters () :precondition (p) :effect (not (p)))";
     let said = describe(&answer(domain, "(:init (p)) (:goal (q))"));
     assert!(
         said.contains("over the whole action") && said.contains("(a)"),

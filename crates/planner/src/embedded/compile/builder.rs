@@ -501,7 +501,10 @@ impl<'a> Builder<'a> {
                     &self.snaps[action.end as usize],
                 );
                 let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                self.actions[number].eagerness = eagerness(start, end, &offers);
+                // What changes continuously is there to be read meanwhile.
+                if action.flows.is_empty() {
+                    self.actions[number].eagerness = eagerness(start, end, &offers);
+                }
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
