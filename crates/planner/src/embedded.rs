@@ -46,10 +46,13 @@ use apply::Step;
 use compile::{Compiled, Eagerness};
 use search::{Search, Style, Turn};
 use symmetry::Symmetry;
-use time::NEVER;
+use time::{NEVER, Ticks};
 
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
+
+/// The most turns between two reports where each state is a linear program.
+const REPORT_SYMBOLIC_TURNS: u64 = 8;
 
 /// The most turns between two reports.
 const REPORT_TURNS: u64 = 256;
@@ -119,6 +122,7 @@ pub fn plan(
         compiled: &compiled,
         progress,
         best: None,
+        horizon: NEVER,
     }
     .run()
 }
@@ -148,6 +152,8 @@ struct Planner<'a> {
     symmetry: &'a Symmetry,
     progress: Progress,
     best: Option<Found>,
+    /// Only plans that end by then are of interest.
+    horizon: Ticks,
 }
 
 impl Planner<'_> {
@@ -210,11 +216,22 @@ impl Planner<'_> {
     /// Lets a search look at so many states.
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
+        if self.horizon < NEVER {
+            search.set_horizon(self.horizon);
+        }
         let before = (self.progress.counts, search.counts());
-        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, REPORT_TURNS);
+        let most_turns = if self.compiled.is_symbolic {
+            REPORT_SYMBOLIC_TURNS
+        } else {
+            REPORT_TURNS
+        };
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
         for turn in 0..budget {
             match search.turn() {
-                Turn::Over => return Outcome::Over,
+                Turn::Over => {
+                    self.count(&before, search);
+                    return Outcome::Over;
+                }
                 Turn::Nothing => {}
                 Turn::Goal(steps) => {
                     self.count(&before, search);
@@ -280,7 +297,8 @@ impl Planner<'_> {
             return Some(Outcome::Stop(Stopped::FirstPlan));
         }
         if is_makespan {
-            search.set_horizon((end - 1).min(NEVER));
+            self.horizon = end - 1;
+            search.set_horizon(self.horizon);
         }
         None
     }

@@ -67,7 +67,6 @@ pub(crate) struct Compiled {
 /// A start, an end, or an instantaneous action.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Snap {
-    pub(crate) action: u32,
     pub(crate) condition: Formula,
     pub(crate) adds: Vec<u32>,
     pub(crate) deletes: Vec<u32>,

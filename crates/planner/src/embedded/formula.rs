@@ -65,11 +65,6 @@ impl Formula {
         self.literals.is_empty() && self.tests.is_empty() && self.choices.is_empty()
     }
 
-    /// Whether literals and tests decide it.
-    pub(crate) fn is_conjunction(&self) -> bool {
-        self.choices.is_empty()
-    }
-
     /// Whether it holds; `test` says whether a numeric test does.
     pub(crate) fn holds(&self, facts: &[u64], test: &mut dyn FnMut(u32) -> bool) -> bool {
         self.literals.iter().all(|literal| literal.holds(facts))

@@ -150,13 +150,14 @@ impl Network {
     /// Notes that a node has set a stamp. Older nodes that are known to come before it need not be
     /// remembered for that stamp.
     pub(crate) fn mark(&mut self, stamp: u32, node: NodeId) {
-        let edges = &self.edges;
-        self.marks.retain(|&(other, older)| {
-            other != stamp
-                || !edges
-                    .iter()
-                    .any(|edge| edge.from == older && edge.to == node && edge.distance >= 0)
-        });
+        // The edges to a new node are the last ones.
+        let newest = self.edges.iter().rev().take_while(|edge| edge.to == node);
+        for edge in newest.filter(|edge| edge.distance >= 0) {
+            let known = (stamp, edge.from);
+            if let Some(place) = self.marks.iter().position(|mark| *mark == known) {
+                self.marks.swap_remove(place);
+            }
+        }
         self.marks.push((stamp, node));
     }
 

@@ -309,7 +309,10 @@ impl<'a> Search<'a> {
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
                 }
-                if is_no_later {
+                // A goal that waits for a timed initial needs a happening so late.
+                let waits = !self.compiled.goal_timed.is_empty()
+                    && other.earliest_end() < state.earliest_end();
+                if is_no_later && !waits {
                     return true;
                 }
                 variants += 1;

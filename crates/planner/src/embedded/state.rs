@@ -99,7 +99,8 @@ impl State {
             facts: bits,
             values,
             stamps: vec![-NEVER; compiled.stamp_count],
-            settled_end: compiled.now,
+            // Before anything that happens now.
+            settled_end: compiled.now - 1,
             ..Self::default()
         };
         state.derive(compiled);

@@ -222,7 +222,7 @@ impl<'a> Builder<'a> {
             })
         };
         let mut has_unknown = false;
-        action.map_leaves(&mut |leaf| {
+        let _ = action.map_leaves(&mut |leaf| {
             has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
             None
         });
@@ -263,16 +263,14 @@ impl<'a> Builder<'a> {
         let Some(body) = action.durative() else {
             return;
         };
-        let number = narrow(self.actions.len());
         let touches = Touches::of_end(self.task, action);
-        let end = self.end_of(number, body, &touches);
+        let end = self.end_of(body, &touches);
         let compiled = self.durative(action, body, NONE, end, Vec::new());
         self.actions.push(compiled);
         self.over_all.push(body.over_all.clone());
     }
 
     fn action(&mut self, action: &ground::Action, footprints: Option<(Touches, Touches)>) {
-        let number = narrow(self.actions.len());
         let (starts, ends) = footprints.unwrap_or_else(|| {
             (
                 Touches::of_start(self.task, action),
@@ -282,7 +280,7 @@ impl<'a> Builder<'a> {
         let mut wishes = starts.wishes(self.epsilon, &self.links);
         match &action.body {
             Body::Instantaneous(body) => {
-                let snap = self.snap(number, body, &mut Vec::new());
+                let snap = self.snap(body, &mut Vec::new());
                 let start = self.push_snap(snap, wishes);
                 self.actions.push(Action {
                     schema: action.schema,
@@ -308,9 +306,9 @@ impl<'a> Builder<'a> {
                 let over_all = Touches::of_condition(self.task, &body.over_all);
                 wishes.need_from_now_on(&over_all);
                 let mut guards = Vec::new();
-                let snap = self.snap(number, &body.start, &mut guards);
+                let snap = self.snap(&body.start, &mut guards);
                 let start = self.push_snap(snap, wishes);
-                let end = self.end_with(number, body, &ends, &mut guards);
+                let end = self.end_with(body, &ends, &mut guards);
                 let compiled = self.durative(action, body, start, end, guards);
                 self.actions.push(compiled);
                 self.over_all.push(body.over_all.clone());
@@ -319,30 +317,28 @@ impl<'a> Builder<'a> {
     }
 
     /// The end of an action that is under way; its guards are decided.
-    fn end_of(&mut self, number: u32, body: &DurativeBody, touches: &Touches) -> u32 {
+    fn end_of(&mut self, body: &DurativeBody, touches: &Touches) -> u32 {
         let mut decided = body.clone();
         for effect in &mut decided.end.effects {
             effect.guard.at_start = Condition::TRUE;
         }
-        self.end_with(number, &decided, touches, &mut Vec::new())
+        self.end_with(&decided, touches, &mut Vec::new())
     }
 
     fn end_with(
         &mut self,
-        number: u32,
         body: &DurativeBody,
         touches: &Touches,
         guards: &mut Vec<Formula>,
     ) -> u32 {
         let mut wishes = touches.wishes(self.epsilon, &self.links);
         wishes.needed_until_now(self.task, &body.over_all);
-        let snap = self.snap(number, &body.end, guards);
+        let snap = self.snap(&body.end, guards);
         self.push_snap(snap, wishes)
     }
 
-    fn snap(&mut self, action: u32, body: &ground::SnapAction, guards: &mut Vec<Formula>) -> Snap {
+    fn snap(&mut self, body: &ground::SnapAction, guards: &mut Vec<Formula>) -> Snap {
         let mut snap = Snap {
-            action,
             condition: self.symbols.formula(&body.condition),
             ..Snap::default()
         };
@@ -505,7 +501,10 @@ impl<'a> Builder<'a> {
                     &self.snaps[action.end as usize],
                 );
                 let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                self.actions[number].eagerness = eagerness(start, end, &offers);
+                // What changes continuously is there to be read meanwhile.
+                if action.flows.is_empty() {
+                    self.actions[number].eagerness = eagerness(start, end, &offers);
+                }
             }
         }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);

@@ -1,0 +1,193 @@
+//! Each feature as a small problem.
+
+use crate::world::{answer, describe, makespan};
+use elbowroom_planner::Answer;
+
+const MATCH: &str = "
+    (:requirements :typing :durative-actions)
+    (:types fuse)
+    (:predicates (unused) (light) (hand) (mended ?f - fuse))
+    (:durative-action strike :parameters () :duration (= ?duration 5)
+      :condition (at start (unused))
+      :effect (and (at start (not (unused))) (at start (light)) (at end (not (light)))))
+    (:durative-action mend :parameters (?f - fuse) :duration (= ?duration 2)
+      :condition (and (at start (hand)) (over all (light)))
+      :effect (and (at start (not (hand))) (at end (mended ?f)) (at end (hand))))";
+
+#[test]
+fn a_match_gives_light_while_it_burns() {
+    let problem = "(:objects a b - fuse) (:init (unused) (hand))
+                   (:goal (and (mended a) (mended b)))";
+    assert_eq!(makespan(&answer(MATCH, problem)), "5");
+}
+
+#[test]
+fn three_fuses_do_not_fit_under_one_match() {
+    let problem = "(:objects a b c - fuse) (:init (unused) (hand))
+                   (:goal (and (mended a) (mended b) (mended c)))";
+    assert!(matches!(answer(MATCH, problem), Answer::Unsolvable { .. }));
+}
+
+const DOOR: &str = "
+    (:requirements :typing :durative-actions :timed-initial-literals)
+    (:predicates (open) (in))
+    (:durative-action enter :parameters () :duration (= ?duration 10)
+      :condition (over all (open)) :effect (at end (in)))";
+
+#[test]
+fn a_window_is_used_once_it_opens() {
+    let problem = "(:init (at 7 (open)) (at 17 (not (open)))) (:goal (in))";
+    assert_eq!(describe(&answer(DOOR, problem)), "7: (enter) [10]");
+}
+
+#[test]
+fn a_window_that_is_too_short_is_a_proof_with_a_reason() {
+    let problem = "(:init (open) (at 9.5 (not (open)))) (:goal (in))";
+    assert_eq!(
+        describe(&answer(DOOR, problem)),
+        "no plan exists: `(in)` cannot be reached before `(open)` closes at 9.5"
+    );
+}
+
+#[test]
+fn a_goal_that_nothing_brings_about_is_named() {
+    let problem = "(:init) (:goal (in))";
+    assert_eq!(
+        describe(&answer(DOOR, problem)),
+        "no plan exists: `(in)` cannot become true"
+    );
+}
+
+const TANK: &str = "
+    (:requirements :typing :durative-actions :numeric-fluents :duration-inequalities)
+    (:predicates (busy) (done))
+    (:functions (level))
+    (:durative-action fill :parameters ()
+      :duration (and (>= ?duration 1) (<= ?duration 10))
+      :condition (at start (not (busy)))
+      :effect (and (at start (busy)) (at end (not (busy)))
+                   (at end (increase (level) (* 3 ?duration)))))
+    (:durative-action use :parameters () :duration (= ?duration 1)
+      :condition (at start (and (not (busy)) (>= (level) 20)))
+      :effect (and (at start (decrease (level) 20)) (at end (done))))";
+
+#[test]
+fn a_duration_is_chosen_long_enough_for_what_depends_on_it() {
+    let answer = answer(TANK, "(:init (= (level) 0)) (:goal (done))");
+    let found = answer.found().expect("a plan");
+    let fill = &found.plan.steps[0];
+    assert_eq!(fill.action.name, "(fill)");
+    let needed = "20/3".parse().unwrap();
+    assert!(fill.duration.as_ref().is_some_and(|d| *d >= needed));
+}
+
+#[test]
+fn a_continuous_effect_is_read_while_it_goes_on() {
+    let domain = "
+        (:requirements :typing :durative-actions :numeric-fluents :continuous-effects)
+        (:predicates (idle) (hot))
+        (:functions (temperature))
+        (:durative-action heat :parameters () :duration (= ?duration 30)
+          :condition (at start (idle))
+          :effect (and (at start (not (idle))) (at end (idle))
+                       (increase (temperature) (* #t 2))))
+        (:action look :parameters ()
+          :precondition (and (>= (temperature) 30) (<= (temperature) 40)) :effect (hot))";
+    let answer = answer(domain, "(:init (idle) (= (temperature) 0)) (:goal (hot))");
+    let found = answer.found().expect("a plan");
+    let look = found.plan.steps.iter().find(|s| s.action.name == "(look)");
+    let time = &look.expect("it looks").start;
+    assert!(
+        *time >= 15.into() && *time <= 20.into(),
+        "{}",
+        describe(&answer)
+    );
+}
+
+const LAMPS: &str = "
+    (:requirements :adl :typing)
+    (:types lamp)
+    (:predicates (on ?l - lamp) (broken ?l - lamp) (seen) (known))
+    (:action switch :parameters (?l - lamp) :precondition (not (on ?l))
+      :effect (when (not (broken ?l)) (on ?l)))
+    (:action see :parameters ()
+      :precondition (or (exists (?l - lamp) (on ?l)) (known)) :effect (seen))
+    (:action mend :parameters (?l - lamp) :precondition (broken ?l) :effect (not (broken ?l)))";
+
+#[test]
+fn disjunctions_quantifiers_and_conditional_effects() {
+    let problem = "(:objects a b - lamp) (:init (broken a) (broken b))
+                   (:goal (and (seen) (forall (?l - lamp) (imply (broken ?l) (not (on ?l))))))";
+    let answer = answer(LAMPS, problem);
+    assert_eq!(answer.found().expect("a plan").plan.steps.len(), 3);
+}
+
+#[test]
+fn derived_facts_are_followed() {
+    let domain = "
+        (:requirements :adl :derived-predicates :typing)
+        (:types place)
+        (:predicates (link ?a ?b - place) (joined ?a ?b - place) (here ?a - place))
+        (:derived (joined ?a ?b - place)
+          (or (link ?a ?b) (exists (?c - place) (and (link ?a ?c) (joined ?c ?b)))))
+        (:action join :parameters (?a ?b - place) :precondition (not (link ?a ?b))
+          :effect (link ?a ?b))
+        (:action jump :parameters (?a ?b - place)
+          :precondition (and (here ?a) (joined ?a ?b))
+          :effect (and (not (here ?a)) (here ?b)))";
+    let problem = "(:objects a b c - place) (:init (here a) (link b c)) (:goal (here c))";
+    assert!(answer(domain, problem).found().is_some());
+}
+
+#[test]
+fn battery_and_charger() {
+    let domain = "
+        (:requirements :durative-actions :numeric-fluents)
+        (:predicates (idle) (home) (away) (sent))
+        (:functions (battery))
+        (:durative-action charge :parameters () :duration (= ?duration 4)
+          :condition (and (at start (idle)) (over all (home)) (at start (<= (battery) 3)))
+          :effect (and (at start (not (idle))) (at end (idle)) (at end (increase (battery) 7))))
+        (:durative-action go :parameters () :duration (= ?duration 3)
+          :condition (and (at start (idle)) (at start (home)) (at start (>= (battery) 6)))
+          :effect (and (at start (not (idle))) (at start (not (home))) (at end (idle))
+                       (at start (decrease (battery) 6)) (at end (away))))";
+    let answer = answer(
+        domain,
+        "(:init (idle) (home) (= (battery) 2)) (:goal (away))",
+    );
+    assert_eq!(describe(&answer), "0: (charge) [4]\n4001/1000: (go) [3]");
+}
+
+#[test]
+fn what_is_not_handled_is_named() {
+    let domain = "
+        (:requirements :adl :durative-actions)
+        (:predicates (p) (q) (r))
+        (:durative-action a :parameters () :duration (= ?duration 1) :condition ()
+          :effect (when (over all (p)) (at end (q))))
+        (:action b :parameters () :precondition (p) :effect (not (p)))";
+    let said = describe(&answer(domain, "(:init (p)) (:goal (q))"));
+    assert!(
+        said.contains("over the whole action") && said.contains("(a)"),
+        "{said}"
+    );
+}
+
+#[test]
+fn interchangeable_objects_are_tried_once() {
+    let names = (0..24).map(|n| format!("f{n} ")).collect::<String>();
+    let domain = "
+        (:requirements :typing :durative-actions)
+        (:types fuse) (:predicates (hand) (mended ?f - fuse) (spare ?f - fuse) (lit))
+        (:durative-action mend :parameters (?f - fuse) :duration (= ?duration 2)
+          :condition (and (at start (hand)) (at start (spare ?f)))
+          :effect (and (at start (not (hand))) (at start (not (spare ?f)))
+                       (at end (mended ?f)) (at end (hand))))
+        (:action light :parameters (?f - fuse) :precondition (and (mended ?f) (lit)) :effect (lit))";
+    let spares = (0..24).map(|n| format!("(spare f{n})")).collect::<String>();
+    let problem = format!(
+        "(:objects {names} - fuse) (:init (hand) {spares}) (:goal (and (mended f0) (mended f9) (hand)))"
+    );
+    assert!(answer(domain, &problem).found().is_some());
+}
