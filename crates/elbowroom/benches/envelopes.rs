@@ -2,7 +2,10 @@
 //!
 //! `whole` compiles the obligations and searches with the authors' settings (β = 1, doubling);
 //! `first_widening` stops when the box has grown for the first time. Without the benchmark files
-//! beside the repository there is nothing to measure.
+//! beside the repository these have nothing to measure.
+//!
+//! `rounds` and `rounds_first_widening` are deliveries of our own with all durations left open, by
+//! the number of parameters.
 
 #[path = "../tests/shared/mod.rs"]
 mod shared;
@@ -10,9 +13,11 @@ mod shared;
 use std::ops::ControlFlow;
 
 use divan::Bencher;
+use elbowroom::flow;
 use elbowroom_envelope::{Oracle, Settings, irr};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_plan::{ParametrizedPlan, format};
 use shared::instances::{Instance, figure_3, figure_4};
 
@@ -70,5 +75,32 @@ fn whole(bencher: Bencher<'_, '_>, name: &str) {
 #[divan::bench(args = names(), sample_count = 20)]
 fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
     let (task, plan) = read(name);
+    bencher.bench_local(|| search(&task, &plan, 1));
+}
+
+/// A delivery with so many durations left open.
+fn delivery(parameters: usize) -> (Task, ParametrizedPlan) {
+    let (problem, plan) = shared::rounds::rounds(parameters / 4);
+    let domain = Source::new("domain", shared::rounds::DOMAIN);
+    let (problem, _) =
+        read_problem(&domain, &Source::new("problem", problem)).expect("a readable problem");
+    let mut task = Task::new(problem);
+    let (plan, _) = read_plan(&Source::new("plan", plan), &mut task).expect("a readable plan");
+    let epsilon = Rational::new(1, 1000);
+    let freed = flow::free(&task, &plan, &epsilon).expect("a valid plan");
+    let plan = flow::open(&task, freed, &[], &epsilon).expect("durations to leave open");
+    assert_eq!(plan.parameters.len(), parameters);
+    (task, plan)
+}
+
+#[divan::bench(args = [33, 65], sample_count = 20)]
+fn rounds(bencher: Bencher<'_, '_>, parameters: usize) {
+    let (task, plan) = delivery(parameters);
+    bencher.bench_local(|| search(&task, &plan, usize::MAX));
+}
+
+#[divan::bench(args = [33, 65], sample_count = 20)]
+fn rounds_first_widening(bencher: Bencher<'_, '_>, parameters: usize) {
+    let (task, plan) = delivery(parameters);
     bencher.bench_local(|| search(&task, &plan, 1));
 }

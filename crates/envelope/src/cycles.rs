@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_num::Rational;
 use elbowroom_plan::ParameterId;
-use elbowroom_plan::reduction::{Edge, Side};
+use elbowroom_plan::reduction::{BoxEnd, Edge, Side};
+use elbowroom_stn::NodeId as ClassId;
 
 /// Through which of its ends a parameter can make the network inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +18,75 @@ pub(crate) enum Role {
     Upper,
     /// Both can.
     Both,
+}
+
+/// How far out the ends of parameters may lie that are differences of times, by bounds on these
+/// same differences; and the edges that are left then.
+///
+/// Let `p` be the difference `d - s`: there is an edge `s -> d` with bound `c + p` and one `d -> s`
+/// with `-c - p`. A bound `k` from `d` to `s` closes a cycle of length `c + p + k` with the former,
+/// so `p >= -k - c` is needed; but for such `p` the latter is at least as tight as `k`, which can
+/// be left out. Likewise with `s` and `d` changed. Left in, such bounds would put the parameter on
+/// cycles both ways.
+pub(crate) fn own_limits(
+    edges: &[Edge],
+    coupled: &[ParameterId],
+) -> (BTreeMap<BoxEnd, Rational>, Vec<Edge>) {
+    // For each pair of classes, the end that bounds their difference, and its constant.
+    let mut differences: BTreeMap<(ClassId, ClassId), Vec<(BoxEnd, &Rational)>> = BTreeMap::new();
+    for edge in edges {
+        if let Some(end) = edge.end
+            && !coupled.contains(&end.parameter)
+            && is_difference(edges, end.parameter)
+        {
+            let both_ways = differences.entry((edge.from, edge.to)).or_default();
+            both_ways.push((end, &edge.constant));
+        }
+    }
+    let mut limits: BTreeMap<BoxEnd, Rational> = BTreeMap::new();
+    let mut left = Vec::new();
+    for edge in edges {
+        let opposite = differences.get(&(edge.to, edge.from));
+        let (None, Some(opposite)) = (edge.end, opposite) else {
+            left.push(edge.clone());
+            continue;
+        };
+        for (end, constant) in opposite {
+            // The way there must not be shorter than the way back, at the end that shortens it.
+            let inner = BoxEnd {
+                side: other_side(end.side),
+                ..*end
+            };
+            let limit = *constant + &edge.constant;
+            let known = limits.entry(inner).or_insert_with(|| limit.clone());
+            if limit < *known {
+                *known = limit;
+            }
+        }
+    }
+    (limits, left)
+}
+
+/// Whether a parameter is the difference of two times: an edge there and one back, and no more.
+fn is_difference(edges: &[Edge], parameter: ParameterId) -> bool {
+    let own = edges
+        .iter()
+        .filter(|edge| edge.end.is_some_and(|end| end.parameter == parameter));
+    match own.collect::<Vec<_>>()[..] {
+        [there, back] => {
+            (there.from, there.to) == (back.to, back.from)
+                && there.from != there.to
+                && there.constant == -&back.constant
+        }
+        _ => false,
+    }
+}
+
+pub(crate) fn other_side(side: Side) -> Side {
+    match side {
+        Side::Lower => Side::Upper,
+        Side::Upper => Side::Lower,
+    }
 }
 
 /// Looks for the cycles that parameters are on.

@@ -7,7 +7,7 @@ use elbowroom_plan::reduction::{BoxEnd, Edge, Reduction, Side};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
-use crate::cycles::{Cycles, Role};
+use crate::cycles::{Cycles, Role, other_side, own_limits};
 
 /// How many corners are looked at before the question is given up.
 pub(crate) const MOST_CORNERS: usize = 1 << 14;
@@ -19,10 +19,19 @@ pub(crate) const MOST_CORNERS: usize = 1 << 14;
 /// through it walk its constraint one way, only one of its ends counts, and that end is known
 /// beforehand. In deordered plans almost every parameter is like that. Where an end is infinite,
 /// it is asked whether the values with a schedule go on for ever on that side.
+///
+/// A parameter that *is* a difference of times may have bounds on that very difference beside it
+/// (an action whose start and end interfere takes at least ε). These bound the parameter, whatever
+/// the others do, and say nothing else: they are looked at by themselves ([`own_limits`]).
 #[derive(Clone, Debug)]
 pub(crate) struct Feasibility {
-    /// The reduced network's edges, and each parameter's role in its cycles.
+    /// The reduced network's edges.
+    all_edges: Vec<Edge>,
+    /// The same, less those that are limits of a parameter.
     edges: Vec<Edge>,
+    /// How far out single ends may lie ([`BoxEnd::reach`]).
+    own_limits: BTreeMap<BoxEnd, Rational>,
+    /// Each parameter's role in the cycles of `edges`.
     class_count: usize,
     roles: Vec<Role>,
     /// Parameters that bound several differences.
@@ -55,8 +64,9 @@ impl Feasibility {
         plan: &ParametrizedPlan,
         reduction: &Reduction,
     ) -> Result<Self, TooManyCorners> {
-        let edges = reduction.edges().to_vec();
+        let all_edges = reduction.edges().to_vec();
         let class_count = reduction.class_count();
+        let (own_limits, edges) = own_limits(&all_edges, &reduction.coupled);
         let mut cycles = Cycles::new(&edges, class_count);
         let roles: Vec<Role> = (0..plan.parameters.len())
             .map(ParameterId::from)
@@ -73,7 +83,9 @@ impl Feasibility {
             return Err(TooManyCorners);
         }
         Ok(Self {
+            all_edges,
             edges,
+            own_limits,
             class_count,
             roles,
             coupled: reduction.coupled.clone(),
@@ -95,8 +107,13 @@ impl Feasibility {
             None => all_ends(envelope),
         };
         for end in ends {
-            if end.reach(envelope).is_none() && !self.goes_on_for_ever(end) {
-                return Some(Infeasible::FarOut(end));
+            match (end.reach(envelope), self.own_limits.get(&end)) {
+                (None, _) if !self.goes_on_for_ever(end) => return Some(Infeasible::FarOut(end)),
+                (Some(reach), Some(limit)) if reach > *limit => {
+                    let sides = BTreeMap::from([(end.parameter, end.side)]);
+                    return Some(Infeasible::At(valuation(&sides, envelope)));
+                }
+                _ => {}
             }
         }
         match moved {
@@ -111,6 +128,9 @@ impl Feasibility {
     /// The values that have one form a polyhedron; it goes on for ever in a direction exactly if
     /// the network has a schedule when only what the direction adds to each bound is kept.
     fn goes_on_for_ever(&self, end: BoxEnd) -> bool {
+        if self.own_limits.contains_key(&end) {
+            return false;
+        }
         if !self.coupled.contains(&end.parameter) {
             return match self.roles[end.parameter.index()] {
                 Role::None => true,
@@ -159,7 +179,10 @@ impl Feasibility {
                 Side::Upper => &base + &step,
             };
             let point = DecoupledEnvelope::point(&values);
-            if self.network_where(|edge| edge.bound(&point)).is_none() {
+            if self
+                .network_where(&self.all_edges, |edge| edge.bound(&point))
+                .is_none()
+            {
                 return values;
             }
             step = &step + &step;
@@ -204,16 +227,17 @@ impl Feasibility {
         sides: &BTreeMap<ParameterId, Side>,
         envelope: &DecoupledEnvelope,
     ) -> Option<ConsistentNetwork> {
-        self.network_where(|edge| self.bound(edge, sides, envelope))
+        self.network_where(&self.edges, |edge| self.bound(edge, sides, envelope))
     }
 
     /// The network with these bounds, if it is consistent; `None` is no bound.
     fn network_where(
         &self,
+        edges: &[Edge],
         bound: impl Fn(&Edge) -> Option<Rational>,
     ) -> Option<ConsistentNetwork> {
         let mut network = Network::with_nodes(self.class_count);
-        for edge in &self.edges {
+        for edge in edges {
             if let Some(bound) = bound(edge) {
                 network.add(Constraint {
                     from: edge.from,
@@ -337,13 +361,6 @@ fn any_value(interval: &Interval, side: Side) -> Rational {
     };
     let value = wanted.value().or(other.value());
     value.cloned().unwrap_or_default()
-}
-
-fn other_side(side: Side) -> Side {
-    match side {
-        Side::Lower => Side::Upper,
-        Side::Upper => Side::Lower,
-    }
 }
 
 fn all_ends(envelope: &DecoupledEnvelope) -> Vec<BoxEnd> {

@@ -423,3 +423,39 @@ fn a_counterexample_to_separation_has_the_happenings_in_order() {
     let gap = &found.schedule[1] - Rational::new(17, 2);
     assert!(!gap.is_negative() && gap < Rational::new(1, 4));
 }
+
+#[test]
+fn a_least_duration_beside_an_open_one_takes_no_corners() {
+    // Twenty actions one after the other, each at least 1 long, with a deadline for all: small and
+    // large durations do harm, but the small ones each by themselves.
+    let count = 20;
+    let each = |line: &dyn Fn(usize) -> String| (0..count).map(line).collect::<Vec<_>>().concat();
+    let text = [
+        each(&|i| format!("parameter d{i} default 2; durative-action instance n{i} : (wait);")),
+        each(&|i| format!("c: n{i}.end - n{i}.start in [d{i}, d{i}];")),
+        each(&|i| format!("c: n{i}.end - n{i}.start in [1, inf];")),
+        each(&|i| match i {
+            0 => String::new(),
+            _ => format!("c: n{i}.start - n{}.end in [0, inf];", i - 1),
+        }),
+        "c: n19.end - .zero in [-inf, 50];".to_owned(),
+    ]
+    .concat();
+    let given = Given {
+        domain: "(:durative-action wait :parameters () :duration (>= ?duration 0) :effect (and))",
+        plan: &text,
+        ..Given::default()
+    };
+    let all_but_first = |first: &str| format!("{first}{}", " [1, 2]".repeat(count - 1));
+    let boxes = ["[1, 12]", "[1, 25/2]", "[1/2, 2]", "[1, inf]", "[-inf, 2]"].map(all_but_first);
+    assert_eq!(
+        given.answers(&boxes.each_ref().map(String::as_str)),
+        [
+            "inside",
+            "no schedule",
+            "no schedule",
+            "no schedule",
+            "no schedule"
+        ]
+    );
+}

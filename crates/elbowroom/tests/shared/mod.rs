@@ -6,6 +6,7 @@
 pub(crate) mod case;
 pub(crate) mod draw;
 pub(crate) mod instances;
+pub(crate) mod rounds;
 
 use std::path::{Path, PathBuf};
 

@@ -127,21 +127,24 @@ fn combinations(
     combinations
 }
 
-const FAR: i64 = 1_000_000;
+/// Farther than any sum of the numbers in a case.
+fn far() -> Rational {
+    Rational::from(i64::MAX) * Rational::from(1_000_000)
+}
 
 fn lower(interval: &Interval) -> Rational {
     match (interval.lower.value(), interval.upper.value()) {
         (Some(lower), _) => lower.clone(),
-        (None, Some(upper)) => upper - Rational::from(FAR),
-        (None, None) => Rational::from(-FAR),
+        (None, Some(upper)) => upper - far(),
+        (None, None) => -far(),
     }
 }
 
 fn upper(interval: &Interval) -> Rational {
     match (interval.lower.value(), interval.upper.value()) {
         (_, Some(upper)) => upper.clone(),
-        (Some(lower), None) => lower + Rational::from(FAR),
-        (None, None) => Rational::from(FAR),
+        (Some(lower), None) => lower + far(),
+        (None, None) => far(),
     }
 }
 

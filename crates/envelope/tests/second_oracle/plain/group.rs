@@ -40,7 +40,7 @@ impl Search<'_> {
                 return Ok(());
             }
         }
-        self.separate(world, group)?;
+        self.separate(world, &[], group)?;
         if self.found.is_some() {
             return Ok(());
         }
@@ -64,9 +64,10 @@ impl Search<'_> {
 
     /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only if
     /// the time of one is open.
-    fn separate(&mut self, world: &World, group: &[usize]) -> Step {
+    fn separate(&mut self, world: &World, unplaced: &[usize], group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
-            for &other in world.placed.iter().chain(&group[..position]) {
+            let others = world.placed.iter().chain(unplaced);
+            for &other in others.chain(&group[..position]) {
                 let footprint = |node: usize| self.footprint(node);
                 if !footprint(node).interferes_with(&footprint(other)) {
                     continue;
@@ -80,6 +81,12 @@ impl Search<'_> {
                 let missing = gap.minus(&Polynomial::constant(self.epsilon));
                 self.system.push();
                 self.assert(&missing, Relation::Below)?;
+                if unplaced.contains(&other) {
+                    // Neither is placed yet, so the other may as well come later.
+                    let opposite = Polynomial::difference(Symbol::Time(node), Symbol::Time(other));
+                    let missing = opposite.minus(&Polynomial::constant(self.epsilon));
+                    self.assert(&missing, Relation::Below)?;
+                }
                 if self.system.is_feasible() {
                     let (first, second) = (self.node(other), self.node(node));
                     self.report(format!("{first:?} and {second:?} too near"));
@@ -102,9 +109,7 @@ impl Search<'_> {
             if self.found.is_some() {
                 return Ok(());
             }
-            let mut others = world.clone();
-            others.placed.extend(&world.remaining[..position]);
-            self.separate(&others, &[node])?;
+            self.separate(world, &world.remaining[..position], &[node])?;
             self.mark_timed();
         }
         Ok(())

@@ -1,0 +1,121 @@
+//! Ctrl-C, and the line that shows how a search is getting on.
+#![cfg(target_os = "linux")]
+#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
+
+#[path = "../../elbowroom/tests/shared/rounds.rs"]
+mod rounds;
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// A search that goes on for long: many ends, each halved more than a thousand times.
+struct Long {
+    folder: PathBuf,
+}
+
+impl Long {
+    /// Writes the files of the search to a folder of that name.
+    fn new(name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let (problem, plan) = rounds::rounds(16);
+        let files = [
+            ("domain.pddl", rounds::DOMAIN),
+            ("problem.pddl", &problem),
+            ("rounds.plan", &plan),
+        ];
+        for (name, text) in files {
+            std::fs::write(folder.join(name), text).expect("a file");
+        }
+        Self { folder }
+    }
+
+    fn arguments(&self) -> Vec<String> {
+        let file = |name: &str| self.folder.join(name).display().to_string();
+        vec![
+            "envelope".to_owned(),
+            file("domain.pddl"),
+            file("problem.pddl"),
+            file("rounds.plan"),
+            "--precision".to_owned(),
+            "1e-400".to_owned(),
+        ]
+    }
+}
+
+/// Waits until a process catches SIGINT.
+fn wait_until_it_listens(child: &Child) {
+    let status = format!("/proc/{}/status", child.id());
+    loop {
+        let text = std::fs::read_to_string(&status).expect("the process is alive");
+        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        if caught.is_some_and(|mask| mask & 0b10 != 0) {
+            return;
+        }
+        sleep(Duration::from_millis(5));
+    }
+}
+
+fn interrupt(child: &Child) {
+    let killed = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("every Unix has `kill`");
+    assert!(killed.success());
+}
+
+#[test]
+fn ctrl_c_ends_the_search_with_the_best_box_so_far() {
+    let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .args(Long::new("interrupt").arguments())
+        .arg("--json")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command");
+    wait_until_it_listens(&child);
+    // Time for a box; however much it is, the answer is one of the two that Ctrl-C can have.
+    sleep(Duration::from_secs(1));
+    interrupt(&child);
+    let output = child.wait_with_output().expect("its output");
+    let document: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(document["stop"], "cancelled", "{document}");
+    let found = &document["parameters"][0]["upper"];
+    match output.status.code() {
+        Some(0) => assert!(!found.is_null(), "{document}"),
+        Some(3) => println!("interrupted before there was a box"),
+        other => panic!("exit code {other:?}: {document}"),
+    }
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+}
+
+/// In a terminal made by `script`, of util-linux; skipped where there is none.
+#[test]
+fn a_terminal_shows_how_the_search_is_getting_on() {
+    let version = Command::new("script").arg("--version").output();
+    if !version.is_ok_and(|output| output.stdout.starts_with(b"script from util-linux")) {
+        println!("skipped: there is no `script` of util-linux here");
+        return;
+    }
+    let quoted = |text: String| format!("'{text}'");
+    let arguments = Long::new("terminal").arguments().into_iter().map(quoted);
+    let command = [env!("CARGO_BIN_EXE_elbowroom").to_owned()]
+        .into_iter()
+        .chain(arguments)
+        .chain(["--time-limit".to_owned(), "2".to_owned()]);
+    let output = Command::new("script")
+        .args(["--quiet", "--return", "--command"])
+        .arg(command.collect::<Vec<_>>().join(" "))
+        .arg("/dev/null")
+        .env("TERM", "xterm")
+        .stdin(Stdio::null())
+        .output()
+        .expect("`script` runs");
+    let shown = String::from_utf8_lossy(&output.stdout);
+    assert!(shown.contains(" widenings"), "{shown}");
+    assert!(output.status.success(), "{shown}");
+}
