@@ -144,7 +144,7 @@ impl<'a> Stepper<'a> {
         });
         self.demand(state, &snap.condition, duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
-            self.demand_duration(state, action, false, &moment)?;
+            Self::demand_duration(state, action, false, &moment)?;
         }
         let mut flows = Vec::new();
         for flow in &action.flows {
@@ -193,7 +193,7 @@ impl<'a> Stepper<'a> {
         }
         let mut when = self.place(state, snap);
         let node = if open.end != SETTLED {
-            self.reach_foreseen_end(state, snap, &when, open.end)?;
+            Self::reach_foreseen_end(state, snap, &when, open.end)?;
             open.end
         } else if open.node == SETTLED {
             when.earliest = when.earliest.max(open.start + open.least);
@@ -224,7 +224,7 @@ impl<'a> Stepper<'a> {
         self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
             self.watch_all(state, &open, &moment)?;
-            self.demand_duration(state, action, true, &moment)?;
+            Self::demand_duration(state, action, true, &moment)?;
             for (fluent, _) in &open.flows {
                 self.watch(state, &[*fluent], &moment)?;
             }
@@ -242,7 +242,6 @@ impl<'a> Stepper<'a> {
 
     /// Lets an action end whose end has been in the network since its start.
     fn reach_foreseen_end(
-        &self,
         state: &mut State,
         snap: &Snap,
         place: &Place,
@@ -263,12 +262,11 @@ impl<'a> Stepper<'a> {
     fn note_end(&mut self, open: &Open, node: NodeId) {
         let scale = self.compiled.scale;
         let Some(log) = &mut self.log else { return };
-        let (least, most) = match &open.duration {
-            Some(duration) => (duration.clone(), Some(duration.clone())),
-            None => {
-                let most = (open.most < NEVER).then(|| scale.units(open.most));
-                (scale.units(open.least), most)
-            }
+        let (least, most) = if let Some(duration) = &open.duration {
+            (duration.clone(), Some(duration.clone()))
+        } else {
+            let most = (open.most < NEVER).then(|| scale.units(open.most));
+            (scale.units(open.least), most)
         };
         log.ends.push((node, open.node, least, most));
     }
@@ -297,7 +295,6 @@ impl<'a> Stepper<'a> {
 
     /// Demands the duration constraints that depend on the state.
     fn demand_duration(
-        &self,
         state: &mut State,
         action: &Action,
         at_end: bool,

@@ -90,13 +90,11 @@ pub(crate) fn plan_of(
         .unwrap_or(-NEVER);
     if state.earliest_end() < needed {
         let nodes = (0..state.network.node_count()).rev();
-        state.network = nodes
-            .filter_map(|node| {
-                let mut network = state.network.clone();
-                let node = NodeId::try_from(node).ok()?;
-                network.delay(node, needed).ok().map(|()| network)
-            })
-            .next()?;
+        state.network = nodes.into_iter().find_map(|node| {
+            let mut network = state.network.clone();
+            let node = NodeId::try_from(node).ok()?;
+            network.delay(node, needed).ok().map(|()| network)
+        })?;
     }
     let log = stepper.log.as_ref()?;
     let times = match &state.symbolic {

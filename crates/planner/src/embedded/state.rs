@@ -298,6 +298,6 @@ impl Outlook {
     }
 }
 
-fn at_most(these: &[Ticks], those: &[Ticks]) -> bool {
-    these.iter().zip(those).all(|(this, that)| this <= that)
+fn at_most(low: &[Ticks], high: &[Ticks]) -> bool {
+    low.iter().zip(high).all(|(a, b)| a <= b)
 }

@@ -39,11 +39,11 @@ pub(crate) fn compile(
     let mut builder = Builder::new(task);
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
-        builder.check(&running.action)?;
+        Builder::check(&running.action)?;
         builder.links_of(&running.action);
     }
     for action in &grounding.actions {
-        builder.check(action)?;
+        Builder::check(action)?;
         builder.links_of(action);
     }
     let scale = scale_of(task, grounding, situation, epsilon);
@@ -214,7 +214,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Refuses what cannot be searched.
-    fn check(&self, action: &ground::Action) -> Result<(), Unsupported> {
+    fn check(action: &ground::Action) -> Result<(), Unsupported> {
         let refuse = |feature: &str| {
             Err(Unsupported {
                 feature: feature.to_owned(),
@@ -454,6 +454,50 @@ impl<'a> Builder<'a> {
         }
     }
 
+    /// Says of each action how soon it should end.
+    fn settle_eagerness(&mut self) {
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.start != NONE && action.end != NONE {
+                let (start, end) = (
+                    &self.snaps[action.start as usize],
+                    &self.snaps[action.end as usize],
+                );
+                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                // What changes continuously is there to be read meanwhile.
+                if action.flows.is_empty() {
+                    self.actions[number].eagerness = eagerness(start, end, &offers);
+                }
+            }
+        }
+    }
+
+    /// Timed initials of one time, as far as anything reads them.
+    fn timed(&self, time: Ticks, changes: &[ModelChange], marks: Vec<u32>) -> Timed {
+        let mut timed = Timed {
+            time,
+            adds: Vec::new(),
+            deletes: Vec::new(),
+            assigns: Vec::new(),
+            marks,
+        };
+        for change in changes {
+            match change {
+                ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
+                ModelChange::Delete(fact) => timed.deletes.extend(self.symbols.known_fact(*fact)),
+                ModelChange::Update { fluent, value, .. } => {
+                    if let (Some(fluent), ground::Expression::Constant(value)) =
+                        (self.symbols.known_fluent(*fluent), value)
+                    {
+                        timed.assigns.push((fluent, value.clone()));
+                    }
+                }
+            }
+        }
+        timed
+    }
+
     fn finish(mut self, grounding: &Grounding, situation: &Situation, scale: Scale) -> Compiled {
         let goal = self.symbols.formula(&grounding.goal);
         let mut rules: Vec<Rule> = Vec::new();
@@ -492,21 +536,7 @@ impl<'a> Builder<'a> {
                 action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
             }
         }
-        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
-        for number in 0..self.actions.len() {
-            let action = &self.actions[number];
-            if action.start != NONE && action.end != NONE {
-                let (start, end) = (
-                    &self.snaps[action.start as usize],
-                    &self.snaps[action.end as usize],
-                );
-                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                // What changes continuously is there to be read meanwhile.
-                if action.flows.is_empty() {
-                    self.actions[number].eagerness = eagerness(start, end, &offers);
-                }
-            }
-        }
+        self.settle_eagerness();
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
         let mut goal_wishes = Wishes::default();
         goal_wishes.need_from_now_on(&goal_reads);
@@ -529,29 +559,7 @@ impl<'a> Builder<'a> {
             .map(|(happening, wishes)| {
                 let (time, exact) = scale.floor(&happening.time);
                 is_exact &= exact;
-                let mut timed = Timed {
-                    time,
-                    adds: Vec::new(),
-                    deletes: Vec::new(),
-                    assigns: Vec::new(),
-                    marks: stamps.marks(wishes),
-                };
-                for change in &happening.changes {
-                    match change {
-                        ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
-                        ModelChange::Delete(fact) => {
-                            timed.deletes.extend(self.symbols.known_fact(*fact));
-                        }
-                        ModelChange::Update { fluent, value, .. } => {
-                            if let (Some(fluent), ground::Expression::Constant(value)) =
-                                (self.symbols.known_fluent(*fluent), value)
-                            {
-                                timed.assigns.push((fluent, value.clone()));
-                            }
-                        }
-                    }
-                }
-                timed
+                self.timed(time, &happening.changes, stamps.marks(wishes))
             })
             .collect();
         let now = scale.floor(&situation.time);
