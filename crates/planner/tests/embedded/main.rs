@@ -1,5 +1,12 @@
 //! The embedded planner: what it handles, what it proves, and a slow twin.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::format_collect,
+    clippy::format_push_string,
+    reason = "the tests put texts together, and know what is in them"
+)]
+
 mod features;
 mod situations;
 mod twin;
