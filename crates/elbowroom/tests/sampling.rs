@@ -24,6 +24,7 @@ fn samples() -> usize {
 }
 
 /// Attacks these instances, less those that are not wanted, and says how many withstood.
+#[allow(clippy::print_stdout, reason = "says how many boxes were attacked")]
 fn attack_all(instances: &[Instance], least: usize) {
     let wanted = std::env::var("ELBOWROOM_INSTANCES").ok();
     let is_wanted = |instance: &&Instance| {

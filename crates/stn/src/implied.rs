@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 use crate::{ConsistentNetwork, ConstraintId, NodeId, Weight};
 
@@ -156,27 +157,27 @@ impl<W: Weight> Search<'_, W> {
             time(a).cmp(time(b)).then(a.cmp(&b))
         });
         let mut reach = Reach::new(group_count);
+        let mut outgoing = self.outgoing();
         for source in sources {
-            let mut edges: Vec<(usize, ConstraintId)> = Vec::new();
-            edges.extend(self.edges_out_of(source).map(|(id, target)| (target, id)));
-            edges.sort_unstable();
-            reach.look_for_detours(self, source, &edges);
-            for edges in edges.chunk_by_mut(|a, b| a.0 == b.0) {
-                self.thin_out(edges, reach.has_detour[edges[0].0]);
+            reach.look_for_detours(&outgoing, source, &self.can_go);
+            for edges in outgoing.of(source).chunk_by(|a, b| a.target == b.target) {
+                self.thin_out(edges, reach.has_detour[edges[0].target]);
             }
+            outgoing.drop_gone(source, &self.is_gone);
         }
     }
 
     /// Of the edges between two groups, keeps the oldest shortest one if there is no detour.
-    fn thin_out(&mut self, edges: &mut [(usize, ConstraintId)], has_detour: bool) {
+    fn thin_out(&mut self, edges: &[Edge<W>], has_detour: bool) {
         // What cannot go counts as older than the rest: it makes the others superfluous.
-        edges.sort_unstable_by_key(|&(_, id)| (self.can_go[id.index()], id));
-        let ids = || edges.iter().map(|&(_, id)| id);
-        let shortest = ids().min_by_key(|id| &self.slack[id.index()]);
-        let needed = shortest.filter(|_| !has_detour);
-        for id in ids() {
-            if self.can_go[id.index()] && Some(id) != needed {
-                self.is_gone[id.index()] = true;
+        let age = |edge: &Edge<W>| (self.can_go[edge.id.index()], edge.id);
+        let shortest = edges
+            .iter()
+            .min_by(|a, b| a.length.cmp(&b.length).then_with(|| age(a).cmp(&age(b))));
+        let needed = shortest.map(|edge| edge.id).filter(|_| !has_detour);
+        for edge in edges {
+            if self.can_go[edge.id.index()] && Some(edge.id) != needed {
+                self.is_gone[edge.id.index()] = true;
             }
         }
     }
@@ -185,15 +186,59 @@ impl<W: Weight> Search<'_, W> {
         self.rigid.group_of[node.index()]
     }
 
-    /// The remaining edges that leave a group, each with the group it leads to.
-    fn edges_out_of(&self, group: usize) -> impl Iterator<Item = (ConstraintId, usize)> {
+    /// The edges between groups.
+    fn outgoing(&self) -> Outgoing<W> {
         let network = self.network.network();
-        let members = self.rigid.groups[group].iter();
-        members
-            .flat_map(|&node| network.leaving(node))
-            .filter(|id| !self.is_gone[id.index()])
-            .map(|id| (id, self.group(network.constraint(id).to)))
-            .filter(move |&(_, target)| target != group)
+        let mut edges = Vec::new();
+        let mut ranges = Vec::with_capacity(self.rigid.groups.len());
+        for (group, members) in self.rigid.groups.iter().enumerate() {
+            let first = edges.len();
+            for id in members.iter().flat_map(|&node| network.leaving(node)) {
+                let target = self.group(network.constraint(id).to);
+                if target != group {
+                    edges.push(Edge {
+                        target,
+                        length: self.slack[id.index()].clone(),
+                        id,
+                    });
+                }
+            }
+            edges[first..].sort_unstable_by_key(|edge| (edge.target, edge.id));
+            ranges.push(first..edges.len());
+        }
+        Outgoing { edges, ranges }
+    }
+}
+
+/// The edges between groups that have not been left out, side by side by the group they leave and
+/// then by the one they lead to: most of the work is to walk along them.
+struct Outgoing<W> {
+    edges: Vec<Edge<W>>,
+    ranges: Vec<Range<usize>>,
+}
+
+struct Edge<W> {
+    target: usize,
+    length: W,
+    id: ConstraintId,
+}
+
+impl<W> Outgoing<W> {
+    fn of(&self, group: usize) -> &[Edge<W>] {
+        &self.edges[self.ranges[group].clone()]
+    }
+
+    /// Forgets the edges of a group that have been left out.
+    fn drop_gone(&mut self, group: usize, is_gone: &[bool]) {
+        let range = &mut self.ranges[group];
+        let mut end = range.start;
+        for place in range.clone() {
+            if !is_gone[self.edges[place].id.index()] {
+                self.edges.swap(end, place);
+                end += 1;
+            }
+        }
+        range.end = end;
     }
 }
 
@@ -221,24 +266,20 @@ impl<W: Weight> Reach<W> {
 
     /// Dijkstra's algorithm from `source`, as far as needed to know which of its edges have a
     /// detour.
-    fn look_for_detours(
-        &mut self,
-        search: &Search<'_, W>,
-        source: usize,
-        edges: &[(usize, ConstraintId)],
-    ) {
+    fn look_for_detours(&mut self, outgoing: &Outgoing<W>, source: usize, can_go: &[bool]) {
         self.clear();
         self.is_final[source] = true;
         self.touched.push(source);
         let mut open: Vec<(W, usize)> = Vec::new();
-        for edges in edges.chunk_by(|a, b| a.0 == b.0) {
-            let target = edges[0].0;
-            let lengths = edges.iter().map(|(_, id)| &search.slack[id.index()]);
+        let edges = outgoing.of(source);
+        for edges in edges.chunk_by(|a, b| a.target == b.target) {
+            let target = edges[0].target;
+            let lengths = edges.iter().map(|edge| &edge.length);
             let Some(shortest) = lengths.min() else {
                 continue;
             };
             self.reach(target, shortest.clone());
-            if edges.iter().any(|(_, id)| search.can_go[id.index()]) {
+            if edges.iter().any(|edge| can_go[edge.id.index()]) {
                 open.push((shortest.clone(), target));
             }
         }
@@ -257,8 +298,9 @@ impl<W: Weight> Reach<W> {
             if std::mem::replace(&mut self.is_final[group], true) {
                 continue;
             }
-            for (id, target) in search.edges_out_of(group) {
-                let longer = length.plus(&search.slack[id.index()]);
+            for edge in outgoing.of(group) {
+                let target = edge.target;
+                let longer = length.plus(&edge.length);
                 if target == source || longer > *limit {
                     continue;
                 }

@@ -105,6 +105,10 @@ impl<'a> Search<'a> {
     }
 
     pub(super) fn report(&mut self, what: String) {
+        // The last check may have been about something narrower that was not feasible.
+        if !self.system.is_feasible() {
+            return;
+        }
         let (valuation, schedule) = self.system.model();
         self.found = Some(Break {
             what,
