@@ -1,0 +1,134 @@
+//! World files: what they may say, and where their mistakes are.
+
+use elbowroom_model::Problem;
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_sim::WorldModel;
+
+fn problem() -> Problem {
+    let domain = "(define (domain post) (:requirements :typing :durative-actions :fluents)
+        (:types place) (:predicates (at ?p - place)) (:functions (charge))
+        (:durative-action go :parameters (?p - place) :duration (= ?duration 5)
+          :condition () :effect (and (at end (at ?p)) (at end (decrease (charge) 2)))))";
+    let problem = "(define (problem p) (:domain post) (:objects a b - place)
+        (:init (= (charge) 9)) (:goal (at b)))";
+    let read = read_problem(
+        &Source::new("domain", domain),
+        &Source::new("problem", problem),
+    );
+    read.expect("a correct problem").0
+}
+
+/// The mistake in a file whose third line and those after it are `sections`.
+fn mistake(sections: &str) -> (usize, String) {
+    let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
+    let error = WorldModel::read(&text, &problem()).expect_err(sections);
+    (error.line, error.message)
+}
+
+#[test]
+fn every_mistake_has_its_line_and_says_what_to_do() {
+    let cases = [
+        (
+            "[[duration]]\naction = \"fly\"\nconstant = 1\n",
+            4,
+            "it has go",
+        ),
+        (
+            "[[duration]]\naction = \"(go c)\"\nconstant = 1\n",
+            4,
+            "no object `c`",
+        ),
+        (
+            "[[duration]]\naction = \"(go a b)\"\nconstant = 1\n",
+            4,
+            "takes 1 arguments",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\n",
+            3,
+            "how it is distributed",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nvalues = [1]\n",
+            5,
+            "one distribution",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nnormal = { mean = 1 }\n",
+            5,
+            "`deviation`",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nnormal = { mean = 1, deviation = -1 }\n",
+            5,
+            "negative",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nuniform = { from = 3, to = 1 }\n",
+            5,
+            "`from`",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nvalues = []\n",
+            5,
+            "at least one",
+        ),
+        ("[[duration]]\naction = \"go\"\nvaleus = [1]\n", 5, "valeus"),
+        ("[[duration]]\nconstant = 1\n", 3, "`action` is missing"),
+        (
+            "[[amount]]\naction = \"go\"\nconstant = 1\n",
+            3,
+            "`fluent` is missing",
+        ),
+        (
+            "[[failure]]\naction = \"go\"\nprobability = 2\n",
+            5,
+            "between 0 and 1",
+        ),
+        (
+            "[[failure]]\naction = \"go\"\nprobability = 1\nwhen = \"never\"\n",
+            6,
+            "midway",
+        ),
+        (
+            "[[event]]\nfact = \"(at _)\"\nbecomes = true\nconstant = 1\n",
+            4,
+            "one fact",
+        ),
+        (
+            "[[event]]\nfact = \"(at a)\"\nbecomes = 3\nconstant = 1\n",
+            3,
+            "true or false",
+        ),
+        ("resolution = 0.0\n", 3, "greater than 0"),
+        ("[reports]\nlost = 1.5\n", 4, "between 0 and 1"),
+    ];
+    for (sections, line, words) in cases {
+        let (found, message) = mistake(sections);
+        assert_eq!(found, line, "{sections}: {message}");
+        assert!(message.contains(words), "{sections}: {message}");
+    }
+}
+
+#[test]
+fn a_file_of_another_kind_or_version_is_refused() {
+    for text in [
+        "",
+        "format = \"elbowroom-world\"\nversion = 2\n",
+        "format = \"x\"\nversion = 1\n",
+    ] {
+        assert!(WorldModel::read(text, &problem()).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn of_several_rules_the_last_that_matches_counts() {
+    let text = "format = \"elbowroom-world\"\nversion = 1\n\
+        [[duration]]\naction = \"*\"\nconstant = 2\nrelative = true\n\
+        [[duration]]\naction = \"(GO b)\"\nconstant = 7\n";
+    let model = WorldModel::read(text, &problem()).expect("a correct file");
+    let mut rng = elbowroom_sim::draw::keyed(0, "", 0, elbowroom_sim::Purpose::Duration);
+    let planned = 5.into();
+    assert_eq!(model.duration("(go a)", &planned, &mut rng), 10.into());
+    assert_eq!(model.duration("(go b)", &planned, &mut rng), 7.into());
+}
