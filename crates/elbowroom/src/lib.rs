@@ -55,6 +55,7 @@ mod explain;
 pub mod flow;
 pub mod graph;
 mod makespan;
+pub mod perturbed;
 mod plan_file;
 
 pub use box_text::{BoxTextError, parse_box, write_box};

@@ -9,6 +9,7 @@
 //! - [`run::run`]: the loop of deciding, waiting, taking in what was observed, and replanning.
 //! - [`Progression`]: a state that follows what happens.
 //! - [`Recorder`]: takes the record of a run.
+//! - [`untimed`]: the same where there is no time, as in the experiments of paper 2.
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
 //! [`Planner`], [`Preparer`] and [`Region`] (what a plan survives). It does not know who stands
@@ -38,6 +39,7 @@ mod quantities;
 mod reason;
 mod record;
 pub mod run;
+pub mod untimed;
 mod world;
 
 pub use event::{Command, Ending, Event, Measured, Observation, Ticket};

@@ -202,6 +202,26 @@ impl OrderSearch {
         })
     }
 
+    /// A sequence of one's own as an order, with its layers and probabilities.
+    ///
+    /// It need not be one that the search would find. Where there is no time for it, it has no
+    /// slots.
+    ///
+    /// # Errors
+    /// When a condition couples too many uncertain facts.
+    pub fn order_of(
+        &self,
+        circumstances: &Circumstances,
+        sequence: &[NodeId],
+    ) -> Result<TotalOrderPlan, TooCoupled> {
+        let mut network = PrunedNetwork::new(&self.model, circumstances)?;
+        for &node in sequence {
+            network.push(node)?;
+        }
+        let probability = network.success_probability()?;
+        self.order(circumstances, sequence, probability)
+    }
+
     /// The order with its layers and its times.
     fn order(
         &self,

@@ -23,6 +23,10 @@ pub enum Purpose {
     Report = 5,
     /// By how much an action changes a fluent; the fluent is part of the instance.
     Amount = 6,
+    /// Whether effects of actions take place.
+    Effect = 7,
+    /// What changes by itself from one step to the next.
+    Change = 8,
 }
 
 /// A source of random numbers that depends on these four and on nothing else.

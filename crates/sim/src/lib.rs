@@ -8,6 +8,7 @@
 //! - [`SimWorld`]: one trajectory of it. It is PDDL that happens: conditions are read in the true
 //!   state, and an action whose conditions do not hold fails.
 //! - [`Unreliable`]: loses, repeats, delays and contradicts the reports of another world.
+//! - [`perturbed`]: worlds without time in which anything can fail (paper 2).
 //!
 //! Randomness is keyed ([`draw`]): the duration of the second time that `(pick rover box)` starts
 //! depends on the seed, on `(pick rover box)` and on 2, and on nothing else. Two executors that
@@ -35,6 +36,7 @@
 pub mod draw;
 mod model;
 mod pattern;
+pub mod perturbed;
 mod sim;
 mod unreliable;
 

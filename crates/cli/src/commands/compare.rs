@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use elbowroom::compare::{self, Experiment, Part, Results};
+use elbowroom::perturbed::{self, PerturbedExperiment};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::CompareArgs;
@@ -26,6 +27,9 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
         fs::read_to_string(&path)
             .map_err(|error| format!("cannot read {}: {}", path.display(), output::plain(&error)))
     };
+    if PerturbedExperiment::is_one(text.text()) {
+        return perturbed(arguments, &name, text.text(), &file);
+    }
     let experiment = Experiment::read(text.text(), &file)
         .map_err(|error| Failure::new(format!("{name}, {error}"), ""))?;
     let results = if arguments.merge.is_empty() {
@@ -41,6 +45,35 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     } else {
         output::print(&results.table(&experiment).plain())?;
     }
+    Ok(Exit::Yes)
+}
+
+/// An experiment in worlds without time.
+fn perturbed(
+    arguments: &CompareArgs,
+    name: &str,
+    text: &str,
+    file: &dyn Fn(&str) -> Result<String, String>,
+) -> Answer {
+    if arguments.json || arguments.shard.is_some() || !arguments.merge.is_empty() {
+        return Err(Failure::new(
+            "experiments in perturbed worlds are not split, and are written as tables only",
+            "leave out --json, --shard and --merge; with -o they are written as CSV, too",
+        ));
+    }
+    let wrong = |error| Failure::new(format!("{name}: {error}"), "");
+    let experiment = PerturbedExperiment::read(text, file).map_err(wrong)?;
+    let interrupt = Interrupt::listen();
+    let go_on = || !interrupt.is_requested();
+    let trials = arguments.trials.unwrap_or(experiment.trials);
+    let rows = perturbed::run(&experiment, trials, arguments.jobs, &go_on).map_err(wrong)?;
+    let table = perturbed::table(&experiment, &rows);
+    if let Some(folder) = &arguments.output {
+        make_folder(folder)?;
+        output::write_file(&folder.join("table.md"), &table.markdown())?;
+        output::write_file(&folder.join("table.csv"), &table.csv())?;
+    }
+    output::print(&table.plain())?;
     Ok(Exit::Yes)
 }
 
@@ -89,6 +122,17 @@ fn merged(paths: &[PathBuf]) -> Result<Results, Failure> {
 }
 
 fn write(folder: &Path, experiment: &Experiment, results: &Results) -> Result<(), Failure> {
+    make_folder(folder)?;
+    let table = results.table(experiment);
+    output::write_file(
+        &folder.join("results.json"),
+        &format!("{:#}\n", results.json()),
+    )?;
+    output::write_file(&folder.join("table.md"), &table.markdown())?;
+    output::write_file(&folder.join("table.csv"), &table.csv())
+}
+
+fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| {
         Failure::new(
             format!(
@@ -98,12 +142,5 @@ fn write(folder: &Path, experiment: &Experiment, results: &Results) -> Result<()
             ),
             "",
         )
-    })?;
-    let table = results.table(experiment);
-    output::write_file(
-        &folder.join("results.json"),
-        &format!("{:#}\n", results.json()),
-    )?;
-    output::write_file(&folder.join("table.md"), &table.markdown())?;
-    output::write_file(&folder.join("table.csv"), &table.csv())
+    })
 }

@@ -1,0 +1,169 @@
+//! Comparing executors in perturbed worlds: the experiments of paper 2.
+//!
+//! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
+//! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a trial
+//! depend on the experiment's seed and the trial's number only, so results do not depend on how many
+//! trials run at once.
+
+mod experiment;
+mod results;
+
+use std::sync::Arc;
+
+use elbowroom_execution::untimed::{
+    Adaptable, AsPublished, Esterel, Foresighted, Limits, Shortest, UntimedExecutor, UntimedWorld,
+    all_actions, trial,
+};
+use elbowroom_model::Task;
+use elbowroom_model::ground::Action;
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_probability::{Likelihoods, Semantics};
+use elbowroom_sim::perturbed::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
+use rayon::prelude::*;
+
+pub use experiment::{Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind};
+pub use results::{Row, table};
+
+/// One case, ready to be run.
+struct Setting<'e> {
+    experiment: &'e PerturbedExperiment,
+    case: &'e Case,
+    task: Arc<Task>,
+    actions: Vec<Action>,
+    likelihoods: Arc<Likelihoods>,
+    chances: Chances,
+    perturbed: Option<PerturbedFacts>,
+}
+
+/// Makes `trials` trials of each case, in each world, with each executor; on `jobs` threads, 0: as
+/// many as there are processors. `observe` is told of each row that is done, and says whether to go
+/// on.
+///
+/// # Errors
+/// When the problem or likelihoods cannot be read, or are of a kind that there is no world for.
+pub fn run(
+    experiment: &PerturbedExperiment,
+    trials: u64,
+    jobs: usize,
+    observe: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Row>, PerturbedError> {
+    let cases = experiment.cases.iter();
+    let settings: Vec<Setting<'_>> = cases
+        .map(|case| Setting::new(experiment, case))
+        .collect::<Result<_, _>>()?;
+    let rows: Vec<_> = settings
+        .iter()
+        .flat_map(|setting| {
+            let worlds = experiment.worlds.iter();
+            worlds.flat_map(move |world| {
+                let executors = experiment.executors.iter();
+                executors.map(move |executor| (setting, *world, *executor))
+            })
+        })
+        .collect();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .build()
+        .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
+    pool.install(|| {
+        rows.par_iter()
+            .map(|(setting, world, executor)| setting.row(*world, *executor, trials, observe))
+            .collect()
+    })
+}
+
+impl<'e> Setting<'e> {
+    fn new(experiment: &'e PerturbedExperiment, case: &'e Case) -> Result<Self, PerturbedError> {
+        let domain = Source::new("domain", experiment.domain.as_str());
+        let problem = Source::new("problem", experiment.problem.as_str());
+        let (problem, _) = read_problem(&domain, &problem)
+            .map_err(|diagnostics| PerturbedError::other(diagnostics.render(false)))?;
+        let mut task = Task::new(problem);
+        let wrong = |error: &dyn std::fmt::Display| {
+            PerturbedError::other(format!("{}: {error}", case.name))
+        };
+        let actions = all_actions(&mut task).map_err(|error| wrong(&error))?;
+        let likelihoods = elbowroom_probability::likelihoods::read(case.likelihoods.as_bytes(), &task)
+            .map_err(|error| wrong(&error))?;
+        let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
+        let perturbed = match &experiment.perturbation {
+            Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
+            None => None,
+        };
+        Ok(Self {
+            experiment,
+            case,
+            task: Arc::new(task),
+            actions,
+            likelihoods: Arc::new(likelihoods),
+            chances,
+            perturbed,
+        })
+    }
+
+    fn foresighted(&self) -> Result<Foresighted, PerturbedError> {
+        let settings = elbowroom_probability::optimum::Settings {
+            most_running: self.experiment.most_running,
+            ..Default::default()
+        };
+        Foresighted::new(&self.task, self.actions.clone(), &self.likelihoods, settings)
+            .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
+    }
+
+    fn row(
+        &self,
+        world: WorldKind,
+        kind: ExecutorKind,
+        trials: u64,
+        observe: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Row, PerturbedError> {
+        let (task, likelihoods) = (&self.task, &self.likelihoods);
+        let mut optimum = None;
+        let mut executor: Box<dyn UntimedExecutor> = match kind {
+            ExecutorKind::Esterel => Box::new(Esterel::new(Arc::clone(task))),
+            ExecutorKind::Adaptable => Box::new(Adaptable::new(
+                Arc::clone(task),
+                Arc::clone(likelihoods),
+                Semantics::Paper,
+            )),
+            ExecutorKind::AsPublished => Box::new(AsPublished::new(
+                Arc::clone(task),
+                Arc::clone(likelihoods),
+            )),
+            ExecutorKind::Lookahead => {
+                let foresighted = self.foresighted()?;
+                // The table is of the sound world; elsewhere it promises nothing.
+                optimum = (world == WorldKind::Sound).then(|| foresighted.value());
+                Box::new(foresighted)
+            }
+        };
+        let mut planner = Shortest::new(Arc::clone(task), self.actions.clone());
+        let limits = Limits {
+            rounds: self.experiment.rounds,
+            ..Limits::default()
+        };
+        let mut row = Row::new(self.case, world, kind, optimum);
+        for number in 0..trials {
+            let seed = self.experiment.seed.wrapping_mul(1_000_003).wrapping_add(number);
+            let mut sound;
+            let mut published;
+            let world: &mut dyn UntimedWorld = match (world, &self.perturbed) {
+                (WorldKind::AsPublished, Some(perturbed)) => {
+                    published = PublishedWorld::new(&self.chances, perturbed, seed);
+                    &mut published
+                }
+                _ => {
+                    sound = SoundWorld::new(&self.chances, task.initial(), seed);
+                    &mut sound
+                }
+            };
+            let mut plans = |state: &_| planner.plan(state);
+            row.add(trial(task, world, &mut plans, &mut *executor, limits));
+        }
+        if observe() {
+            Ok(row)
+        } else {
+            Err(PerturbedError::other("interrupted"))
+        }
+    }
+}

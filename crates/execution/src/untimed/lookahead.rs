@@ -1,0 +1,76 @@
+//! The executor that knows the world: [`Foresighted`].
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::Action;
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_plan::{InstanceId, PartialOrderPlan};
+use elbowroom_probability::likelihoods::Missing;
+use elbowroom_probability::optimum::{Move, NotSmall, Optimum, Perturbed, Settings};
+use elbowroom_probability::{Likelihoods, Model, Semantics};
+
+use super::adaptable::{circumstances, perform};
+use super::{Stage, UntimedExecutor};
+
+/// Does what is best in the world of the likelihoods, whatever the plan says: what
+/// [`Lookahead`](elbowroom_probability::Lookahead) does with a plan of everything that can be done.
+#[derive(Clone, Debug)]
+pub struct Foresighted {
+    process: Perturbed,
+    optimum: Optimum,
+}
+
+/// The world cannot be tabulated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoForesight {
+    /// Likelihoods are missing.
+    #[error(transparent)]
+    Missing(#[from] Missing),
+    /// The world is too large, or of another kind.
+    #[error(transparent)]
+    NotSmall(#[from] NotSmall),
+}
+
+impl Foresighted {
+    /// Tabulates the world.
+    ///
+    /// # Errors
+    /// When likelihoods are missing, or the world is too large.
+    pub fn new(
+        task: &Arc<Task>,
+        actions: Vec<Action>,
+        likelihoods: &Likelihoods,
+        settings: Settings,
+    ) -> Result<Self, NoForesight> {
+        let plan = PartialOrderPlan::unordered(task, actions);
+        let model = Model::new(Arc::clone(task), plan, likelihoods, Semantics::World)?;
+        let process = Perturbed::new(model, settings)?;
+        let optimum = process.optimum();
+        Ok(Self { process, optimum })
+    }
+
+    /// The best success probability that any executor can have from the beginning.
+    pub fn value(&self) -> f64 {
+        let initial = self.process.model().task().initial();
+        self.optimum.value(&self.process, &circumstances(initial, &[]))
+    }
+}
+
+impl UntimedExecutor for Foresighted {
+    fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+        let model = Arc::clone(self.process.model());
+        let mut running: Vec<InstanceId> = Vec::new();
+        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+            let now = circumstances(stage.state(), &running);
+            match self.optimum.choose(&self.process, &now) {
+                Move::Do(node) => {
+                    if !perform(&model, node, &mut running, stage) {
+                        return;
+                    }
+                }
+                Move::Abandon(id) => running.retain(|&other| other != id),
+                Move::Stop => return,
+            }
+        }
+    }
+}

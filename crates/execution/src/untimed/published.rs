@@ -1,0 +1,200 @@
+//! Olisipo as it was when the paper's table was made: [`AsPublished`].
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use elbowroom_model::ground::FactId;
+use elbowroom_model::{State, Task, TimeTriggeredPlan};
+use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_probability::{
+    Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics, TotalOrderPlan,
+};
+
+use super::adaptable::{circumstances, model, perform};
+use super::{Stage, UntimedExecutor, apply, holds, start_of};
+
+/// The published program, with the faults that its results depend on:
+///
+/// - the search returns the *last* order found, not the best;
+/// - the belief is never brought up to date, so that no later search finds anything: there is one
+///   order in each trial;
+/// - where a layer fits and something is under way, it ends, whatever the layer; so one action is
+///   executed after the other. Only layers before a start count otherwise.
+///
+/// One thing differs. When the order did not fit any more, the program went on in the rounds left
+/// with the old order applied to the happenings of new plans. As that never led to the goal, it
+/// is not done here.
+#[derive(Clone, Debug)]
+pub struct AsPublished {
+    task: Arc<Task>,
+    likelihoods: Arc<Likelihoods>,
+    found: Vec<(Arc<TimeTriggeredPlan>, Option<Found>)>,
+    /// Whether this trial's order has been given up.
+    is_given_up: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Found {
+    model: Arc<Model>,
+    sequence: Vec<NodeId>,
+    /// Facts that must be true; negative conditions were mistaken for positive ones.
+    layers: Vec<BTreeSet<FactId>>,
+}
+
+impl AsPublished {
+    /// For plans of this task, in a world of these likelihoods.
+    pub fn new(task: Arc<Task>, likelihoods: Arc<Likelihoods>) -> Self {
+        Self {
+            task,
+            likelihoods,
+            found: Vec::new(),
+            is_given_up: false,
+        }
+    }
+
+    fn order(&mut self, plan: &Arc<TimeTriggeredPlan>, state: &State) -> usize {
+        let known = self.found.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
+        known.unwrap_or_else(|| {
+            let model = model(&self.task, plan, state, &self.likelihoods, Semantics::Paper);
+            let found = model.and_then(|model| last_order(Arc::new(model), state));
+            self.found.push((Arc::clone(plan), found));
+            self.found.len() - 1
+        })
+    }
+}
+
+impl UntimedExecutor for AsPublished {
+    fn begin(&mut self) {
+        self.is_given_up = false;
+    }
+
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+        if self.is_given_up {
+            return;
+        }
+        self.is_given_up = true;
+        let index = self.order(plan, stage.state());
+        let Some(found) = &self.found[index].1 else {
+            return;
+        };
+        let mut running = Vec::new();
+        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+            let Some(next) = found.next(stage.state(), &running) else {
+                return;
+            };
+            if !perform(&found.model, next, &mut running, stage) {
+                return;
+            }
+        }
+    }
+}
+
+impl Found {
+    fn next(&self, state: &State, running: &[InstanceId]) -> Option<NodeId> {
+        let nodes = &self.model.plan().nodes;
+        let fits = |layer: &BTreeSet<FactId>| layer.is_subset(&state.facts);
+        let mut fitting = (0..self.layers.len()).rev().filter(|&i| fits(&self.layers[i]));
+        if let Some(first) = running.first() {
+            fitting.next()?;
+            let end = nodes.iter().position(|node| *node == Node::End(*first));
+            return end.map(NodeId::from);
+        }
+        let is_start = |node: &NodeId| {
+            matches!(nodes[node.index()], Node::Start(_) | Node::Instant(_))
+        };
+        fitting.find_map(|i| self.sequence.get(i).copied().filter(is_start))
+    }
+}
+
+/// The last order that the published search finds.
+fn last_order(model: Arc<Model>, state: &State) -> Option<Found> {
+    let mut search = LastOrder {
+        orders: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
+        network: PrunedNetwork::new(&model, &circumstances(state, &[])).ok()?,
+        initial: state,
+        last: None,
+        last_probability: 0.0,
+    };
+    search.explore(state);
+    let sequence = search.last.take()?;
+    let layers = layers(&model, state, &sequence)?;
+    let positive = |order: TotalOrderPlan| {
+        let facts = |layer: &elbowroom_probability::Layer| {
+            layer.literals.iter().map(|(fact, _)| *fact).collect()
+        };
+        order.layers.iter().map(facts).collect()
+    };
+    Some(Found {
+        layers: positive(layers),
+        model,
+        sequence,
+    })
+}
+
+fn layers(model: &Arc<Model>, state: &State, sequence: &[NodeId]) -> Option<TotalOrderPlan> {
+    OrderSearch::new(Arc::clone(model), SearchSettings::default())
+        .order_of(&circumstances(state, &[]), sequence)
+        .ok()
+}
+
+/// Depth first, happenings in the order of the plan; the published cut and no other.
+struct LastOrder<'m> {
+    orders: OrderSearch,
+    network: PrunedNetwork<'m>,
+    initial: &'m State,
+    last: Option<Vec<NodeId>>,
+    last_probability: f64,
+}
+
+impl LastOrder<'_> {
+    fn explore(&mut self, state: &State) {
+        let sequence = self.network.sequence().to_vec();
+        let now = circumstances(self.initial, &[]);
+        if self.orders.windows(&now, &sequence).is_none() {
+            return;
+        }
+        let model = Arc::clone(self.orders.model());
+        if holds(model.task().goal(), state) {
+            self.last_probability = self.network.success_probability().unwrap_or(0.0);
+            self.last = Some(sequence);
+            return;
+        }
+        for (index, node) in model.plan().nodes.iter().enumerate() {
+            let id = NodeId::from(index);
+            if sequence.contains(&id) {
+                continue;
+            }
+            let mut after = state.clone();
+            let can_be = match *node {
+                Node::Start(instance) | Node::Instant(instance) => {
+                    let action = &model.plan().instance(instance).action;
+                    apply(start_of(action), &mut after);
+                    let over_all = action.durative().map(|body| &body.over_all);
+                    holds(&start_of(action).condition, state)
+                        && over_all.is_none_or(|condition| holds(condition, state))
+                }
+                Node::End(instance) => {
+                    let action = &model.plan().instance(instance).action;
+                    let has_started = sequence
+                        .iter()
+                        .any(|node| model.plan().nodes[node.index()] == Node::Start(instance));
+                    has_started
+                        && action.durative().is_some_and(|body| {
+                            apply(&body.end, &mut after);
+                            holds(&body.end.condition, state)
+                        })
+                }
+                Node::Zero | Node::Timed(_) => false,
+            };
+            if !can_be {
+                continue;
+            }
+            if let Ok(probability) = self.network.push(id) {
+                if probability > self.last_probability {
+                    self.explore(&after);
+                }
+                self.network.pop();
+            }
+        }
+    }
+}

@@ -1,0 +1,8 @@
+; What is listed first is perturbed first where worlds are as published.
+(define (problem three-machines-one-robot)
+  (:domain advanced-factory-robot)
+  (:objects m1 m2 m3 - machine)
+  (:init (robot_at m1)
+    (machine_is_working m1) (machine_is_working m2) (machine_is_working m3))
+  (:goal (and
+    (machine_is_maintained m1) (machine_is_maintained m2) (machine_is_maintained m3))))
