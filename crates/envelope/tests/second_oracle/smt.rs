@@ -93,12 +93,11 @@ pub(crate) fn contained(
     }
     let places = Places::within(plan, envelope)?;
     let mut encoder = Encoder::new(task, plan, epsilon, &places);
-    let (lives, violations) = match encoder.causes(envelope) {
-        Ok(lives) => (lives, encoder.violations),
-        Err(NotEncoded) => {
-            let encoding = Encoding::new(task, plan, epsilon, &places).ok()?;
-            (encoding.lives(envelope), encoding.violations)
-        }
+    let (lives, violations) = if let Ok(lives) = encoder.causes(envelope) {
+        (lives, encoder.violations)
+    } else {
+        let encoding = Encoding::new(task, plan, epsilon, &places).ok()?;
+        (encoding.lives(envelope), encoding.violations)
     };
     let mut ask = |violation: &str| match solver.ask(&format!("{lives}(assert {violation})\n")) {
         Found::Model => Some(false),

@@ -104,12 +104,11 @@ impl Encoder<'_> {
 
     /// The truth that a time point gives to a fact, if any. Additions come after deletions.
     fn sets(&self, node: usize, fact: FactId) -> Option<bool> {
-        let changes: Vec<&Change> = match self.node(node) {
-            Node::Timed(group) => self.task.timed()[group].changes.iter().collect(),
-            _ => {
-                let snap = self.snap(node)?;
-                snap.effects.iter().map(|effect| &effect.change).collect()
-            }
+        let changes: Vec<&Change> = if let Node::Timed(group) = self.node(node) {
+            self.task.timed()[group].changes.iter().collect()
+        } else {
+            let snap = self.snap(node)?;
+            snap.effects.iter().map(|effect| &effect.change).collect()
         };
         if changes.contains(&&Change::Add(fact)) {
             Some(true)
