@@ -2,7 +2,7 @@
 //!
 //! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
 //! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a trial
-//! depend on the experiment's seed and the trial's number only, so results do not depend on how many
+//! depend on the experiment's seed, the case and the trial's number only, so results do not depend on how many
 //! trials run at once.
 
 mod experiment;
@@ -28,6 +28,8 @@ pub use results::{Row, table};
 struct Setting<'e> {
     experiment: &'e PerturbedExperiment,
     case: &'e Case,
+    /// Cases have dice of their own.
+    number: u64,
     task: Arc<Task>,
     actions: Vec<Action>,
     likelihoods: Arc<Likelihoods>,
@@ -47,9 +49,9 @@ pub fn run(
     jobs: usize,
     observe: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Row>, PerturbedError> {
-    let cases = experiment.cases.iter();
+    let cases = (0..).zip(&experiment.cases);
     let settings: Vec<Setting<'_>> = cases
-        .map(|case| Setting::new(experiment, case))
+        .map(|(number, case)| Setting::new(experiment, case, number))
         .collect::<Result<_, _>>()?;
     let rows: Vec<_> = settings
         .iter()
@@ -73,7 +75,11 @@ pub fn run(
 }
 
 impl<'e> Setting<'e> {
-    fn new(experiment: &'e PerturbedExperiment, case: &'e Case) -> Result<Self, PerturbedError> {
+    fn new(
+        experiment: &'e PerturbedExperiment,
+        case: &'e Case,
+        number: u64,
+    ) -> Result<Self, PerturbedError> {
         let domain = Source::new("domain", experiment.domain.as_str());
         let problem = Source::new("problem", experiment.problem.as_str());
         let (problem, _) = read_problem(&domain, &problem)
@@ -93,6 +99,7 @@ impl<'e> Setting<'e> {
         Ok(Self {
             experiment,
             case,
+            number,
             task: Arc::new(task),
             actions,
             likelihoods: Arc::new(likelihoods),
@@ -143,8 +150,10 @@ impl<'e> Setting<'e> {
             ..Limits::default()
         };
         let mut row = Row::new(self.case, world, kind, optimum);
+        let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
+            .wrapping_add(self.number.wrapping_mul(1_000_000_007));
         for number in 0..trials {
-            let seed = self.experiment.seed.wrapping_mul(1_000_003).wrapping_add(number);
+            let seed = first_seed.wrapping_add(number);
             let mut sound;
             let mut published;
             let world: &mut dyn UntimedWorld = match (world, &self.perturbed) {

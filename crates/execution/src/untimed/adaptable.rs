@@ -160,7 +160,17 @@ impl Prepared {
         // A condition that couples too many facts: as if there were no order.
         let found = self.search.best_order(now, &mut patient).ok();
         let Some(found) = found.and_then(|found| found.order) else {
-            return stop;
+            // The plan does not lead to the goal from here. What is under way ends before it is
+            // given up: a robot that is let go between two places is at neither.
+            let model = self.search.model();
+            let first = now.running.first();
+            let end = first.and_then(|first| model.plan().nodes.iter().position(|node| {
+                *node == Node::End(first.instance)
+            }));
+            return Chosen {
+                next: end.map(NodeId::from),
+                order,
+            };
         };
         let next = found.sequence.first().copied();
         let known = self.orders.iter().position(|order| *order == found);
