@@ -21,7 +21,9 @@ use elbowroom_probability::{Likelihoods, Semantics};
 use elbowroom_sim::perturbed::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use rayon::prelude::*;
 
-pub use experiment::{Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind};
+pub use experiment::{
+    Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind,
+};
 pub use results::{Row, table};
 
 /// One case, ready to be run.
@@ -89,8 +91,9 @@ impl<'e> Setting<'e> {
             PerturbedError::other(format!("{}: {error}", case.name))
         };
         let actions = all_actions(&mut task).map_err(|error| wrong(&error))?;
-        let likelihoods = elbowroom_probability::likelihoods::read(case.likelihoods.as_bytes(), &task)
-            .map_err(|error| wrong(&error))?;
+        let likelihoods =
+            elbowroom_probability::likelihoods::read(case.likelihoods.as_bytes(), &task)
+                .map_err(|error| wrong(&error))?;
         let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
@@ -113,8 +116,13 @@ impl<'e> Setting<'e> {
             most_running: self.experiment.most_running,
             ..Default::default()
         };
-        Foresighted::new(&self.task, self.actions.clone(), &self.likelihoods, settings)
-            .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
+        Foresighted::new(
+            &self.task,
+            self.actions.clone(),
+            &self.likelihoods,
+            settings,
+        )
+        .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
     }
 
     fn row(
@@ -133,10 +141,9 @@ impl<'e> Setting<'e> {
                 Arc::clone(likelihoods),
                 Semantics::Paper,
             )),
-            ExecutorKind::AsPublished => Box::new(AsPublished::new(
-                Arc::clone(task),
-                Arc::clone(likelihoods),
-            )),
+            ExecutorKind::AsPublished => {
+                Box::new(AsPublished::new(Arc::clone(task), Arc::clone(likelihoods)))
+            }
             ExecutorKind::Lookahead => {
                 let foresighted = self.foresighted()?;
                 // The table is of the sound world; elsewhere it promises nothing.

@@ -240,7 +240,9 @@ impl PerturbedExperiment {
             worlds: read.worlds,
             executors: read.executors,
             perturbation: read.perturbation,
-            most_running: read.optimum.map_or(usize::MAX, |optimum| optimum.most_running),
+            most_running: read
+                .optimum
+                .map_or(usize::MAX, |optimum| optimum.most_running),
             cases: read.case.into_iter().map(case).collect::<Result<_, _>>()?,
         })
     }

@@ -130,12 +130,13 @@ pub fn table(experiment: &PerturbedExperiment, rows: &[Row]) -> Table {
         "failed starts (failure)",
         "actions (failure)",
     ];
-    let percent = |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
+    let percent =
+        |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
     let mean = |mean: Mean| mean.value().map_or_else(String::new, |m| format!("{m:.2}"));
     let row = |row: &Row| {
         let interval = row.success.wilson();
-        let interval = interval
-            .map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
+        let interval =
+            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
         let z = row.distance().map(|z| format!("{z:+.1}"));
         vec![
             row.case.clone(),

@@ -93,12 +93,11 @@ fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happe
         Ok(deordered) => (deordered.plan, true),
         // A planner that makes plans that do not work: what is listed first is done first.
         Err(_) => {
-            let instance = |(index, step): (usize, &elbowroom_model::Step)| {
-                elbowroom_plan::Instance {
+            let instance =
+                |(index, step): (usize, &elbowroom_model::Step)| elbowroom_plan::Instance {
                     label: format!("n{index}"),
                     action: step.action.clone(),
-                }
-            };
+                };
             let instances = plan.steps.iter().enumerate().map(instance).collect();
             (StnPlan::unconstrained(&task, instances), false)
         }

@@ -52,7 +52,8 @@ impl Foresighted {
     /// The best success probability that any executor can have from the beginning.
     pub fn value(&self) -> f64 {
         let initial = self.process.model().task().initial();
-        self.optimum.value(&self.process, &circumstances(initial, &[]))
+        self.optimum
+            .value(&self.process, &circumstances(initial, &[]))
     }
 }
 

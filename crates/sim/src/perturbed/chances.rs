@@ -83,8 +83,7 @@ impl Chances {
 
     /// Those of an action. One that is not among those of [`Chances::new`] never starts.
     pub(super) fn of(&self, action: &Action) -> Option<&ActionChances> {
-        self.actions
-            .get(&(action.schema, action.arguments.clone()))
+        self.actions.get(&(action.schema, action.arguments.clone()))
     }
 }
 
