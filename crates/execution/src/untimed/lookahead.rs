@@ -61,7 +61,7 @@ impl UntimedExecutor for Foresighted {
     fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
         let model = Arc::clone(self.process.model());
         let mut running: Vec<InstanceId> = Vec::new();
-        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+        while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
             let now = circumstances(stage.state(), &running);
             match self.optimum.choose(&self.process, &now) {
                 Move::Do(node) => {

@@ -78,7 +78,7 @@ impl UntimedExecutor for AsPublished {
             return;
         };
         let mut running = Vec::new();
-        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+        while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
             let Some(next) = found.next(stage.state(), &running) else {
                 return;
             };
