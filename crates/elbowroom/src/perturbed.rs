@@ -2,7 +2,7 @@
 //!
 //! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
 //! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a trial
-//! depend on the experiment's seed and the trial's number only, so results do not depend on how many
+//! depend on the experiment's seed, the case and the trial's number only, so results do not depend on how many
 //! trials run at once.
 
 mod experiment;
@@ -21,13 +21,17 @@ use elbowroom_probability::{Likelihoods, Semantics};
 use elbowroom_sim::perturbed::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use rayon::prelude::*;
 
-pub use experiment::{Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind};
+pub use experiment::{
+    Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind,
+};
 pub use results::{Row, table};
 
 /// One case, ready to be run.
 struct Setting<'e> {
     experiment: &'e PerturbedExperiment,
     case: &'e Case,
+    /// Cases have dice of their own.
+    number: u64,
     task: Arc<Task>,
     actions: Vec<Action>,
     likelihoods: Arc<Likelihoods>,
@@ -47,9 +51,9 @@ pub fn run(
     jobs: usize,
     observe: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Row>, PerturbedError> {
-    let cases = experiment.cases.iter();
+    let cases = (0..).zip(&experiment.cases);
     let settings: Vec<Setting<'_>> = cases
-        .map(|case| Setting::new(experiment, case))
+        .map(|(number, case)| Setting::new(experiment, case, number))
         .collect::<Result<_, _>>()?;
     let rows: Vec<_> = settings
         .iter()
@@ -73,7 +77,11 @@ pub fn run(
 }
 
 impl<'e> Setting<'e> {
-    fn new(experiment: &'e PerturbedExperiment, case: &'e Case) -> Result<Self, PerturbedError> {
+    fn new(
+        experiment: &'e PerturbedExperiment,
+        case: &'e Case,
+        number: u64,
+    ) -> Result<Self, PerturbedError> {
         let domain = Source::new("domain", experiment.domain.as_str());
         let problem = Source::new("problem", experiment.problem.as_str());
         let (problem, _) = read_problem(&domain, &problem)
@@ -83,8 +91,9 @@ impl<'e> Setting<'e> {
             PerturbedError::other(format!("{}: {error}", case.name))
         };
         let actions = all_actions(&mut task).map_err(|error| wrong(&error))?;
-        let likelihoods = elbowroom_probability::likelihoods::read(case.likelihoods.as_bytes(), &task)
-            .map_err(|error| wrong(&error))?;
+        let likelihoods =
+            elbowroom_probability::likelihoods::read(case.likelihoods.as_bytes(), &task)
+                .map_err(|error| wrong(&error))?;
         let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
         let perturbed = match &experiment.perturbation {
             Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
@@ -93,6 +102,7 @@ impl<'e> Setting<'e> {
         Ok(Self {
             experiment,
             case,
+            number,
             task: Arc::new(task),
             actions,
             likelihoods: Arc::new(likelihoods),
@@ -106,8 +116,13 @@ impl<'e> Setting<'e> {
             most_running: self.experiment.most_running,
             ..Default::default()
         };
-        Foresighted::new(&self.task, self.actions.clone(), &self.likelihoods, settings)
-            .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
+        Foresighted::new(
+            &self.task,
+            self.actions.clone(),
+            &self.likelihoods,
+            settings,
+        )
+        .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
     }
 
     fn row(
@@ -126,10 +141,9 @@ impl<'e> Setting<'e> {
                 Arc::clone(likelihoods),
                 Semantics::Paper,
             )),
-            ExecutorKind::AsPublished => Box::new(AsPublished::new(
-                Arc::clone(task),
-                Arc::clone(likelihoods),
-            )),
+            ExecutorKind::AsPublished => {
+                Box::new(AsPublished::new(Arc::clone(task), Arc::clone(likelihoods)))
+            }
             ExecutorKind::Lookahead => {
                 let foresighted = self.foresighted()?;
                 // The table is of the sound world; elsewhere it promises nothing.
@@ -143,8 +157,10 @@ impl<'e> Setting<'e> {
             ..Limits::default()
         };
         let mut row = Row::new(self.case, world, kind, optimum);
+        let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
+            .wrapping_add(self.number.wrapping_mul(1_000_000_007));
         for number in 0..trials {
-            let seed = self.experiment.seed.wrapping_mul(1_000_003).wrapping_add(number);
+            let seed = first_seed.wrapping_add(number);
             let mut sound;
             let mut published;
             let world: &mut dyn UntimedWorld = match (world, &self.perturbed) {

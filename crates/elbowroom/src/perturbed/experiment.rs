@@ -8,7 +8,7 @@ use elbowroom_sim::perturbed::Perturbation;
 use serde::Deserialize;
 
 /// The `format` of such files.
-pub const FORMAT: &str = "elbowroom-perturbed-experiment";
+const FORMAT: &str = "elbowroom-perturbed-experiment";
 
 /// An experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
@@ -55,7 +55,6 @@ pub struct Published {
     /// Of how many trials.
     pub trials: u64,
     /// By executor.
-    #[serde(flatten)]
     pub successes: BTreeMap<ExecutorKind, u64>,
 }
 
@@ -241,7 +240,9 @@ impl PerturbedExperiment {
             worlds: read.worlds,
             executors: read.executors,
             perturbation: read.perturbation,
-            most_running: read.optimum.map_or(usize::MAX, |optimum| optimum.most_running),
+            most_running: read
+                .optimum
+                .map_or(usize::MAX, |optimum| optimum.most_running),
             cases: read.case.into_iter().map(case).collect::<Result<_, _>>()?,
         })
     }

@@ -90,10 +90,16 @@ impl Row {
         Some((ours - theirs) / deviation.max(f64::MIN_POSITIVE))
     }
 
-    /// Whether the 95 % intervals (Wilson) of ours and of what was published overlap.
+    /// Whether the published share could, at the 5 % level, be of the same probability as ours.
     pub fn agrees(&self) -> Option<bool> {
-        let (ours, theirs) = (self.success.wilson()?, self.published?.wilson()?);
-        Some(ours.0 <= theirs.1 && theirs.0 <= ours.1)
+        Some(self.distance()?.abs() <= 1.96)
+    }
+
+    /// Whether our share lies in the 95 % interval (Wilson) of what was published.
+    pub fn is_inside(&self) -> Option<bool> {
+        let (lower, upper) = self.published?.wilson()?;
+        let share = self.success.share()?;
+        Some(lower <= share && share <= upper)
     }
 }
 
@@ -124,12 +130,13 @@ pub fn table(experiment: &PerturbedExperiment, rows: &[Row]) -> Table {
         "failed starts (failure)",
         "actions (failure)",
     ];
-    let percent = |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
+    let percent =
+        |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
     let mean = |mean: Mean| mean.value().map_or_else(String::new, |m| format!("{m:.2}"));
     let row = |row: &Row| {
         let interval = row.success.wilson();
-        let interval = interval
-            .map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
+        let interval =
+            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
         let z = row.distance().map(|z| format!("{z:+.1}"));
         vec![
             row.case.clone(),
@@ -153,10 +160,12 @@ pub fn table(experiment: &PerturbedExperiment, rows: &[Row]) -> Table {
     let compared: Vec<bool> = rows.iter().filter_map(Row::agrees).collect();
     if !compared.is_empty() {
         let agreeing = compared.iter().filter(|&&agrees| agrees).count();
+        let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
         caption += &format!(
-            "\n{agreeing} of {} published success rates agree: their 95 % intervals overlap with \
-             ours.",
-            compared.len()
+            "\nOf {} published success rates, {agreeing} do not differ from ours at the 5 % level; \
+             {} of ours lie in the 95 % interval of what was published.",
+            compared.len(),
+            inside.count()
         );
     }
     Table {

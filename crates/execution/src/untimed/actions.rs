@@ -23,7 +23,8 @@ pub fn all_actions(task: &mut Task) -> Result<Vec<Action>, Unsupported> {
     if !task.timed().is_empty() {
         return refuse("the problem has timed initials".to_owned());
     }
-    let Answer::Complete(grounding) = reachability::ground(task, &reachability::Settings::default())
+    let Answer::Complete(grounding) =
+        reachability::ground(task, &reachability::Settings::default())
     else {
         return refuse("there are more actions than can be listed".to_owned());
     };

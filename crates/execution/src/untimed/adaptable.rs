@@ -64,11 +64,13 @@ impl Adaptable {
     fn prepare(&mut self, plan: &Arc<TimeTriggeredPlan>, state: &State) -> usize {
         let known = self.plans.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
         known.unwrap_or_else(|| {
-            let prepared = model(&self.task, plan, state, &self.likelihoods, self.semantics)
-                .map(|model| Prepared {
-                    search: OrderSearch::new(model, SearchSettings::default()),
-                    orders: Vec::new(),
-                    known: BTreeMap::new(),
+            let prepared =
+                model(&self.task, plan, state, &self.likelihoods, self.semantics).map(|model| {
+                    Prepared {
+                        search: OrderSearch::new(model, SearchSettings::default()),
+                        orders: Vec::new(),
+                        known: BTreeMap::new(),
+                    }
                 });
             self.plans.push((Arc::clone(plan), prepared));
             self.plans.len() - 1
@@ -121,9 +123,8 @@ pub(super) fn perform(
         }
         Node::End(id) => {
             let action = &model.plan().instance(id).action;
-            let holds = |body: &elbowroom_model::ground::DurativeBody| {
-                stage.holds(&body.end.condition)
-            };
+            let holds =
+                |body: &elbowroom_model::ground::DurativeBody| stage.holds(&body.end.condition);
             if !action.durative().is_some_and(holds) {
                 return false;
             }
@@ -160,7 +161,21 @@ impl Prepared {
         // A condition that couples too many facts: as if there were no order.
         let found = self.search.best_order(now, &mut patient).ok();
         let Some(found) = found.and_then(|found| found.order) else {
-            return stop;
+            // The plan does not lead to the goal from here. What is under way ends before it is
+            // given up: a robot that is let go between two places is at neither.
+            let model = self.search.model();
+            let first = now.running.first();
+            let end = first.and_then(|first| {
+                model
+                    .plan()
+                    .nodes
+                    .iter()
+                    .position(|node| *node == Node::End(first.instance))
+            });
+            return Chosen {
+                next: end.map(NodeId::from),
+                order,
+            };
         };
         let next = found.sequence.first().copied();
         let known = self.orders.iter().position(|order| *order == found);

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use elbowroom_model::ground::Action;
-use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, State, Step, Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder::{Settings, deorder};
-use elbowroom_plan::{Bound, Node, StnPlan};
+use elbowroom_plan::{Bound, Instance, Node, StnPlan};
 
 use super::{Stage, UntimedExecutor, start_of};
 
@@ -89,20 +89,13 @@ fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happe
     let mut situation = Situation::initial(task);
     situation.state = state.clone();
     let task = task.beginning_at(&situation);
-    let (network, is_ordered) = match deorder(&task, plan, &Settings::default()) {
-        Ok(deordered) => (deordered.plan, true),
-        // A planner that makes plans that do not work: what is listed first is done first.
-        Err(_) => {
-            let instance = |(index, step): (usize, &elbowroom_model::Step)| {
-                elbowroom_plan::Instance {
-                    label: format!("n{index}"),
-                    action: step.action.clone(),
-                }
-            };
-            let instances = plan.steps.iter().enumerate().map(instance).collect();
-            (StnPlan::unconstrained(&task, instances), false)
-        }
-    };
+    let deordered = deorder(&task, plan, &Settings::default());
+    let is_ordered = deordered.is_ok();
+    // A planner that makes plans that do not work: what is listed first is done first.
+    let network = deordered.map_or_else(
+        |_| StnPlan::unconstrained(&task, listed(plan)),
+        |deordered| deordered.plan,
+    );
     let mut happenings: Vec<Happening> = Vec::new();
     for (node, meaning) in network.nodes() {
         let (id, start) = match meaning {
@@ -126,4 +119,13 @@ fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happe
         });
     }
     happenings
+}
+
+/// The actions of a plan as they are listed.
+fn listed(plan: &TimeTriggeredPlan) -> Vec<Instance> {
+    let instance = |(index, step): (usize, &Step)| Instance {
+        label: format!("n{index}"),
+        action: step.action.clone(),
+    };
+    plan.steps.iter().enumerate().map(instance).collect()
 }

@@ -52,7 +52,8 @@ impl Foresighted {
     /// The best success probability that any executor can have from the beginning.
     pub fn value(&self) -> f64 {
         let initial = self.process.model().task().initial();
-        self.optimum.value(&self.process, &circumstances(initial, &[]))
+        self.optimum
+            .value(&self.process, &circumstances(initial, &[]))
     }
 }
 
@@ -60,7 +61,7 @@ impl UntimedExecutor for Foresighted {
     fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
         let model = Arc::clone(self.process.model());
         let mut running: Vec<InstanceId> = Vec::new();
-        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+        while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
             let now = circumstances(stage.state(), &running);
             match self.optimum.choose(&self.process, &now) {
                 Move::Do(node) => {

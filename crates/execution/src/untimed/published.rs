@@ -78,7 +78,7 @@ impl UntimedExecutor for AsPublished {
             return;
         };
         let mut running = Vec::new();
-        while !stage.is_over() && !(running.is_empty() && stage.is_goal()) {
+        while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
             let Some(next) = found.next(stage.state(), &running) else {
                 return;
             };
@@ -93,15 +93,16 @@ impl Found {
     fn next(&self, state: &State, running: &[InstanceId]) -> Option<NodeId> {
         let nodes = &self.model.plan().nodes;
         let fits = |layer: &BTreeSet<FactId>| layer.is_subset(&state.facts);
-        let mut fitting = (0..self.layers.len()).rev().filter(|&i| fits(&self.layers[i]));
+        let mut fitting = (0..self.layers.len())
+            .rev()
+            .filter(|&i| fits(&self.layers[i]));
         if let Some(first) = running.first() {
             fitting.next()?;
             let end = nodes.iter().position(|node| *node == Node::End(*first));
             return end.map(NodeId::from);
         }
-        let is_start = |node: &NodeId| {
-            matches!(nodes[node.index()], Node::Start(_) | Node::Instant(_))
-        };
+        let is_start =
+            |node: &NodeId| matches!(nodes[node.index()], Node::Start(_) | Node::Instant(_));
         fitting.find_map(|i| self.sequence.get(i).copied().filter(is_start))
     }
 }

@@ -83,8 +83,7 @@ impl Chances {
 
     /// Those of an action. One that is not among those of [`Chances::new`] never starts.
     pub(super) fn of(&self, action: &Action) -> Option<&ActionChances> {
-        self.actions
-            .get(&(action.schema, action.arguments.clone()))
+        self.actions.get(&(action.schema, action.arguments.clone()))
     }
 }
 
@@ -102,12 +101,12 @@ fn effects(
     let mut changes: Vec<_> = snap.effects.iter().filter_map(change).collect();
     // Stable: otherwise in the order of the domain.
     changes.sort_by_key(|(makes_true, _)| *makes_true);
-    let chance = |(makes_true, fact): (bool, FactId)| {
+    let with_likelihood = |(makes_true, fact): (bool, FactId)| {
         Ok(EffectChance {
             fact,
             makes_true,
             probability: likelihoods.effect(task, action, fact, makes_true)?,
         })
     };
-    changes.into_iter().map(chance).collect()
+    changes.into_iter().map(with_likelihood).collect()
 }

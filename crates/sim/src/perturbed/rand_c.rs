@@ -51,6 +51,9 @@ mod tests {
     fn the_first_numbers_are_the_well_known_ones() {
         let mut rand = RandC::unseeded();
         let numbers: Vec<u32> = (0..4).map(|_| rand.next()).collect();
-        assert_eq!(numbers, [1_804_289_383, 846_930_886, 1_681_692_777, 1_714_636_915]);
+        assert_eq!(
+            numbers,
+            [1_804_289_383, 846_930_886, 1_681_692_777, 1_714_636_915]
+        );
     }
 }

@@ -1,0 +1,90 @@
+//! Paper 2's experiments.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
+
+use std::fs;
+use std::path::Path;
+
+use elbowroom::perturbed::{self, ExecutorKind, PerturbedExperiment, Row, WorldKind};
+
+fn experiment(name: &str) -> PerturbedExperiment {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
+    let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
+    PerturbedExperiment::read(&file(name).unwrap(), &file).unwrap()
+}
+
+fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
+    let mut experiment = experiment(name);
+    experiment.worlds = vec![world];
+    perturbed::run(&experiment, trials, 0, &|| true).unwrap()
+}
+
+fn share(rows: &[Row], case: &str, executor: ExecutorKind) -> f64 {
+    let is_it = |row: &&Row| row.case == case && row.executor == executor;
+    rows.iter().find(is_it).unwrap().success.share().unwrap()
+}
+
+#[test]
+fn the_published_success_rates_come_out_where_the_world_is_as_published() {
+    for (name, count) in [("olisipo_sf3.toml", 20), ("olisipo_af3.toml", 16)] {
+        let rows = rows(name, WorldKind::AsPublished, 1000);
+        let distances: Vec<f64> = rows.iter().filter_map(Row::distance).collect();
+        assert_eq!(distances.len(), count);
+        for (row, distance) in rows
+            .iter()
+            .filter(|row| row.published.is_some())
+            .zip(&distances)
+        {
+            assert!(
+                distance.abs() < 3.5,
+                "{} {}: {distance}",
+                row.case,
+                row.executor.name()
+            );
+        }
+        let outside = distances
+            .iter()
+            .filter(|distance| distance.abs() > 1.96)
+            .count();
+        assert!(outside <= 3, "{name}: {distances:?}");
+    }
+}
+
+#[test]
+fn the_lookahead_succeeds_as_often_as_its_table_says() {
+    for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
+        for row in rows(name, WorldKind::Sound, 1000) {
+            let Some(optimum) = row.optimum else { continue };
+            let share = row.success.share().unwrap();
+            let deviation = (optimum * (1.0 - optimum) / 1000.0).sqrt();
+            let distance = (share - optimum) / deviation;
+            assert!(distance.abs() < 4.0, "{}: {share} {optimum}", row.case);
+        }
+    }
+}
+
+/// Not on AF3 p4 and p6, where they are too close to tell, and not on p7 and p8: see
+/// `docs/perturbed-worlds.md`.
+#[test]
+fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world() {
+    for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
+        let rows = rows(name, WorldKind::Sound, 2000);
+        for case in &experiment(name).cases {
+            if ["AF3 p4", "AF3 p6", "AF3 p7", "AF3 p8"].contains(&case.name.as_str()) {
+                continue;
+            }
+            let adaptable = share(&rows, &case.name, ExecutorKind::Adaptable);
+            let esterel = share(&rows, &case.name, ExecutorKind::Esterel);
+            assert!(adaptable > esterel, "{}: {adaptable} {esterel}", case.name);
+        }
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_how_many_run_at_once() {
+    let experiment = experiment("olisipo_af3.toml");
+    let run = |jobs| {
+        let rows = perturbed::run(&experiment, 20, jobs, &|| true).unwrap();
+        perturbed::table(&experiment, &rows)
+    };
+    assert_eq!(run(1), run(3));
+}
