@@ -177,10 +177,9 @@ impl Network {
                 waiting.extend(next.map(|edge| edge.to));
             }
         }
-        let mut count = 0;
-        for (name, _) in names.iter_mut().zip(&is_kept).filter(|(_, kept)| **kept) {
+        let kept = names.iter_mut().zip(&is_kept).filter(|(_, kept)| **kept);
+        for ((name, _), count) in kept.zip(0..) {
             *name = count;
-            count += 1;
         }
         let nodes = &self.nodes;
         self.marks.retain_mut(|(stamp, node)| {

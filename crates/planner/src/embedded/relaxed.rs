@@ -1,8 +1,8 @@
 //! The heuristic: how many steps a plan takes when nothing that was reached is ever lost.
 //!
 //! Facts, their negations, numeric tests and the like are *propositions*. The cost of a
-//! proposition is the sum over what its cheapest achiever needs (h_add, Bonet & Geffner 2001); a
-//! relaxed plan is read off the cheapest achievers (Keyder & Geffner 2008, "FF(h_a)"), and its
+//! proposition is the sum over what its cheapest achiever needs (`h_add`, Bonet & Geffner 2001); a
+//! relaxed plan is read off the cheapest achievers (Keyder & Geffner 2008, "`FF(h_a)`"), and its
 //! first steps are the preferred ones (Hoffmann & Nebel 2001). A numeric test that adding up
 //! changes can reach costs as many repetitions as the gap asks for (Scala et al. 2016); other
 //! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
@@ -347,9 +347,8 @@ impl<'a> Relaxed<'a> {
             let data = &self.graph.operators[operator as usize];
             estimate.steps += data.cost;
             self.is_used[operator as usize] = false;
-            if self.operator_cost[operator as usize] == data.cost {
-                push_steps(data.kind, state, &mut estimate.preferred);
-            } else if matches!(data.kind, Kind::Timed(_)) {
+            let is_next = self.operator_cost[operator as usize] == data.cost;
+            if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
             }
         }

@@ -181,10 +181,9 @@ impl<'a> Search<'a> {
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
-        let queue = match self.turns[0] <= self.turns[1] && !self.preferred.buckets.is_empty() {
-            true => 0,
-            false => 1,
-        };
+        let is_preferred_turn =
+            self.turns[0] <= self.turns[1] && !self.preferred.buckets.is_empty();
+        let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
         let entry = match queue {
             0 => self.preferred.pop(),
@@ -193,9 +192,8 @@ impl<'a> Search<'a> {
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
-        let (step, state) = match self.make(parent, step) {
-            Some(made) => made,
-            None => return Turn::Nothing,
+        let Some((step, state)) = self.make(parent, step) else {
+            return Turn::Nothing;
         };
         self.visit(parent, step, state)
     }

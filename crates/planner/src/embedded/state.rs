@@ -298,6 +298,6 @@ impl Outlook {
     }
 }
 
-fn at_most(these: &[Ticks], those: &[Ticks]) -> bool {
-    these.iter().zip(those).all(|(this, that)| this <= that)
+fn at_most(left: &[Ticks], right: &[Ticks]) -> bool {
+    left.iter().zip(right).all(|(a, b)| a <= b)
 }

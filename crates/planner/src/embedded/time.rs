@@ -115,7 +115,7 @@ mod tests {
             let ticks = scale.exactly(number).expect("on the grid");
             assert_eq!(scale.units(ticks), *number);
         }
-        assert_eq!(scale.floor(&Rational::new(1, 7)).1, false);
+        assert!(!scale.floor(&Rational::new(1, 7)).1);
     }
 
     #[test]

@@ -39,11 +39,11 @@ pub(crate) fn compile(
     let mut builder = Builder::new(task);
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
-        builder.check(&running.action)?;
+        check(&running.action)?;
         builder.links_of(&running.action);
     }
     for action in &grounding.actions {
-        builder.check(action)?;
+        check(action)?;
         builder.links_of(action);
     }
     let scale = scale_of(task, grounding, situation, epsilon);
@@ -55,6 +55,39 @@ pub(crate) fn compile(
         builder.action(action, footprints.get_mut(number).and_then(Option::take));
     }
     Ok(builder.finish(grounding, situation, scale))
+}
+
+/// Refuses what cannot be searched.
+fn check(action: &ground::Action) -> Result<(), Unsupported> {
+    let refuse = |feature: &str| {
+        Err(Unsupported {
+            feature: feature.to_owned(),
+            place: format!("action {}", action.name),
+        })
+    };
+    let mut has_unknown = false;
+    let _ = action.map_leaves(&mut |leaf| {
+        has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
+        None
+    });
+    if has_unknown {
+        return refuse("numbers left open (:synth-parameters)");
+    }
+    let Some(body) = action.durative() else {
+        return Ok(());
+    };
+    let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
+    if body.end.effects.iter().any(|e| guarded(&e)) {
+        return refuse("effects under a condition over the whole action");
+    }
+    if body
+        .continuous
+        .iter()
+        .any(|e| !e.guard.over_all.is_trivial())
+    {
+        return refuse("continuous effects under a condition over the whole action");
+    }
+    Ok(())
 }
 
 struct Builder<'a> {
@@ -211,39 +244,6 @@ impl<'a> Builder<'a> {
                 }
             });
         }
-    }
-
-    /// Refuses what cannot be searched.
-    fn check(&self, action: &ground::Action) -> Result<(), Unsupported> {
-        let refuse = |feature: &str| {
-            Err(Unsupported {
-                feature: feature.to_owned(),
-                place: format!("action {}", action.name),
-            })
-        };
-        let mut has_unknown = false;
-        let _ = action.map_leaves(&mut |leaf| {
-            has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
-            None
-        });
-        if has_unknown {
-            return refuse("numbers left open (:synth-parameters)");
-        }
-        let Some(body) = action.durative() else {
-            return Ok(());
-        };
-        let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
-        if body.end.effects.iter().any(|e| guarded(&e)) {
-            return refuse("effects under a condition over the whole action");
-        }
-        if body
-            .continuous
-            .iter()
-            .any(|e| !e.guard.over_all.is_trivial())
-        {
-            return refuse("continuous effects under a condition over the whole action");
-        }
-        Ok(())
     }
 
     fn links_of(&mut self, action: &ground::Action) {
@@ -454,6 +454,10 @@ impl<'a> Builder<'a> {
         }
     }
 
+    #[allow(
+        clippy::too_many_lines,
+        reason = "one part of the compiled problem after the other"
+    )]
     fn finish(mut self, grounding: &Grounding, situation: &Situation, scale: Scale) -> Compiled {
         let goal = self.symbols.formula(&grounding.goal);
         let mut rules: Vec<Rule> = Vec::new();

@@ -23,7 +23,7 @@ pub(super) struct Deadlines {
 impl Deadlines {
     /// Makes operators that come too late wait for ever: those whose conditions cannot be true in
     /// time, when nothing that was reached is ever lost and everything happens as early as it can
-    /// (h_max, Haslum & Geffner, ECP 2001, with the windows of timed initials).
+    /// (`h_max`, Haslum & Geffner, ECP 2001, with the windows of timed initials).
     pub(super) fn exclude_late(
         &mut self,
         compiled: &Compiled,

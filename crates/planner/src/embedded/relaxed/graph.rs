@@ -210,7 +210,7 @@ impl Graph {
             let needs = self.propositions(&snap.condition);
             self.add_snaps(
                 compiled,
-                Draft {
+                &Draft {
                     kind: Kind::Start(number),
                     needs,
                     is_running: None,
@@ -248,7 +248,7 @@ impl Graph {
             };
             self.add_snaps(
                 compiled,
-                Draft {
+                &Draft {
                     kind,
                     needs,
                     is_running: (!is_whole).then_some(running),
@@ -260,7 +260,7 @@ impl Graph {
         end_needs.push(running);
         self.end_of[number as usize] = self.add_snaps(
             compiled,
-            Draft {
+            &Draft {
                 kind: Kind::End(number),
                 needs: end_needs,
                 is_running: None,
@@ -271,7 +271,7 @@ impl Graph {
     }
 
     /// Adds an operator for the snaps together, and one for each conditional effect.
-    fn add_snaps(&mut self, compiled: &Compiled, draft: Draft<'_>) -> u32 {
+    fn add_snaps(&mut self, compiled: &Compiled, draft: &Draft<'_>) -> u32 {
         let least = least_ticks(compiled, draft.action);
         let mut effects: Vec<(u32, Ticks)> = Vec::new();
         effects.extend(draft.is_running.map(|running| (running, least)));
@@ -285,7 +285,7 @@ impl Graph {
         for flow in &draft.action.flows {
             self.add_any_gain(flow.fluent, &mut gains);
         }
-        let windows = self.windows_of(compiled, &draft);
+        let windows = self.windows_of(compiled, draft);
         let operator = self.add(draft.kind, 1, draft.needs.clone(), &effects, gains);
         self.operators[operator as usize].windows = windows.clone();
         self.operators[operator as usize].span = span;
@@ -424,15 +424,12 @@ impl Graph {
                 }
             }
         };
-        match draft.kind {
-            Kind::End(_) => add(&draft.snaps[0].condition, epsilon, epsilon),
-            _ => {
-                add(&draft.snaps[0].condition, epsilon, epsilon);
-                add(&draft.action.over_all, 0, least);
-                if draft.action.end != NONE {
-                    let end = &compiled.snap(draft.action.end).condition;
-                    add(end, (epsilon - most).max(-NEVER), least + epsilon);
-                }
+        add(&draft.snaps[0].condition, epsilon, epsilon);
+        if !matches!(draft.kind, Kind::End(_)) {
+            add(&draft.action.over_all, 0, least);
+            if draft.action.end != NONE {
+                let end = &compiled.snap(draft.action.end).condition;
+                add(end, (epsilon - most).max(-NEVER), least + epsilon);
             }
         }
         begin..self.windows.len()
