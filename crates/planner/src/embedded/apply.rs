@@ -112,7 +112,7 @@ impl<'a> Stepper<'a> {
         let snap = self.compiled.snap(action.start);
         if action.end == NONE {
             let place = self.place(state, snap);
-            let node = self.insert(state, snap, &place, false)?;
+            let node = insert(state, self.settles(state), snap, &place, false)?;
             let moment = moment(state, || (Form::node(node), None));
             self.demand(state, &snap.condition, None, &moment)?;
             self.take_effect(state, snap, u64::MAX, None, &moment)?;
@@ -126,7 +126,7 @@ impl<'a> Stepper<'a> {
             let time = self.compiled.timed[timed as usize].time;
             place.latest = place.latest.min(time - least);
         }
-        let node = self.insert(state, snap, &place, true)?;
+        let node = insert(state, self.settles(state), snap, &place, true)?;
         let mut end = SETTLED;
         if state.symbolic.is_some() {
             let after = [(node, least)];
@@ -144,7 +144,7 @@ impl<'a> Stepper<'a> {
         });
         self.demand(state, &snap.condition, duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
-            Self::demand_duration(state, action, false, &moment)?;
+            demand_duration(state, action, false, &moment)?;
         }
         let mut flows = Vec::new();
         for flow in &action.flows {
@@ -193,17 +193,17 @@ impl<'a> Stepper<'a> {
         }
         let mut when = self.place(state, snap);
         let node = if open.end != SETTLED {
-            Self::reach_foreseen_end(state, snap, &when, open.end)?;
+            reach_foreseen_end(state, snap, &when, open.end)?;
             open.end
         } else if open.node == SETTLED {
             when.earliest = when.earliest.max(open.start + open.least);
             if open.most < NEVER {
                 when.latest = when.latest.min(open.start + open.most);
             }
-            self.insert(state, snap, &when, false)?
+            insert(state, self.settles(state), snap, &when, false)?
         } else {
             when.after.push((open.node, open.least));
-            let node = self.insert(state, snap, &when, true)?;
+            let node = insert(state, self.settles(state), snap, &when, true)?;
             if open.most < NEVER {
                 state.network.add_edge(node, open.node, -open.most).ok()?;
             }
@@ -224,7 +224,7 @@ impl<'a> Stepper<'a> {
         self.demand(state, &snap.condition, open.duration.as_ref(), &moment)?;
         if state.symbolic.is_some() {
             self.watch_all(state, &open, &moment)?;
-            Self::demand_duration(state, action, true, &moment)?;
+            demand_duration(state, action, true, &moment)?;
             for (fluent, _) in &open.flows {
                 self.watch(state, &[*fluent], &moment)?;
             }
@@ -236,24 +236,6 @@ impl<'a> Stepper<'a> {
         }
         if self.settles(state) {
             settle(state);
-        }
-        Some(())
-    }
-
-    /// Lets an action end whose end has been in the network since its start.
-    fn reach_foreseen_end(
-        state: &mut State,
-        snap: &Snap,
-        place: &Place,
-        end: NodeId,
-    ) -> Option<()> {
-        for &(from, distance) in &place.after {
-            state.network.add_edge(from, end, distance).ok()?;
-        }
-        state.network.delay(end, place.earliest).ok()?;
-        state.network.hurry(end, place.latest).ok()?;
-        for &stamp in &snap.marks {
-            state.network.mark(stamp, end);
         }
         Some(())
     }
@@ -291,27 +273,6 @@ impl<'a> Stepper<'a> {
         }
         let lost = &mut self.has_rounded;
         symbolic::demand_formula(self.compiled, state, condition, moment, lost)
-    }
-
-    /// Demands the duration constraints that depend on the state.
-    fn demand_duration(
-        state: &mut State,
-        action: &Action,
-        at_end: bool,
-        moment: &Moment,
-    ) -> Option<()> {
-        for bound in action
-            .duration
-            .bounds
-            .iter()
-            .filter(|bound| bound.at_end == at_end)
-        {
-            let value = symbolic::value(state, &bound.value, moment)?;
-            let duration = moment.duration.clone()?;
-            let difference = duration.plus(&Rational::from(-1), &value);
-            symbolic::demand(state, difference, bound.comparison)?;
-        }
-        Some(())
     }
 
     /// Demands the over-all condition of an action at some moment.
@@ -399,36 +360,6 @@ impl<'a> Stepper<'a> {
             }
         }
         place
-    }
-
-    /// Gives the happening its place in time. It is settled if nothing can push it and nothing
-    /// pushes back.
-    fn insert(
-        &self,
-        state: &mut State,
-        snap: &Snap,
-        place: &Place,
-        is_unsettled: bool,
-    ) -> Option<NodeId> {
-        if !is_unsettled && place.after.is_empty() && self.settles(state) {
-            if place.earliest > place.latest {
-                return None;
-            }
-            for &stamp in &snap.marks {
-                let stamp = &mut state.stamps[stamp as usize];
-                *stamp = (*stamp).max(place.earliest);
-            }
-            state.settled_end = state.settled_end.max(place.earliest);
-            return Some(SETTLED);
-        }
-        let node = state
-            .network
-            .add_node(place.earliest, place.latest, &place.after)
-            .ok()?;
-        for &stamp in &snap.marks {
-            state.network.mark(stamp, node);
-        }
-        Some(node)
     }
 
     fn require(
@@ -653,6 +584,70 @@ fn duration_form(duration: Option<&Rational>, start: NodeId, end: NodeId) -> For
         Some(duration) => Form::constant(duration.clone()),
         None => Form::node(end).plus(&Rational::from(-1), &Form::node(start)),
     }
+}
+
+/// Gives the happening its place in time. It is settled if nothing can push it and nothing
+/// pushes back.
+fn insert(
+    state: &mut State,
+    settles: bool,
+    snap: &Snap,
+    place: &Place,
+    is_unsettled: bool,
+) -> Option<NodeId> {
+    if !is_unsettled && place.after.is_empty() && settles {
+        if place.earliest > place.latest {
+            return None;
+        }
+        for &stamp in &snap.marks {
+            let stamp = &mut state.stamps[stamp as usize];
+            *stamp = (*stamp).max(place.earliest);
+        }
+        state.settled_end = state.settled_end.max(place.earliest);
+        return Some(SETTLED);
+    }
+    let node = state
+        .network
+        .add_node(place.earliest, place.latest, &place.after)
+        .ok()?;
+    for &stamp in &snap.marks {
+        state.network.mark(stamp, node);
+    }
+    Some(node)
+}
+
+/// Lets an action end whose end has been in the network since its start.
+fn reach_foreseen_end(state: &mut State, snap: &Snap, place: &Place, end: NodeId) -> Option<()> {
+    for &(from, distance) in &place.after {
+        state.network.add_edge(from, end, distance).ok()?;
+    }
+    state.network.delay(end, place.earliest).ok()?;
+    state.network.hurry(end, place.latest).ok()?;
+    for &stamp in &snap.marks {
+        state.network.mark(stamp, end);
+    }
+    Some(())
+}
+
+/// Demands the duration constraints that depend on the state.
+fn demand_duration(
+    state: &mut State,
+    action: &Action,
+    at_end: bool,
+    moment: &Moment,
+) -> Option<()> {
+    for bound in action
+        .duration
+        .bounds
+        .iter()
+        .filter(|bound| bound.at_end == at_end)
+    {
+        let value = symbolic::value(state, &bound.value, moment)?;
+        let duration = moment.duration.clone()?;
+        let difference = duration.plus(&Rational::from(-1), &value);
+        symbolic::demand(state, difference, bound.comparison)?;
+    }
+    Some(())
 }
 
 /// Whether a duration constraint bounds from below, and from above.

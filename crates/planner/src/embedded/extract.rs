@@ -22,6 +22,10 @@ struct Timing {
 
 /// The plan that the choices stand for, everything as early as possible; `None` if the judge does
 /// not find it valid.
+#[allow(
+    clippy::too_many_lines,
+    reason = "replays the choices, then reads off the plan"
+)]
 pub(crate) fn plan_of(
     task: &mut Task,
     situation: &Situation,
@@ -89,8 +93,8 @@ pub(crate) fn plan_of(
         .max()
         .unwrap_or(-NEVER);
     if state.earliest_end() < needed {
-        let nodes = (0..state.network.node_count()).rev();
-        state.network = nodes.into_iter().find_map(|node| {
+        let mut nodes = (0..state.network.node_count()).rev();
+        state.network = nodes.find_map(|node| {
             let mut network = state.network.clone();
             let node = NodeId::try_from(node).ok()?;
             network.delay(node, needed).ok().map(|()| network)

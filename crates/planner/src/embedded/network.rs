@@ -178,8 +178,8 @@ impl Network {
             }
         }
         let kept = names.iter_mut().zip(&is_kept).filter(|(_, kept)| **kept);
-        for (place, (name, _)) in (0..).zip(kept) {
-            *name = place;
+        for ((name, _), count) in kept.zip(0..) {
+            *name = count;
         }
         let nodes = &self.nodes;
         self.marks.retain_mut(|(stamp, node)| {

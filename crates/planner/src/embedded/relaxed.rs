@@ -347,8 +347,8 @@ impl<'a> Relaxed<'a> {
             let data = &self.graph.operators[operator as usize];
             estimate.steps += data.cost;
             self.is_used[operator as usize] = false;
-            let is_first = self.operator_cost[operator as usize] == data.cost;
-            if is_first || matches!(data.kind, Kind::Timed(_)) {
+            let is_next = self.operator_cost[operator as usize] == data.cost;
+            if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
             }
         }

@@ -181,9 +181,9 @@ impl<'a> Search<'a> {
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
-        let is_preferred_next =
+        let is_preferred_turn =
             self.turns[0] <= self.turns[1] && !self.preferred.buckets.is_empty();
-        let queue = usize::from(!is_preferred_next);
+        let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
         let entry = match queue {
             0 => self.preferred.pop(),

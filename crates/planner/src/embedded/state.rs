@@ -298,6 +298,6 @@ impl Outlook {
     }
 }
 
-fn at_most(low: &[Ticks], high: &[Ticks]) -> bool {
-    low.iter().zip(high).all(|(a, b)| a <= b)
+fn at_most(left: &[Ticks], right: &[Ticks]) -> bool {
+    left.iter().zip(right).all(|(a, b)| a <= b)
 }

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use elbowroom_model::ground::{Action, Change, Condition};
+use elbowroom_model::ground::Action;
 use elbowroom_model::validate::{self, Settings as Strictness, Verdict};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
@@ -327,23 +327,8 @@ impl Twin<'_> {
     }
 }
 
-/// Whether the goal holds at once, or an effect could matter at all: keeps the twin's runs short.
-fn is_worth_a_look(action: &Action) -> bool {
-    let changes = |effects: &[elbowroom_model::ground::Effect]| {
-        effects
-            .iter()
-            .any(|e| matches!(e.change, Change::Add(_) | Change::Delete(_)))
-    };
-    match &action.body {
-        elbowroom_model::ground::Body::Instantaneous(snap) => changes(&snap.effects),
-        elbowroom_model::ground::Body::Durative(body) => {
-            changes(&body.start.effects) || changes(&body.end.effects)
-        }
-    }
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 160, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     #[test]
     fn the_planner_finds_a_plan_exactly_when_its_twin_does(draft in drafts()) {
@@ -362,9 +347,8 @@ proptest! {
                 let schema = task.problem().schema(name).unwrap();
                 task.instantiate(schema, &[]).unwrap()
             })
-            .filter(is_worth_a_look)
             .collect();
-        let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 6_000 };
+        let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 1_200 };
         let found = twin.finds();
         match &answer {
             Answer::Plan { found: ours, .. } => {
@@ -388,6 +372,5 @@ proptest! {
                 prop_assert_ne!(found, Some(true), "{}", describe(&answer));
             }
         }
-        prop_assert!(!matches!(task.goal(), Condition::Or(_)));
     }
 }

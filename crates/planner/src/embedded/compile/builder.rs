@@ -39,11 +39,11 @@ pub(crate) fn compile(
     let mut builder = Builder::new(task);
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
-        Builder::check(&running.action)?;
+        check(&running.action)?;
         builder.links_of(&running.action);
     }
     for action in &grounding.actions {
-        Builder::check(action)?;
+        check(action)?;
         builder.links_of(action);
     }
     let scale = scale_of(task, grounding, situation, epsilon);
@@ -55,6 +55,39 @@ pub(crate) fn compile(
         builder.action(action, footprints.get_mut(number).and_then(Option::take));
     }
     Ok(builder.finish(grounding, situation, scale))
+}
+
+/// Refuses what cannot be searched.
+fn check(action: &ground::Action) -> Result<(), Unsupported> {
+    let refuse = |feature: &str| {
+        Err(Unsupported {
+            feature: feature.to_owned(),
+            place: format!("action {}", action.name),
+        })
+    };
+    let mut has_unknown = false;
+    let _ = action.map_leaves(&mut |leaf| {
+        has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
+        None
+    });
+    if has_unknown {
+        return refuse("numbers left open (:synth-parameters)");
+    }
+    let Some(body) = action.durative() else {
+        return Ok(());
+    };
+    let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
+    if body.end.effects.iter().any(|e| guarded(&e)) {
+        return refuse("effects under a condition over the whole action");
+    }
+    if body
+        .continuous
+        .iter()
+        .any(|e| !e.guard.over_all.is_trivial())
+    {
+        return refuse("continuous effects under a condition over the whole action");
+    }
+    Ok(())
 }
 
 struct Builder<'a> {
@@ -211,39 +244,6 @@ impl<'a> Builder<'a> {
                 }
             });
         }
-    }
-
-    /// Refuses what cannot be searched.
-    fn check(action: &ground::Action) -> Result<(), Unsupported> {
-        let refuse = |feature: &str| {
-            Err(Unsupported {
-                feature: feature.to_owned(),
-                place: format!("action {}", action.name),
-            })
-        };
-        let mut has_unknown = false;
-        let _ = action.map_leaves(&mut |leaf| {
-            has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
-            None
-        });
-        if has_unknown {
-            return refuse("numbers left open (:synth-parameters)");
-        }
-        let Some(body) = action.durative() else {
-            return Ok(());
-        };
-        let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
-        if body.end.effects.iter().any(|e| guarded(&e)) {
-            return refuse("effects under a condition over the whole action");
-        }
-        if body
-            .continuous
-            .iter()
-            .any(|e| !e.guard.over_all.is_trivial())
-        {
-            return refuse("continuous effects under a condition over the whole action");
-        }
-        Ok(())
     }
 
     fn links_of(&mut self, action: &ground::Action) {
@@ -454,50 +454,10 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Says of each action how soon it should end.
-    fn settle_eagerness(&mut self) {
-        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
-        for number in 0..self.actions.len() {
-            let action = &self.actions[number];
-            if action.start != NONE && action.end != NONE {
-                let (start, end) = (
-                    &self.snaps[action.start as usize],
-                    &self.snaps[action.end as usize],
-                );
-                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                // What changes continuously is there to be read meanwhile.
-                if action.flows.is_empty() {
-                    self.actions[number].eagerness = eagerness(start, end, &offers);
-                }
-            }
-        }
-    }
-
-    /// Timed initials of one time, as far as anything reads them.
-    fn timed(&self, time: Ticks, changes: &[ModelChange], marks: Vec<u32>) -> Timed {
-        let mut timed = Timed {
-            time,
-            adds: Vec::new(),
-            deletes: Vec::new(),
-            assigns: Vec::new(),
-            marks,
-        };
-        for change in changes {
-            match change {
-                ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
-                ModelChange::Delete(fact) => timed.deletes.extend(self.symbols.known_fact(*fact)),
-                ModelChange::Update { fluent, value, .. } => {
-                    if let (Some(fluent), ground::Expression::Constant(value)) =
-                        (self.symbols.known_fluent(*fluent), value)
-                    {
-                        timed.assigns.push((fluent, value.clone()));
-                    }
-                }
-            }
-        }
-        timed
-    }
-
+    #[allow(
+        clippy::too_many_lines,
+        reason = "one part of the compiled problem after the other"
+    )]
     fn finish(mut self, grounding: &Grounding, situation: &Situation, scale: Scale) -> Compiled {
         let goal = self.symbols.formula(&grounding.goal);
         let mut rules: Vec<Rule> = Vec::new();
@@ -536,7 +496,21 @@ impl<'a> Builder<'a> {
                 action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
             }
         }
-        self.settle_eagerness();
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.start != NONE && action.end != NONE {
+                let (start, end) = (
+                    &self.snaps[action.start as usize],
+                    &self.snaps[action.end as usize],
+                );
+                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                // What changes continuously is there to be read meanwhile.
+                if action.flows.is_empty() {
+                    self.actions[number].eagerness = eagerness(start, end, &offers);
+                }
+            }
+        }
         let goal_reads = Touches::of_condition(self.task, &grounding.goal);
         let mut goal_wishes = Wishes::default();
         goal_wishes.need_from_now_on(&goal_reads);
@@ -559,7 +533,29 @@ impl<'a> Builder<'a> {
             .map(|(happening, wishes)| {
                 let (time, exact) = scale.floor(&happening.time);
                 is_exact &= exact;
-                self.timed(time, &happening.changes, stamps.marks(wishes))
+                let mut timed = Timed {
+                    time,
+                    adds: Vec::new(),
+                    deletes: Vec::new(),
+                    assigns: Vec::new(),
+                    marks: stamps.marks(wishes),
+                };
+                for change in &happening.changes {
+                    match change {
+                        ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
+                        ModelChange::Delete(fact) => {
+                            timed.deletes.extend(self.symbols.known_fact(*fact));
+                        }
+                        ModelChange::Update { fluent, value, .. } => {
+                            if let (Some(fluent), ground::Expression::Constant(value)) =
+                                (self.symbols.known_fluent(*fluent), value)
+                            {
+                                timed.assigns.push((fluent, value.clone()));
+                            }
+                        }
+                    }
+                }
+                timed
             })
             .collect();
         let now = scale.floor(&situation.time);
