@@ -88,7 +88,15 @@ fn a_run_that_is_killed_leaves_its_trace() {
     let trace = temporary("killed.jsonl");
     let mut run = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(root())
-        .args(["run", DELIVERY[0], DELIVERY[1], "--realtime", "1", "--trace", &trace])
+        .args([
+            "run",
+            DELIVERY[0],
+            DELIVERY[1],
+            "--realtime",
+            "1",
+            "--trace",
+            &trace,
+        ])
         .spawn()
         .expect("the command can be started");
     // At a real second for each second of the plan, it has begun and is far from done.

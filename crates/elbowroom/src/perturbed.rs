@@ -163,16 +163,14 @@ impl<'e> Setting<'e> {
             let seed = first_seed.wrapping_add(number);
             let mut sound;
             let mut published;
-            let world: &mut dyn UntimedWorld = match (world, &self.perturbed) {
-                (WorldKind::AsPublished, Some(perturbed)) => {
+            let world: &mut dyn UntimedWorld =
+                if let (WorldKind::AsPublished, Some(perturbed)) = (world, &self.perturbed) {
                     published = PublishedWorld::new(&self.chances, perturbed, seed);
                     &mut published
-                }
-                _ => {
+                } else {
                     sound = SoundWorld::new(&self.chances, task.initial(), seed);
                     &mut sound
-                }
-            };
+                };
             let mut plans = |state: &_| planner.plan(state);
             row.add(trial(task, world, &mut plans, &mut *executor, limits));
         }

@@ -36,14 +36,18 @@ impl Situation {
     /// what is left of its duration, and ends as the running one does.
     #[must_use]
     pub fn rest_of_plan(&self, plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
-        let continued = self.running.iter().zip(&plan.steps).map(|(running, step)| Step {
-            start: Rational::ZERO,
-            duration: step
-                .duration
-                .as_ref()
-                .map(|duration| &running.start + duration - &self.time),
-            action: running.rest(&self.time),
-        });
+        let continued = self
+            .running
+            .iter()
+            .zip(&plan.steps)
+            .map(|(running, step)| Step {
+                start: Rational::ZERO,
+                duration: step
+                    .duration
+                    .as_ref()
+                    .map(|duration| &running.start + duration - &self.time),
+                action: running.rest(&self.time),
+            });
         let new = plan.new_steps(self).iter().map(|step| Step {
             start: &step.start - &self.time,
             ..step.clone()

@@ -1,5 +1,7 @@
 //! What trials in perturbed worlds came to.
 
+use std::fmt::Write as _;
+
 use elbowroom_execution::untimed::Trial;
 use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
@@ -161,7 +163,8 @@ pub fn table(experiment: &PerturbedExperiment, rows: &[Row]) -> Table {
     if !compared.is_empty() {
         let agreeing = compared.iter().filter(|&&agrees| agrees).count();
         let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
-        caption += &format!(
+        let _ = write!(
+            caption,
             "\nOf {} published success rates, {agreeing} do not differ from ours at the 5 % level; \
              {} of ours lie in the 95 % interval of what was published.",
             compared.len(),
