@@ -4,8 +4,8 @@
 //! coverage [--limit SECONDS] [--memory MEGABYTES] [--first] [--only TEXT] [--plans] FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
-//! FOLDER holds a `manifest.csv` with the columns collection, domain, instance, domain_file,
-//! problem_file; `--only` keeps the lines that contain the text. With a domain and problems
+//! FOLDER holds a `manifest.csv` with the columns collection, domain, instance, `domain_file`,
+//! `problem_file`; `--only` keeps the lines that contain the text. With a domain and problems
 //! instead, these are run. With `--plans`, plans are printed to standard error.
 #![allow(
     clippy::print_stdout,
