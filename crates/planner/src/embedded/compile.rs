@@ -8,6 +8,7 @@
 //! here once, and the search only takes maxima.
 
 mod builder;
+mod eager;
 mod gaps;
 mod interference;
 mod symbols;
@@ -123,6 +124,8 @@ pub(crate) struct Action {
     pub(crate) breaking_timed: Vec<u32>,
     /// What is lost if it ends as soon as it has started, as far as the order of happenings goes.
     pub(crate) eagerness: Eagerness,
+    /// Whether its end only adds facts that matter where they are true; see `eager`.
+    pub(crate) only_adds_at_end: bool,
     /// Whether it cannot start while another instance of it runs.
     pub(crate) excludes_itself: bool,
     /// Whether something reads `?duration`, or changes continuously.

@@ -101,6 +101,25 @@ impl<'a> Relaxed<'a> {
         self.graph.operators.len() as u64
     }
 
+    /// Whether nothing that the end of the action adds is true, or can become true before it, in a
+    /// state in which one instance of the action is under way.
+    pub(crate) fn is_end_the_only_way(&mut self, state: &State, action: u32) -> bool {
+        let instances = state.open.iter().filter(|open| open.action == action);
+        if instances.count() != 1 {
+            return false;
+        }
+        self.prepare(state);
+        let end = self.compiled.snap(self.compiled.action(action).end);
+        let is_true = |cost: &[u32]| end.adds.iter().any(|&f| cost[2 * f as usize] != UNREACHED);
+        if is_true(&self.cost) {
+            self.buckets.iter_mut().for_each(Vec::clear);
+            return false;
+        }
+        self.missing[self.graph.end_of[action as usize] as usize] += 1;
+        self.spread(state);
+        !is_true(&self.cost)
+    }
+
     /// The parts of the goal that are out of reach, and the ends of what is under way; after an
     /// evaluation that found nothing.
     pub(crate) fn missing_goals(&self) -> Vec<Missing> {

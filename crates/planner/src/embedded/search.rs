@@ -234,6 +234,15 @@ impl<'a> Search<'a> {
             other => other,
         };
         let next = self.stepper.apply(state, step)?;
+        if let Step::Start(action) = step
+            && self.compiled.action(action).only_adds_at_end
+            && state.symbolic.is_none()
+            && self.relaxed.is_end_the_only_way(&next, action)
+        {
+            // No plan is lost: see `compile::eager`.
+            let whole = Step::Whole(action);
+            return Some((whole, self.stepper.apply(state, whole)?));
+        }
         Some((step, next))
     }
 

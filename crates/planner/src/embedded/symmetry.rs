@@ -15,7 +15,7 @@ use super::hash::Map;
 use super::state::State;
 
 /// The most comparisons of actions spent on finding interchangeable objects.
-const MOST_COMPARISONS: usize = 2_000_000;
+const MOST_COMPARISONS: usize = 300_000;
 
 /// A pair of interchangeable objects.
 #[derive(Clone, Debug)]

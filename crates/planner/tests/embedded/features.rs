@@ -77,7 +77,7 @@ fn a_duration_is_chosen_long_enough_for_what_depends_on_it() {
     let found = answer.found().expect("a plan");
     let fill = &found.plan.steps[0];
     assert_eq!(fill.action.name, "(fill)");
-    let needed = "20/3".parse().unwrap();
+    let needed = "20/3".parse().expect("as written above");
     assert!(fill.duration.as_ref().is_some_and(|d| *d >= needed));
 }
 
@@ -176,7 +176,10 @@ fn what_is_not_handled_is_named() {
 
 #[test]
 fn interchangeable_objects_are_tried_once() {
-    let names = (0..24).map(|n| format!("f{n} ")).collect::<String>();
+    let names = (0..24)
+        .map(|n| format!("f{n}"))
+        .collect::<Vec<_>>()
+        .join(" ");
     let domain = "
         (:requirements :typing :durative-actions)
         (:types fuse) (:predicates (hand) (mended ?f - fuse) (spare ?f - fuse) (lit))
@@ -185,7 +188,10 @@ fn interchangeable_objects_are_tried_once() {
           :effect (and (at start (not (hand))) (at start (not (spare ?f)))
                        (at end (mended ?f)) (at end (hand))))
         (:action light :parameters (?f - fuse) :precondition (and (mended ?f) (lit)) :effect (lit))";
-    let spares = (0..24).map(|n| format!("(spare f{n})")).collect::<String>();
+    let spares = (0..24)
+        .map(|n| format!("(spare f{n})"))
+        .collect::<Vec<_>>()
+        .join(" ");
     let problem = format!(
         "(:objects {names} - fuse) (:init (hand) {spares}) (:goal (and (mended f0) (mended f9) (hand)))"
     );

@@ -22,11 +22,11 @@ fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
     let problem =
         format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
     let mut task = task(DELIVERY, &problem);
-    let go = task.problem().schema("go").unwrap();
-    let action = task.instantiate(go, &[]).unwrap();
+    let go = task.problem().schema("go").expect("as written above");
+    let action = task.instantiate(go, &[]).expect("as written above");
     let mut situation = Situation::initial(&task);
-    let here = task.problem().predicate("here").unwrap();
-    let here = task.find_fact(here, &[]).unwrap();
+    let here = task.problem().predicate("here").expect("as written above");
+    let here = task.find_fact(here, &[]).expect("as written above");
     situation.state.facts.remove(&here);
     situation.time = 6.into();
     situation.running.push(RunningAction {
@@ -64,8 +64,8 @@ fn a_deadline_after_now_can_be_out_of_reach() {
 #[test]
 fn a_deadline_that_has_passed_does_not_come_again() {
     let (mut task, mut situation) = on_the_way("5", Interval::closed(8.into(), 15.into()));
-    let open = task.problem().predicate("open").unwrap();
-    let open = task.find_fact(open, &[]).unwrap();
+    let open = task.problem().predicate("open").expect("as written above");
+    let open = task.find_fact(open, &[]).expect("as written above");
     situation.state.facts.remove(&open);
     let answer = answer_from(&mut task, &situation, 100);
     assert!(matches!(answer, Answer::Unsolvable { .. }));

@@ -87,9 +87,9 @@ fn written(literals: &[(u8, bool)], when: &str) -> String {
             format!("(not (f{fact}))")
         };
         if when.is_empty() {
-            write!(text, " {literal}").unwrap();
+            write!(text, " {literal}").expect("as written above");
         } else {
-            write!(text, " (at {when} {literal})").unwrap();
+            write!(text, " (at {when} {literal})").expect("as written above");
         }
     }
     text
@@ -106,26 +106,29 @@ impl Draft {
                 let mut needs = written(&needs, "");
                 let mut effects = written(&action.start, "");
                 if action.cost > 0 {
-                    needs += &format!(" (>= (store) {})", action.cost);
-                    effects += &format!(" (decrease (store) {})", action.cost);
+                    write!(needs, " (>= (store) {})", action.cost).expect("strings take all");
+                    write!(effects, " (decrease (store) {})", action.cost)
+                        .expect("strings take all");
                 }
                 write!(
                     domain,
                     "(:action a{number} :parameters () :precondition (and{needs})
                       :effect (and{effects}))",
                 )
-                .unwrap();
+                .expect("as written above");
                 continue;
             }
             let mut needs = written(&needs, "start");
             let mut effects = written(&action.start, "start");
             effects += &written(&action.end, "end");
             if let Some(fact) = action.over_all {
-                needs += &format!(" (over all (f{fact}))");
+                write!(needs, " (over all (f{fact}))").expect("strings take all");
             }
             if action.cost > 0 {
-                needs += &format!(" (at start (>= (store) {}))", action.cost);
-                effects += &format!(" (at start (decrease (store) {}))", action.cost);
+                write!(needs, " (at start (>= (store) {}))", action.cost)
+                    .expect("strings take all");
+                write!(effects, " (at start (decrease (store) {}))", action.cost)
+                    .expect("strings take all");
             }
             write!(
                 domain,
@@ -133,16 +136,19 @@ impl Draft {
                   :condition (and{needs}) :effect (and{effects}))",
                 action.duration
             )
-            .unwrap();
+            .expect("as written above");
         }
         let facts = |bits: u8| {
             let facts = (0..4).filter(|bit| bits >> bit & 1 == 1);
-            facts.map(|bit| format!("(f{bit})")).collect::<String>()
+            facts
+                .map(|bit| format!("(f{bit})"))
+                .collect::<Vec<_>>()
+                .concat()
         };
         let mut initial = facts(self.initial) + "(= (store) 2)";
         for (time, fact, truth) in &self.timed {
             let literal = written(&[(*fact, *truth)], "");
-            write!(initial, " (at {time}{literal})").unwrap();
+            write!(initial, " (at {time}{literal})").expect("as written above");
         }
         let goal = facts(self.goal);
         task(&domain, &format!("(:init {initial}) (:goal (and {goal}))"))
@@ -344,8 +350,8 @@ proptest! {
         let actions: Vec<Action> = names
             .iter()
             .map(|name| {
-                let schema = task.problem().schema(name).unwrap();
-                task.instantiate(schema, &[]).unwrap()
+                let schema = task.problem().schema(name).expect("as written above");
+                task.instantiate(schema, &[]).expect("as written above")
             })
             .collect();
         let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 1_200 };

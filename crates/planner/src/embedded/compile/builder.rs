@@ -6,8 +6,9 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::{End, Rational};
 
+use super::eager;
 use super::gaps;
-use super::interference::{Links, Stamps, TimedWishes, Touches, Wishes};
+use super::interference::{Access, Links, Stamps, TimedWishes, Touches, Wishes};
 use super::symbols::Symbols;
 use super::{
     Action, Bound, Change, Compiled, Conditional, Duration, Eagerness, Flow, NONE, Rule, Snap,
@@ -297,6 +298,7 @@ impl<'a> Builder<'a> {
                     flows: Vec::new(),
                     breaking_timed: Vec::new(),
                     eagerness: Eagerness::Offers,
+                    only_adds_at_end: false,
                     excludes_itself: true,
                     uses_duration: false,
                 });
@@ -449,6 +451,7 @@ impl<'a> Builder<'a> {
             flows,
             breaking_timed: Vec::new(),
             eagerness: Eagerness::Offers,
+            only_adds_at_end: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }
@@ -496,38 +499,8 @@ impl<'a> Builder<'a> {
                 action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
             }
         }
-        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
-        for number in 0..self.actions.len() {
-            let action = &self.actions[number];
-            if action.start != NONE && action.end != NONE {
-                let (start, end) = (
-                    &self.snaps[action.start as usize],
-                    &self.snaps[action.end as usize],
-                );
-                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
-                // What changes continuously is there to be read meanwhile.
-                if action.flows.is_empty() {
-                    self.actions[number].eagerness = eagerness(start, end, &offers);
-                }
-            }
-        }
-        let goal_reads = Touches::of_condition(self.task, &grounding.goal);
-        let mut goal_wishes = Wishes::default();
-        goal_wishes.need_from_now_on(&goal_reads);
-        let goal_accesses: Vec<_> = goal_wishes
-            .after
-            .iter()
-            .map(|(access, _)| *access)
-            .collect();
-        let goal_timed = (0..coming.len())
-            .filter(|&number| {
-                let makes = &timed_wishes[number].makes;
-                makes.iter().any(|access| goal_accesses.contains(access))
-            })
-            .map(narrow)
-            .collect();
         let mut is_exact = scale.exactly(&Rational::ONE).is_some();
-        let timed = coming
+        let timed: Vec<Timed> = coming
             .iter()
             .zip(&timed_wishes)
             .map(|(happening, wishes)| {
@@ -557,6 +530,53 @@ impl<'a> Builder<'a> {
                 }
                 timed
             })
+            .collect();
+        let ends = eager::Ends::of(&self.actions, &self.snaps, &timed, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.end == NONE || !strata.is_empty() {
+                continue;
+            }
+            let makes = &self.wishes[action.end as usize].makes;
+            let is_plain = makes.iter().all(|&access| match access {
+                Access::Added(fact) => {
+                    self.symbols.known_fact(fact).is_some() || !stamps.has(access)
+                }
+                Access::NeededTrue(_) | Access::NeededFalse(_) => true,
+                _ => !stamps.has(access),
+            });
+            let only_adds = is_plain && ends.only_add(action, &self.snaps);
+            self.actions[number].only_adds_at_end = only_adds;
+        }
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for number in 0..self.actions.len() {
+            let action = &self.actions[number];
+            if action.start != NONE && action.end != NONE {
+                let (start, end) = (
+                    &self.snaps[action.start as usize],
+                    &self.snaps[action.end as usize],
+                );
+                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                // What changes continuously is there to be read meanwhile.
+                if action.flows.is_empty() {
+                    self.actions[number].eagerness = eagerness(start, end, &offers);
+                }
+            }
+        }
+        let goal_reads = Touches::of_condition(self.task, &grounding.goal);
+        let mut goal_wishes = Wishes::default();
+        goal_wishes.need_from_now_on(&goal_reads);
+        let goal_accesses: Vec<_> = goal_wishes
+            .after
+            .iter()
+            .map(|(access, _)| *access)
+            .collect();
+        let goal_timed = (0..coming.len())
+            .filter(|&number| {
+                let makes = &timed_wishes[number].makes;
+                makes.iter().any(|access| goal_accesses.contains(access))
+            })
+            .map(narrow)
             .collect();
         let now = scale.floor(&situation.time);
         let epsilon = scale.ceil(&Rational::ZERO).0.max(self.epsilon);

@@ -349,6 +349,11 @@ impl Stamps {
         [Added(fact), Deleted(fact)].map(|access| self.number(access).unwrap_or(NONE))
     }
 
+    /// Whether someone makes the access and someone waits for it.
+    pub(super) fn has(&self, access: Access) -> bool {
+        self.number(access).is_some()
+    }
+
     fn number(&self, access: Access) -> Option<u32> {
         let number = *self.numbers.get(&access)?;
         (number != NONE).then_some(number)

@@ -1,0 +1,100 @@
+//! Which actions may end before anything else happens, in the order of happenings, without losing
+//! a plan.
+//!
+//! Take a plan in which some happenings come between the start and the end of an action. If none
+//! of them can touch what the end adds, the end may as well stand right after the start: its time
+//! is the same, and so are all distances. They cannot touch a fact if that fact is false after the
+//! start and cannot become true without the end, and whoever reads or deletes it needs it true.
+//! The first is for the search to find out, state by state; the second is settled here.
+
+use super::{Action, Change, NONE, Snap, Timed};
+use crate::embedded::formula::{Formula, Literal};
+
+/// The facts that matter only where they are true.
+#[derive(Debug)]
+pub(super) struct Ends {
+    matters_only_true: Vec<bool>,
+}
+
+impl Ends {
+    pub(super) fn of(
+        actions: &[Action],
+        snaps: &[Snap],
+        timed: &[Timed],
+        fact_count: usize,
+    ) -> Self {
+        let mut ends = Self {
+            matters_only_true: vec![true; fact_count],
+        };
+        for &fact in timed.iter().flat_map(|timed| &timed.deletes) {
+            ends.matters_only_true[fact as usize] = false;
+        }
+        for action in actions {
+            ends.note_formula(&action.over_all);
+            action
+                .guards
+                .iter()
+                .for_each(|guard| ends.note_formula(guard));
+            for number in [action.start, action.end] {
+                let Some(snap) = snaps.get(number as usize) else {
+                    continue;
+                };
+                ends.note_formula(&snap.condition);
+                for effect in &snap.conditional {
+                    // Whether it happens decides whether it deletes, or reads.
+                    effect
+                        .now
+                        .visit_literals(&mut |literal| ends.exclude(literal));
+                    if let Change::Delete(fact) | Change::Add(fact) = effect.change {
+                        ends.matters_only_true[fact as usize] = false;
+                    }
+                }
+                for &fact in &snap.deletes {
+                    let needed = Literal::new(fact, true);
+                    let is_needed = snap.condition.literals.contains(&needed)
+                        || number == action.end && action.over_all.literals.contains(&needed);
+                    if !is_needed {
+                        ends.matters_only_true[fact as usize] = false;
+                    }
+                }
+            }
+        }
+        ends
+    }
+
+    fn note_formula(&mut self, formula: &Formula) {
+        for &literal in &formula.literals {
+            if !literal.truth() {
+                self.exclude(literal);
+            }
+        }
+        for part in formula.choices.iter().flatten() {
+            part.visit_literals(&mut |literal| self.exclude(literal));
+        }
+    }
+
+    fn exclude(&mut self, literal: Literal) {
+        self.matters_only_true[literal.fact() as usize] = false;
+    }
+
+    /// Whether the end of the action does nothing but add such facts.
+    pub(super) fn only_add(&self, action: &Action, snaps: &[Snap]) -> bool {
+        if action.start == NONE || action.end == NONE {
+            return false;
+        }
+        let end = &snaps[action.end as usize];
+        let over_all = &action.over_all;
+        end.condition.is_trivial()
+            && end.deletes.is_empty()
+            && end.updates.is_empty()
+            && end.conditional.is_empty()
+            && action.flows.is_empty()
+            && !action.duration.bounds.iter().any(|bound| bound.at_end)
+            && over_all.tests.is_empty()
+            && over_all.choices.is_empty()
+            && end
+                .adds
+                .iter()
+                .all(|&fact| self.matters_only_true[fact as usize])
+    }
+}
