@@ -50,7 +50,7 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
         ),
         (
             "[[duration]]\naction = \"go\"\nconstant = 1\nvalues = [1]\n",
-            5,
+            6,
             "one distribution",
         ),
         (
