@@ -263,6 +263,35 @@ pub enum Expression {
     Negate(Box<Expression>),
 }
 
+impl Expression {
+    /// The value, or `None` where a leaf has none or a division is by zero.
+    pub fn evaluate(&self, leaf: &mut impl FnMut(&Self) -> Option<Rational>) -> Option<Rational> {
+        Some(match self {
+            Self::Constant(value) => value.clone(),
+            Self::Fluent(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => leaf(self)?,
+            Self::Add(parts) => {
+                let mut total = Rational::ZERO;
+                for part in parts {
+                    total += part.evaluate(leaf)?;
+                }
+                total
+            }
+            Self::Multiply(parts) => {
+                let mut product = Rational::ONE;
+                for part in parts {
+                    product *= part.evaluate(leaf)?;
+                }
+                product
+            }
+            Self::Subtract(left, right) => left.evaluate(leaf)? - right.evaluate(leaf)?,
+            Self::Divide(left, right) => {
+                left.evaluate(leaf)?.checked_div(&right.evaluate(leaf)?)?
+            }
+            Self::Negate(part) => -part.evaluate(leaf)?,
+        })
+    }
+}
+
 /// A number that the problem leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Unknown {

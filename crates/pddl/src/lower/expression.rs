@@ -163,28 +163,5 @@ impl Reader {
 
 /// The value of an expression without fluents and other names.
 fn value(expression: &Expression) -> Option<Rational> {
-    Some(match expression {
-        Expression::Constant(value) => value.clone(),
-        Expression::Add(parts) => {
-            let mut total = Rational::ZERO;
-            for part in parts {
-                total += value(part)?;
-            }
-            total
-        }
-        Expression::Multiply(parts) => {
-            let mut product = Rational::ONE;
-            for part in parts {
-                product *= value(part)?;
-            }
-            product
-        }
-        Expression::Subtract(left, right) => value(left)? - value(right)?,
-        Expression::Divide(left, right) => value(left)?.checked_div(&value(right)?)?,
-        Expression::Negate(part) => -value(part)?,
-        Expression::Fluent(_)
-        | Expression::Duration
-        | Expression::TotalTime
-        | Expression::Unknown(_) => return None,
-    })
+    expression.evaluate(&mut |_| None)
 }

@@ -11,10 +11,8 @@ pub(crate) fn metric_value(
     expression: &Expression,
     report: &Report,
 ) -> Option<Rational> {
-    let value = |part: &Expression| metric_value(task, part, report);
-    Some(match expression {
-        Expression::Constant(value) => value.clone(),
-        Expression::TotalTime => report.makespan.clone(),
+    expression.evaluate(&mut |leaf| match leaf {
+        Expression::TotalTime => Some(report.makespan.clone()),
         Expression::Fluent(fluent) => {
             let objects = fluent.arguments.iter().map(|term| match term {
                 Term::Object(object) => Some(*object),
@@ -22,25 +20,8 @@ pub(crate) fn metric_value(
             });
             let objects: Option<Vec<ObjectId>> = objects.collect();
             let fluent = task.find_fluent(fluent.function, &objects?)?;
-            report.state.values.get(&fluent)?.clone()
+            report.state.values.get(&fluent).cloned()
         }
-        Expression::Duration | Expression::Unknown(_) => return None,
-        Expression::Add(parts) => {
-            let mut sum = Rational::ZERO;
-            for part in parts {
-                sum += value(part)?;
-            }
-            sum
-        }
-        Expression::Multiply(parts) => {
-            let mut product = Rational::ONE;
-            for part in parts {
-                product *= value(part)?;
-            }
-            product
-        }
-        Expression::Subtract(left, right) => value(left)? - value(right)?,
-        Expression::Divide(left, right) => value(left)?.checked_div(&value(right)?)?,
-        Expression::Negate(part) => -value(part)?,
+        _ => None,
     })
 }
