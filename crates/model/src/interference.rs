@@ -160,6 +160,9 @@ impl Task {
     /// Calls `visit` for each basic fact that a condition reads; a derived fact counts as all
     /// basic facts that its rules mention, directly or through other derived facts.
     pub fn visit_facts_of(&self, condition: &Condition, visit: &mut impl FnMut(FactId)) {
+        if self.rules().is_empty() {
+            return condition.visit_facts(visit);
+        }
         for fact in self.closure(condition) {
             if !self.is_derived(fact) {
                 visit(fact);
@@ -170,6 +173,9 @@ impl Task {
     /// Calls `visit` for each fluent that a condition reads, also through derived facts.
     pub fn visit_fluents_of(&self, condition: &Condition, visit: &mut impl FnMut(FluentId)) {
         condition.visit_fluents(visit);
+        if self.rules().is_empty() {
+            return;
+        }
         for fact in self.closure(condition) {
             for rule in self.rules_of(fact) {
                 rule.body.visit_fluents(visit);

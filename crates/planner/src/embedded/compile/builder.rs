@@ -3,12 +3,12 @@
 use elbowroom_model::ground::{self, Body, Change as ModelChange, Condition, DurativeBody};
 use elbowroom_model::problem::{self, Comparison};
 use elbowroom_model::reachability::Grounding;
-use elbowroom_model::{Situation, Task};
+use elbowroom_model::{Footprint, Situation, Task};
 use elbowroom_num::{End, Rational};
 
 use super::eager;
 use super::gaps;
-use super::interference::{Access, Links, Stamps, TimedWishes, Touches, Wishes};
+use super::interference::{Access, Links, Stamps, TimedWishes, Wishes};
 use super::symbols::Symbols;
 use super::{
     Action, Bound, Change, Compiled, Conditional, Duration, Eagerness, Flow, NONE, Rule, Snap,
@@ -36,7 +36,7 @@ pub(crate) fn compile(
     situation: &Situation,
     epsilon: &Rational,
 ) -> Result<Compiled, Unsupported> {
-    let mut footprints = full_touches(task, grounding);
+    let mut footprints = full_footprints(task, grounding);
     let mut builder = Builder::new(task);
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
@@ -102,10 +102,10 @@ struct Builder<'a> {
     over_all: Vec<Condition>,
 }
 
-/// What start and end touch, as the judge sees it, of the actions of which grounding may have
+/// The footprints of start and end, as the judge sees them, of the actions of which grounding may have
 /// dropped something that reads or writes a changing fact: a conditional effect that never happens,
 /// or a part of a disjunction that other parts decide. These interfere all the same.
-fn full_touches(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Touches, Touches)>> {
+fn full_footprints(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Footprint, Footprint)>> {
     let schemas = &task.problem().schemas;
     let is_shortened: Vec<bool> = schemas.iter().map(may_be_shortened).collect();
     if !is_shortened.contains(&true) {
@@ -119,8 +119,8 @@ fn full_touches(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Touches, 
                 return None;
             }
             let full = task.instantiate(action.schema, &action.arguments).ok()?;
-            let starts = Touches::of_start(task, &full);
-            Some((starts, Touches::of_end(task, &full)))
+            let starts = Footprint::of_start(task, &full);
+            Some((starts, Footprint::of_end(task, &full)))
         })
         .collect()
 }
@@ -264,21 +264,21 @@ impl<'a> Builder<'a> {
         let Some(body) = action.durative() else {
             return;
         };
-        let touches = Touches::of_end(self.task, action);
-        let end = self.end_of(body, &touches);
+        let footprint = Footprint::of_end(self.task, action);
+        let end = self.end_of(body, &footprint);
         let compiled = self.durative(action, body, NONE, end, Vec::new());
         self.actions.push(compiled);
         self.over_all.push(body.over_all.clone());
     }
 
-    fn action(&mut self, action: &ground::Action, footprints: Option<(Touches, Touches)>) {
+    fn action(&mut self, action: &ground::Action, footprints: Option<(Footprint, Footprint)>) {
         let (starts, ends) = footprints.unwrap_or_else(|| {
             (
-                Touches::of_start(self.task, action),
-                Touches::of_end(self.task, action),
+                Footprint::of_start(self.task, action),
+                Footprint::of_end(self.task, action),
             )
         });
-        let mut wishes = starts.wishes(self.epsilon, &self.links);
+        let mut wishes = Wishes::of(&starts, self.epsilon, &self.links);
         match &action.body {
             Body::Instantaneous(body) => {
                 let snap = self.snap(body, &mut Vec::new());
@@ -305,7 +305,7 @@ impl<'a> Builder<'a> {
                 self.over_all.push(Condition::TRUE);
             }
             Body::Durative(body) => {
-                let over_all = Touches::of_condition(self.task, &body.over_all);
+                let over_all = Footprint::of_condition(self.task, &body.over_all);
                 wishes.need_from_now_on(&over_all);
                 let mut guards = Vec::new();
                 let snap = self.snap(&body.start, &mut guards);
@@ -319,21 +319,21 @@ impl<'a> Builder<'a> {
     }
 
     /// The end of an action that is under way; its guards are decided.
-    fn end_of(&mut self, body: &DurativeBody, touches: &Touches) -> u32 {
+    fn end_of(&mut self, body: &DurativeBody, footprint: &Footprint) -> u32 {
         let mut decided = body.clone();
         for effect in &mut decided.end.effects {
             effect.guard.at_start = Condition::TRUE;
         }
-        self.end_with(&decided, touches, &mut Vec::new())
+        self.end_with(&decided, footprint, &mut Vec::new())
     }
 
     fn end_with(
         &mut self,
         body: &DurativeBody,
-        touches: &Touches,
+        footprint: &Footprint,
         guards: &mut Vec<Formula>,
     ) -> u32 {
-        let mut wishes = touches.wishes(self.epsilon, &self.links);
+        let mut wishes = Wishes::of(footprint, self.epsilon, &self.links);
         wishes.needed_until_now(self.task, &body.over_all);
         let snap = self.snap(&body.end, guards);
         self.push_snap(snap, wishes)
@@ -478,7 +478,7 @@ impl<'a> Builder<'a> {
             .collect();
         let timed_wishes: Vec<Wishes> = coming
             .iter()
-            .map(|timed| Touches::of_timed(timed).wishes(self.epsilon, &self.links))
+            .map(|timed| Wishes::of(&Footprint::of_timed(timed), self.epsilon, &self.links))
             .collect();
         let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
         let waiting = TimedWishes::of(&timed_wishes);
@@ -563,7 +563,7 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        let goal_reads = Touches::of_condition(self.task, &grounding.goal);
+        let goal_reads = Footprint::of_condition(self.task, &grounding.goal);
         let mut goal_wishes = Wishes::default();
         goal_wishes.need_from_now_on(&goal_reads);
         let goal_accesses: Vec<_> = goal_wishes

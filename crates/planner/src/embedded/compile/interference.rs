@@ -1,8 +1,8 @@
 //! Which happenings must keep what distance: wishes first, then stamps for those that matter.
 
+use elbowroom_model::Footprint;
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body, Change, Condition, Expression, FactId, FluentId};
-use elbowroom_model::{Footprint, TimedHappening};
+use elbowroom_model::ground::{Condition, FactId, FluentId};
 
 use crate::embedded::hash::Map;
 use crate::embedded::time::Ticks;
@@ -30,17 +30,6 @@ use Access::{
     Added, Assigned, Deleted, NeededFalse, NeededTrue, NeededValue, Read, ReadValue, Shifted,
 };
 
-/// What a happening reads and writes; like the judge's [`Footprint`], in plain lists.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Touches {
-    pub(super) reads: Vec<FactId>,
-    pub(super) adds: Vec<FactId>,
-    pub(super) deletes: Vec<FactId>,
-    pub(super) reads_fluents: Vec<FluentId>,
-    pub(super) shifts: Vec<FluentId>,
-    pub(super) assigns: Vec<FluentId>,
-}
-
 /// The distances a happening must keep, and the accesses it makes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Wishes {
@@ -57,150 +46,34 @@ pub(super) struct Links {
     fluents: Map<FluentId, Vec<Access>>,
 }
 
-impl Touches {
-    /// Those of the start, or of the instant.
-    pub(super) fn of_start(task: &Task, action: &Action) -> Self {
-        let mut touches = Self::default();
-        match &action.body {
-            Body::Instantaneous(snap) => {
-                touches.condition(task, &snap.condition);
-                touches.effects(task, &snap.effects);
-            }
-            Body::Durative(body) => {
-                touches.condition(task, &body.start.condition);
-                touches.effects(task, &body.start.effects);
-                for bound in body.duration.iter().filter(|bound| !bound.at_end) {
-                    touches.expression(&bound.bound);
-                }
-                for effect in &body.end.effects {
-                    touches.condition(task, &effect.guard.at_start);
-                }
-                for effect in &body.continuous {
-                    touches.condition(task, &effect.guard.at_start);
-                    touches.expression(&effect.rate);
-                    touches.shifts.push(effect.fluent);
-                }
-            }
-        }
-        touches.sorted()
-    }
-
-    /// Those of the end.
-    pub(super) fn of_end(task: &Task, action: &Action) -> Self {
-        let mut touches = Self::default();
-        if let Some(body) = action.durative() {
-            touches.condition(task, &body.end.condition);
-            touches.effects(task, &body.end.effects);
-            for bound in body.duration.iter().filter(|bound| bound.at_end) {
-                touches.expression(&bound.bound);
-            }
-            touches
-                .shifts
-                .extend(body.continuous.iter().map(|effect| effect.fluent));
-        }
-        touches.sorted()
-    }
-
-    pub(super) fn of_footprint(footprint: Footprint) -> Self {
-        Self {
-            reads: footprint.reads.into_iter().collect(),
-            adds: footprint.adds.into_iter().collect(),
-            deletes: footprint.deletes.into_iter().collect(),
-            reads_fluents: footprint.reads_fluents.into_iter().collect(),
-            shifts: footprint.shifts.into_iter().collect(),
-            assigns: footprint.assigns.into_iter().collect(),
-        }
-    }
-
-    pub(super) fn of_timed(timed: &TimedHappening) -> Self {
-        Self::of_footprint(Footprint::of_timed(timed))
-    }
-
-    /// What a condition reads.
-    pub(super) fn of_condition(task: &Task, condition: &Condition) -> Self {
-        let mut touches = Self::default();
-        touches.condition(task, condition);
-        touches.sorted()
-    }
-
-    fn effects(&mut self, task: &Task, effects: &[elbowroom_model::ground::Effect]) {
-        for effect in effects {
-            self.condition(task, &effect.guard.now);
-            match &effect.change {
-                Change::Add(fact) => self.adds.push(*fact),
-                Change::Delete(fact) => self.deletes.push(*fact),
-                Change::Update {
-                    operator,
-                    fluent,
-                    value,
-                } => {
-                    if operator.is_additive() {
-                        self.shifts.push(*fluent);
-                    } else {
-                        self.assigns.push(*fluent);
-                    }
-                    self.expression(value);
-                }
-            }
-        }
-    }
-
-    fn condition(&mut self, task: &Task, condition: &Condition) {
-        if condition.is_trivial() {
-            return;
-        }
-        if task.rules().is_empty() {
-            condition.visit_facts(&mut |fact| self.reads.push(fact));
-            condition.visit_fluents(&mut |fluent| self.reads_fluents.push(fluent));
-        } else {
-            task.visit_facts_of(condition, &mut |fact| self.reads.push(fact));
-            task.visit_fluents_of(condition, &mut |fluent| self.reads_fluents.push(fluent));
-        }
-    }
-
-    fn expression(&mut self, expression: &Expression) {
-        expression.visit_fluents(&mut |fluent| self.reads_fluents.push(fluent));
-    }
-
-    fn sorted(mut self) -> Self {
-        for facts in [&mut self.reads, &mut self.adds, &mut self.deletes] {
-            facts.sort_unstable();
-            facts.dedup();
-        }
-        for fluents in [&mut self.reads_fluents, &mut self.shifts, &mut self.assigns] {
-            fluents.sort_unstable();
-            fluents.dedup();
-        }
-        self
-    }
-
-    /// The distances and accesses of a happening that touches this.
-    pub(super) fn wishes(&self, epsilon: Ticks, links: &Links) -> Wishes {
-        let mut wishes = Wishes::default();
-        for &fact in &self.reads {
+impl Wishes {
+    /// The distances and accesses of a happening that reads and writes this.
+    pub(super) fn of(footprint: &Footprint, epsilon: Ticks, links: &Links) -> Self {
+        let mut wishes = Self::default();
+        for &fact in &footprint.reads {
             wishes.after([Added(fact), Deleted(fact)], epsilon);
             wishes.makes.push(Read(fact));
         }
-        for &fact in &self.adds {
+        for &fact in &footprint.adds {
             wishes.after([Deleted(fact), Read(fact)], epsilon);
             wishes.after([NeededFalse(fact)], 0);
             wishes.makes.push(Added(fact));
         }
-        for &fact in &self.deletes {
+        for &fact in &footprint.deletes {
             wishes.after([Added(fact), Read(fact)], epsilon);
             wishes.after([NeededTrue(fact)], 0);
             wishes.makes.push(Deleted(fact));
         }
-        for &fluent in &self.reads_fluents {
+        for &fluent in &footprint.reads_fluents {
             wishes.after([Shifted(fluent), Assigned(fluent)], epsilon);
             wishes.makes.push(ReadValue(fluent));
         }
-        for &fluent in &self.shifts {
+        for &fluent in &footprint.shifts {
             wishes.after([Assigned(fluent), ReadValue(fluent)], epsilon);
             wishes.after([NeededValue(fluent)], 0);
             wishes.makes.push(Shifted(fluent));
         }
-        for &fluent in &self.assigns {
+        for &fluent in &footprint.assigns {
             wishes.after(
                 [Assigned(fluent), Shifted(fluent), ReadValue(fluent)],
                 epsilon,
@@ -208,21 +81,19 @@ impl Touches {
             wishes.after([NeededValue(fluent)], 0);
             wishes.makes.push(Assigned(fluent));
         }
-        for fact in self.adds.iter().chain(&self.deletes) {
+        for fact in footprint.adds.iter().chain(&footprint.deletes) {
             if let Some(linked) = links.facts.get(fact) {
                 wishes.after(linked.iter().copied(), 0);
             }
         }
-        for fluent in self.shifts.iter().chain(&self.assigns) {
+        for fluent in footprint.shifts.iter().chain(&footprint.assigns) {
             if let Some(linked) = links.fluents.get(fluent) {
                 wishes.after(linked.iter().copied(), 0);
             }
         }
         wishes
     }
-}
 
-impl Wishes {
     fn after(&mut self, accesses: impl IntoIterator<Item = Access>, distance: Ticks) {
         self.after
             .extend(accesses.into_iter().map(|access| (access, distance)));
@@ -230,11 +101,11 @@ impl Wishes {
 
     /// Adds what the start of an action needs for its over-all condition: what it reads was
     /// brought about by then.
-    pub(super) fn need_from_now_on(&mut self, touches: &Touches) {
-        for &fact in &touches.reads {
+    pub(super) fn need_from_now_on(&mut self, footprint: &Footprint) {
+        for &fact in &footprint.reads {
             self.after([Added(fact), Deleted(fact)], 0);
         }
-        for &fluent in &touches.reads_fluents {
+        for &fluent in &footprint.reads_fluents {
             self.after([Shifted(fluent), Assigned(fluent)], 0);
         }
     }
@@ -251,11 +122,11 @@ impl Wishes {
                     part.visit_facts(&mut |fact| self.makes.push(NeededFalse(fact)));
                 }
                 other => {
-                    let touches = Touches::of_condition(task, other);
-                    for fact in touches.reads {
+                    let footprint = Footprint::of_condition(task, other);
+                    for fact in footprint.reads {
                         self.makes.extend([NeededTrue(fact), NeededFalse(fact)]);
                     }
-                    for fluent in touches.reads_fluents {
+                    for fluent in footprint.reads_fluents {
                         self.makes.push(NeededValue(fluent));
                     }
                 }
@@ -278,22 +149,22 @@ impl Links {
             if is_literal {
                 continue;
             }
-            let touches = Touches::of_condition(task, conjunct);
-            let accesses: Vec<Access> = touches
+            let footprint = Footprint::of_condition(task, conjunct);
+            let accesses: Vec<Access> = footprint
                 .reads
                 .iter()
                 .flat_map(|&fact| [Added(fact), Deleted(fact)])
                 .chain(
-                    touches
+                    footprint
                         .reads_fluents
                         .iter()
                         .flat_map(|&fluent| [Shifted(fluent), Assigned(fluent)]),
                 )
                 .collect();
-            for &fact in &touches.reads {
+            for &fact in &footprint.reads {
                 merge(self.facts.entry(fact).or_default(), &accesses);
             }
-            for &fluent in &touches.reads_fluents {
+            for &fluent in &footprint.reads_fluents {
                 merge(self.fluents.entry(fluent).or_default(), &accesses);
             }
         }
