@@ -1,8 +1,7 @@
 //! Runs planners on instances, and writes down what became of them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::fs::{self, OpenOptions};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -15,7 +14,7 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::pddl::{Source, read_problem};
 use elbowroom::planner::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 
-use crate::row::{HEADER, Row};
+use crate::row::{self, Row};
 
 struct Options {
     data: PathBuf,
@@ -48,10 +47,11 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
         .append(true)
         .open(&options.output)
         .map_err(|error| format!("{}: {error}", options.output.display()))?;
-    if done.is_empty() && file.metadata().is_ok_and(|file| file.len() == 0) {
-        write(&file, HEADER)?;
-    }
-    let file = Mutex::new(file);
+    let is_new = file.metadata().is_ok_and(|file| file.len() == 0);
+    let writer = csv::WriterBuilder::new()
+        .has_headers(is_new)
+        .from_writer(file);
+    let writer = Mutex::new(writer);
     let next = AtomicUsize::new(0);
     let work = || -> Result<(), String> {
         loop {
@@ -69,8 +69,11 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
                 row.instance,
                 row.outcome
             );
-            let file = file.lock().map_err(|_| "another job has failed")?;
-            write(&file, &row.line())?;
+            let mut writer = writer.lock().map_err(|_| "another job has failed")?;
+            let written = writer.serialize(&row);
+            written
+                .and_then(|()| Ok(writer.flush()?))
+                .map_err(|error| format!("the results cannot be written: {error}"))?;
         }
     };
     thread::scope(|scope| {
@@ -80,10 +83,6 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
         }
         Ok(())
     })
-}
-
-fn write(mut file: &File, line: &str) -> Result<(), String> {
-    writeln!(file, "{line}").map_err(|error| format!("the results cannot be written: {error}"))
 }
 
 fn options(arguments: &[String]) -> Result<Options, String> {
@@ -129,9 +128,7 @@ fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
     if !path.exists() {
         return Ok(BTreeSet::new());
     }
-    let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let rows = text.lines().skip(1).filter_map(Row::parse);
-    Ok(rows.map(|row| row.key()).collect())
+    Ok(row::read(path)?.iter().map(Row::key).collect())
 }
 
 /// All planners on the temporal instances, instance by instance.
