@@ -3,11 +3,9 @@
 //! Variables are numbered by position: an action's parameters come first, then the variables of
 //! each enclosing quantifier, outermost first. A [`Term::Variable`] is an index into that list.
 
-mod expression;
-
 use elbowroom_num::Rational;
 
-pub use expression::{Comparison, Expression, Unknown};
+pub use crate::expression::{Comparison, Unknown};
 
 /// Declares an index into one of [`Problem`]'s lists.
 macro_rules! id {
@@ -202,6 +200,9 @@ impl Default for Condition {
         Self::TRUE
     }
 }
+
+/// A numeric expression.
+pub type Expression = crate::expression::Expression<Fluent>;
 
 /// An action schema.
 #[derive(Clone, Debug, PartialEq)]
