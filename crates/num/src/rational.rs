@@ -18,8 +18,9 @@ pub struct Rational(Repr);
 
 #[derive(Clone)]
 enum Repr {
-    /// Lowest terms, `denominator > 0`, `numerator != i64::MIN`.
-    Small { numerator: i64, denominator: i64 },
+    /// Numerator and denominator in lowest terms; the numerator is not `i64::MIN`, the denominator
+    /// positive.
+    Small(i64, i64),
     /// Only what does not fit `Small`.
     Big(Box<RBig>),
 }
@@ -35,10 +36,7 @@ impl Rational {
     pub const ONE: Self = Self::integer(1);
 
     const fn integer(numerator: i64) -> Self {
-        Self(Small {
-            numerator,
-            denominator: 1,
-        })
+        Self(Small(numerator, 1))
     }
 
     /// The fraction `numerator / denominator`.
@@ -72,10 +70,9 @@ impl Rational {
             (n, d) = (-n, -d);
         }
         match (i64::try_from(n), i64::try_from(d)) {
-            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
-                numerator,
-                denominator,
-            }),
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => {
+                Self(Small(numerator, denominator))
+            }
             _ => Self::from_big(RBig::from_parts(
                 IBig::from(n),
                 UBig::try_from(d).expect("the denominator was made positive"),
@@ -88,29 +85,22 @@ impl Rational {
     fn reduced_small(numerator: i64, denominator: i64) -> Self {
         let divisor = gcd_u64(numerator.unsigned_abs(), denominator.unsigned_abs());
         let divisor = i64::try_from(divisor).expect("not above the denominator");
-        Self(Small {
-            numerator: numerator / divisor,
-            denominator: denominator / divisor,
-        })
+        Self(Small(numerator / divisor, denominator / divisor))
     }
 
     fn from_big(big: RBig) -> Self {
         let (numerator, denominator) = (big.numerator(), big.denominator());
         match (i64::try_from(numerator), i64::try_from(denominator)) {
-            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
-                numerator,
-                denominator,
-            }),
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => {
+                Self(Small(numerator, denominator))
+            }
             _ => Self(Big(Box::new(big))),
         }
     }
 
     fn to_big(&self) -> RBig {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => RBig::from_parts(
+            Small(numerator, denominator) => RBig::from_parts(
                 IBig::from(*numerator),
                 UBig::try_from(*denominator).expect("denominators are positive"),
             ),
@@ -120,7 +110,7 @@ impl Rational {
 
     /// Whether this is 0.
     pub fn is_zero(&self) -> bool {
-        matches!(self.0, Small { numerator: 0, .. })
+        matches!(self.0, Small(0, _))
     }
 
     /// Whether this is below 0.
@@ -136,7 +126,7 @@ impl Rational {
     /// Whether this is a whole number.
     pub fn is_integer(&self) -> bool {
         match &self.0 {
-            Small { denominator, .. } => *denominator == 1,
+            Small(_, denominator) => *denominator == 1,
             Big(big) => big.is_int(),
         }
     }
@@ -144,7 +134,7 @@ impl Rational {
     /// -1, 0 or 1, as this is below, at or above 0.
     pub fn signum(&self) -> i32 {
         match &self.0 {
-            Small { numerator, .. } => match numerator.cmp(&0) {
+            Small(numerator, _) => match numerator.cmp(&0) {
                 Ordering::Less => -1,
                 Ordering::Equal => 0,
                 Ordering::Greater => 1,
@@ -191,10 +181,7 @@ impl Rational {
     #[must_use]
     pub fn floor(&self) -> Self {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Self::from(numerator.div_euclid(*denominator)),
+            Small(numerator, denominator) => Self::from(numerator.div_euclid(*denominator)),
             Big(big) => Self::from_big(RBig::from(big.floor())),
         }
     }
@@ -212,10 +199,7 @@ impl Rational {
     )]
     pub fn to_f64(&self) -> f64 {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => *numerator as f64 / *denominator as f64,
+            Small(numerator, denominator) => *numerator as f64 / *denominator as f64,
             Big(big) => big.to_f64().value(),
         }
     }
@@ -223,10 +207,7 @@ impl Rational {
     /// Numerator and denominator, when both fit an `i64`.
     pub fn as_small(&self) -> Option<(i64, i64)> {
         match self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Some((numerator, denominator)),
+            Small(numerator, denominator) => Some((numerator, denominator)),
             Big(_) => None,
         }
     }
@@ -234,7 +215,7 @@ impl Rational {
     /// The denominator of the fraction in lowest terms, when it fits an `i64`.
     pub fn denominator(&self) -> Option<i64> {
         match &self.0 {
-            Small { denominator, .. } => Some(*denominator),
+            Small(_, denominator) => Some(*denominator),
             Big(big) => i64::try_from(big.denominator()).ok(),
         }
     }
@@ -329,16 +310,7 @@ impl Default for Rational {
 impl PartialEq for Rational {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => a == c && b == d,
+            (&Small(a, b), &Small(c, d)) => a == c && b == d,
             (Big(a), Big(b)) => a == b,
             _ => false,
         }
@@ -350,10 +322,7 @@ impl Eq for Rational {}
 impl Hash for Rational {
     fn hash<H: Hasher>(&self, state: &mut H) {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => (numerator, denominator).hash(state),
+            Small(numerator, denominator) => (numerator, denominator).hash(state),
             Big(big) => (big.numerator(), big.denominator()).hash(state),
         }
     }
@@ -368,20 +337,11 @@ impl PartialOrd for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => {
+            (&Small(a, b), &Small(c, d)) => {
                 if b == d {
-                    a.cmp(c)
+                    a.cmp(&c)
                 } else {
-                    (i128::from(*a) * i128::from(*d)).cmp(&(i128::from(*c) * i128::from(*b)))
+                    (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
                 }
             }
             _ => self.to_big().cmp(&other.to_big()),

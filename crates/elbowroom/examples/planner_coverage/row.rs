@@ -24,6 +24,7 @@ pub(crate) struct Row {
     pub(crate) refused: String,
     /// Whether the times of the last plan had to be repaired.
     pub(crate) repaired: String,
+    /// Processor time of all its processes.
     pub(crate) seconds: String,
     pub(crate) megabytes: String,
     /// What else is to be said.

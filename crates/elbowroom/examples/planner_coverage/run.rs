@@ -20,6 +20,7 @@ struct Options {
     data: PathBuf,
     planners: Vec<String>,
     output: PathBuf,
+    /// Processor time.
     seconds: u64,
     megabytes: u64,
     jobs: usize,
@@ -230,7 +231,9 @@ fn run(job: &Job, options: &Options) -> Row {
         Err(error) => return outcome(row, "not started", error),
     };
     let settings = Settings {
-        time_limit: Some(Duration::from_secs(options.seconds)),
+        work_limit: Some(Duration::from_secs(options.seconds)),
+        // For a planner that waits for nothing.
+        time_limit: Some(Duration::from_secs(options.seconds * 6)),
         memory_limit: Some(options.megabytes << 20),
         ..Settings::default()
     };
@@ -303,7 +306,7 @@ fn filled(row: Row, report: &Report) -> Row {
                 .to_owned()
             })
             .unwrap_or_default(),
-        seconds: seconds(statistics.elapsed),
+        seconds: seconds(statistics.work),
         megabytes: (statistics.peak_memory >> 20).to_string(),
         note: note.chars().take(300).collect(),
         ..row

@@ -22,45 +22,25 @@ impl<'a> Sub<&'a Rational> for &Rational {
 
 /// `a + b`, or `a - b` when `subtract`.
 fn sum(left: &Rational, right: &Rational, subtract: bool) -> Rational {
-    if let (
-        Small {
-            numerator: a,
-            denominator: b,
-        },
-        Small {
-            numerator: c,
-            denominator: d,
-        },
-    ) = (&left.0, &right.0)
-    {
-        let c = if subtract { -c } else { *c };
+    if let (&Small(a, b), &Small(c, d)) = (&left.0, &right.0) {
+        let c = if subtract { -c } else { c };
         // With a whole number on one side, the sum is in lowest terms already.
-        let whole = if *d == 1 {
-            c.checked_mul(*b)
-                .and_then(|c| Some((a.checked_add(c)?, *b)))
-        } else if *b == 1 {
-            a.checked_mul(*d)
-                .and_then(|a| Some((a.checked_add(c)?, *d)))
+        let whole = if d == 1 {
+            c.checked_mul(b).and_then(|c| Some((a.checked_add(c)?, b)))
+        } else if b == 1 {
+            a.checked_mul(d).and_then(|a| Some((a.checked_add(c)?, d)))
         } else {
             None
         };
         if let Some((numerator, denominator)) = whole
             && numerator != i64::MIN
         {
-            return Rational(Small {
-                numerator,
-                denominator,
-            });
+            return Rational(Small(numerator, denominator));
         }
         if b == d {
-            return Rational::reduced(i128::from(*a) + i128::from(c), i128::from(*b));
+            return Rational::reduced(i128::from(a) + i128::from(c), i128::from(b));
         }
-        let (a, b, c, d) = (
-            i128::from(*a),
-            i128::from(*b),
-            i128::from(c),
-            i128::from(*d),
-        );
+        let [a, b, c, d] = [a, b, c, d].map(i128::from);
         return Rational::reduced(a * d + c * b, b * d);
     }
     let (a, b) = (left.to_big(), right.to_big());
@@ -71,31 +51,16 @@ impl<'a> Mul<&'a Rational> for &Rational {
     type Output = Rational;
     fn mul(self, other: &'a Rational) -> Rational {
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => {
+            (&Small(a, b), &Small(c, d)) => {
                 // Most products are with 1 or -1, or of whole numbers.
-                let (is_sign, is_signed) = (d == &1 && c.abs() == 1, b == &1 && a.abs() == 1);
-                if (is_sign || is_signed || (b == &1 && d == &1))
-                    && let Some(numerator) = a.checked_mul(*c)
+                let (is_sign, is_signed) = (d == 1 && c.abs() == 1, b == 1 && a.abs() == 1);
+                if (is_sign || is_signed || (b == 1 && d == 1))
+                    && let Some(numerator) = a.checked_mul(c)
                     && numerator != i64::MIN
                 {
-                    return Rational(Small {
-                        numerator,
-                        denominator: b * d,
-                    });
+                    return Rational(Small(numerator, b * d));
                 }
-                Rational::reduced(
-                    i128::from(*a) * i128::from(*c),
-                    i128::from(*b) * i128::from(*d),
-                )
+                Rational::reduced(i128::from(a) * i128::from(c), i128::from(b) * i128::from(d))
             }
             _ => Rational::from_big(self.to_big() * other.to_big()),
         }
@@ -109,19 +74,9 @@ impl<'a> Div<&'a Rational> for &Rational {
     fn div(self, other: &'a Rational) -> Rational {
         assert!(!other.is_zero(), "division of a rational by zero");
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => Rational::reduced(
-                i128::from(*a) * i128::from(*d),
-                i128::from(*b) * i128::from(*c),
-            ),
+            (&Small(a, b), &Small(c, d)) => {
+                Rational::reduced(i128::from(a) * i128::from(d), i128::from(b) * i128::from(c))
+            }
             _ => Rational::from_big(self.to_big() / other.to_big()),
         }
     }
@@ -131,13 +86,7 @@ impl Neg for &Rational {
     type Output = Rational;
     fn neg(self) -> Rational {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Rational(Small {
-                numerator: -numerator,
-                denominator: *denominator,
-            }),
+            Small(numerator, denominator) => Rational(Small(-numerator, *denominator)),
             Big(big) => Rational::from_big(-(**big).clone()),
         }
     }

@@ -13,14 +13,8 @@ use super::Repr::{Big, Small};
 impl fmt::Display for Rational {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
-            Small {
-                numerator,
-                denominator: 1,
-            } => f.pad(&numerator.to_string()),
-            Small {
-                numerator,
-                denominator,
-            } => f.pad(&format!("{numerator}/{denominator}")),
+            Small(numerator, 1) => f.pad(&numerator.to_string()),
+            Small(numerator, denominator) => f.pad(&format!("{numerator}/{denominator}")),
             Big(big) => f.pad(&big.to_string()),
         }
     }
