@@ -7,10 +7,12 @@ use elbowroom_plan::reduction::{BoxEnd, Edge, Reduction, Side};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
+use crate::branching::{Branching, TooManyBranches};
 use crate::cycles::{Cycles, Role, other_side, own_limits};
 
-/// How many corners are looked at before the question is given up.
-pub(crate) const MOST_CORNERS: usize = 1 << 14;
+/// How many corners are kept from one box to the next; if there are more, [`Branching`] looks for
+/// those that matter.
+const MOST_CORNERS: usize = 1 << 8;
 
 /// Whether a plan's network has a schedule for every value in a box (weak controllability).
 ///
@@ -36,6 +38,8 @@ pub(crate) struct Feasibility {
     roles: Vec<Role>,
     /// Parameters that bound several differences.
     coupled: Vec<ParameterId>,
+    /// Whether there are too many corners to keep.
+    branches: bool,
     corners: Vec<Corner>,
 }
 
@@ -55,15 +59,8 @@ pub(crate) enum Infeasible {
     FarOut(BoxEnd),
 }
 
-/// Too many parameters are on cycles both ways.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct TooManyCorners;
-
 impl Feasibility {
-    pub(crate) fn new(
-        plan: &ParametrizedPlan,
-        reduction: &Reduction,
-    ) -> Result<Self, TooManyCorners> {
+    pub(crate) fn new(plan: &ParametrizedPlan, reduction: &Reduction) -> Self {
         let all_edges = reduction.edges().to_vec();
         let class_count = reduction.class_count();
         let (own_limits, edges) = own_limits(&all_edges, &reduction.coupled);
@@ -79,18 +76,16 @@ impl Feasibility {
             })
             .collect();
         let both = roles.iter().filter(|&&role| role == Role::Both).count();
-        if both > MOST_CORNERS.ilog2() as usize {
-            return Err(TooManyCorners);
-        }
-        Ok(Self {
+        Self {
             all_edges,
             edges,
             own_limits,
             class_count,
             roles,
             coupled: reduction.coupled.clone(),
+            branches: both > MOST_CORNERS.ilog2() as usize,
             corners: Vec::new(),
-        })
+        }
     }
 
     /// Values in the box without a schedule, if any.
@@ -101,25 +96,60 @@ impl Feasibility {
         &mut self,
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
-    ) -> Option<Infeasible> {
+    ) -> Result<Option<Infeasible>, TooManyBranches> {
         let ends = match moved {
             Some(end) => vec![end],
             None => all_ends(envelope),
         };
         for end in ends {
             match (end.reach(envelope), self.own_limits.get(&end)) {
-                (None, _) if !self.goes_on_for_ever(end) => return Some(Infeasible::FarOut(end)),
+                (None, _) if !self.goes_on_for_ever(end) => {
+                    return Ok(Some(Infeasible::FarOut(end)));
+                }
                 (Some(reach), Some(limit)) if reach > *limit => {
                     let sides = BTreeMap::from([(end.parameter, end.side)]);
-                    return Some(Infeasible::At(valuation(&sides, envelope)));
+                    return Ok(Some(Infeasible::At(valuation(&sides, envelope))));
                 }
                 _ => {}
             }
         }
-        match moved {
+        if self.branches {
+            let corner = self.branching(envelope)?;
+            return Ok(corner.map(|sides| Infeasible::At(valuation(&sides, envelope))));
+        }
+        Ok(match moved {
             Some(end) if !self.corners.is_empty() => self.tighten(envelope, end),
             _ => self.rebuild(envelope),
-        }
+        })
+    }
+
+    /// A corner without a schedule.
+    fn branching(
+        &self,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<Option<BTreeMap<ParameterId, Side>>, TooManyBranches> {
+        let network = Branching {
+            edges: self
+                .edges
+                .iter()
+                .filter(|edge| self.matters(edge))
+                .collect(),
+            class_count: self.class_count,
+            is_pair: &|parameter| !self.coupled.contains(&parameter),
+            value: &|parameter, side| any_value(envelope.interval(parameter), side),
+        };
+        network.corner_without_schedule()
+    }
+
+    /// Whether an edge lies on a cycle. One that says "at most the parameter" lies on cycles that
+    /// small values break.
+    fn matters(&self, edge: &Edge) -> bool {
+        edge.end.is_none_or(|end| {
+            matches!(
+                (self.roles[end.parameter.index()], end.side),
+                (Role::Both, _) | (Role::Lower, Side::Upper) | (Role::Upper, Side::Lower)
+            )
+        })
     }
 
     /// Whether the parameter can move out on that side without limit, from any values that have a
@@ -259,12 +289,7 @@ impl Feasibility {
         let Some(end) = edge.end else {
             return Some(edge.constant.clone());
         };
-        // An edge that says "at most the parameter" lies on cycles that small values break.
-        let matters = match (self.roles[end.parameter.index()], end.side) {
-            (Role::Both, _) | (Role::Lower, Side::Upper) | (Role::Upper, Side::Lower) => true,
-            (Role::None | Role::Lower | Role::Upper, _) => false,
-        };
-        let (true, Some(&side)) = (matters, sides.get(&end.parameter)) else {
+        let (true, Some(&side)) = (self.matters(edge), sides.get(&end.parameter)) else {
             return None;
         };
         let value = any_value(envelope.interval(end.parameter), side);

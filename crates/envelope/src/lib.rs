@@ -7,6 +7,7 @@
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
 //! - [`Objection`]: why a box is not inside, with values and a schedule that show it.
 
+mod branching;
 mod cycles;
 mod feasibility;
 mod frontier;

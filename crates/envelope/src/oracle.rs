@@ -7,6 +7,7 @@ use elbowroom_plan::reduction::BoxEnd;
 use elbowroom_plan::soundness::{Broken, Counterexample, Soundness};
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
+use crate::branching::{MOST_BRANCHES, TooManyBranches};
 use crate::feasibility::{Feasibility, Infeasible};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
@@ -59,11 +60,7 @@ impl<'a> Oracle<'a> {
         epsilon: &Rational,
     ) -> Result<Self, Refusal> {
         let soundness = Soundness::new(task, plan, epsilon)?;
-        let feasibility =
-            Feasibility::new(plan, soundness.reduction()).map_err(|_| Refusal::TooManyCases {
-                place: "parameters on constraints in both directions".to_owned(),
-                limit: crate::feasibility::MOST_CORNERS,
-            })?;
+        let feasibility = Feasibility::new(plan, soundness.reduction());
         Ok(Self {
             task,
             plan,
@@ -174,7 +171,12 @@ impl<'a> Oracle<'a> {
         if let Some(broken) = self.soundness.broken(envelope, trusted)? {
             return Ok(Some(Reason::Broken(broken)));
         }
-        if let Some(found) = self.feasibility.infeasible(envelope, moved) {
+        let infeasible = self.feasibility.infeasible(envelope, moved);
+        let infeasible = infeasible.map_err(|TooManyBranches| Refusal::TooManyCases {
+            place: "parameters on constraints in both directions".to_owned(),
+            limit: MOST_BRANCHES,
+        })?;
+        if let Some(found) = infeasible {
             self.without_schedule += 1;
             return Ok(Some(Reason::NoSchedule(found)));
         }

@@ -1,4 +1,5 @@
-//! Mistakes found in the box check, most of them by the second oracle, each as a small case.
+//! Mistakes found in the box check, most of them by the second oracle, and limits that it once had,
+//! each as a small case.
 
 use elbowroom_envelope::{Objection, Oracle};
 use elbowroom_model::Task;
@@ -458,4 +459,34 @@ fn a_least_duration_beside_an_open_one_takes_no_corners() {
             "no schedule"
         ]
     );
+}
+
+#[test]
+fn thirty_durations_whose_sum_has_a_least_and_a_greatest_value() {
+    // There would be 2^30 corners, and two of them matter.
+    let actions: Vec<String> = (0..30)
+        .map(|index| {
+            let follows = match index {
+                0 => String::new(),
+                _ => format!("c: a{index}.start - a{}.end in [0, 0];", index - 1),
+            };
+            format!(
+                "parameter d{index} default 2; durative-action instance a{index} : (go);
+                 c: a{index}.end - a{index}.start in [d{index}, d{index}]; {follows}"
+            )
+        })
+        .collect();
+    let plan = format!("{} c: a29.end - a0.start in [30, 90];", actions.concat());
+    let given = Given {
+        domain: "(:durative-action go :parameters () :duration (>= ?duration 0) :effect (and))",
+        plan: &plan,
+        ..Given::default()
+    };
+    let answers = given.answers(&[
+        &"[1, 3] ".repeat(30),
+        &format!("{}[1, 7/2]", "[1, 3] ".repeat(29)),
+        &format!("[1/2, 3] {}", "[1, 3] ".repeat(29)),
+        &format!("[1/2, 3] [3/2, 3] {}", "[1, 3] ".repeat(28)),
+    ]);
+    assert_eq!(answers, ["inside", "no schedule", "no schedule", "inside"]);
 }

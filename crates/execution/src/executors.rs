@@ -44,7 +44,7 @@ pub struct Registered {
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ExecutorSpec {
     /// Which.
     pub registered: &'static Registered,
@@ -78,6 +78,13 @@ impl ExecutorSpec {
     pub fn build(&self, region: Box<dyn Region>) -> Box<dyn Executor> {
         let zero = Rational::ZERO;
         (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), region)
+    }
+}
+
+impl fmt::Debug for ExecutorSpec {
+    /// Its name: where its code lies in memory is another in each process.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ExecutorSpec({self})")
     }
 }
 

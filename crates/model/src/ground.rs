@@ -2,9 +2,7 @@
 //!
 //! Facts and fluents are numbers here; [`Task`](crate::Task) knows their names.
 
-use elbowroom_num::Rational;
-
-use crate::problem::{Comparison, ObjectId, SchemaId, Unknown, UpdateOperator};
+use crate::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 
 /// A ground atom, as a position in its task's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -116,113 +114,7 @@ impl Condition {
 }
 
 /// A ground numeric expression.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Expression {
-    /// A number.
-    Constant(Rational),
-    /// The current value of a fluent.
-    Fluent(FluentId),
-    /// The duration of the action it belongs to.
-    Duration,
-    /// The makespan; metrics only.
-    TotalTime,
-    /// A number left open.
-    Unknown(Unknown),
-    /// Sum of the operands.
-    Add(Vec<Expression>),
-    /// First minus second.
-    Subtract(Box<Expression>, Box<Expression>),
-    /// Product of the operands.
-    Multiply(Vec<Expression>),
-    /// First divided by second.
-    Divide(Box<Expression>, Box<Expression>),
-    /// Minus the operand.
-    Negate(Box<Expression>),
-}
-
-impl Expression {
-    /// Calls `visit` for each fluent read.
-    pub fn visit_fluents(&self, visit: &mut impl FnMut(FluentId)) {
-        self.visit_leaves(&mut |leaf| {
-            if let Self::Fluent(fluent) = leaf {
-                visit(*fluent);
-            }
-        });
-    }
-
-    /// Calls `visit` for each leaf: constants, fluents, `?duration`, unknowns.
-    pub fn visit_leaves(&self, visit: &mut impl FnMut(&Self)) {
-        match self {
-            Self::Constant(_)
-            | Self::Fluent(_)
-            | Self::Duration
-            | Self::TotalTime
-            | Self::Unknown(_) => visit(self),
-            Self::Add(parts) | Self::Multiply(parts) => {
-                for part in parts {
-                    part.visit_leaves(visit);
-                }
-            }
-            Self::Subtract(left, right) | Self::Divide(left, right) => {
-                left.visit_leaves(visit);
-                right.visit_leaves(visit);
-            }
-            Self::Negate(part) => part.visit_leaves(visit),
-        }
-    }
-
-    /// The same expression with each leaf for which `replace` gives something replaced by it.
-    #[must_use]
-    pub fn map_leaves(&self, replace: &mut impl FnMut(&Self) -> Option<Self>) -> Self {
-        match self {
-            Self::Constant(_)
-            | Self::Fluent(_)
-            | Self::Duration
-            | Self::TotalTime
-            | Self::Unknown(_) => replace(self).unwrap_or_else(|| self.clone()),
-            Self::Add(parts) => Self::Add(parts.iter().map(|p| p.map_leaves(replace)).collect()),
-            Self::Multiply(parts) => {
-                Self::Multiply(parts.iter().map(|p| p.map_leaves(replace)).collect())
-            }
-            Self::Subtract(left, right) => Self::Subtract(
-                Box::new(left.map_leaves(replace)),
-                Box::new(right.map_leaves(replace)),
-            ),
-            Self::Divide(left, right) => Self::Divide(
-                Box::new(left.map_leaves(replace)),
-                Box::new(right.map_leaves(replace)),
-            ),
-            Self::Negate(part) => Self::Negate(Box::new(part.map_leaves(replace))),
-        }
-    }
-
-    /// The value, or `None` where a leaf has none or a division is by zero.
-    pub fn evaluate(&self, leaf: &mut impl FnMut(&Self) -> Option<Rational>) -> Option<Rational> {
-        Some(match self {
-            Self::Constant(value) => value.clone(),
-            Self::Fluent(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => leaf(self)?,
-            Self::Add(parts) => {
-                let mut total = Rational::ZERO;
-                for part in parts {
-                    total += part.evaluate(leaf)?;
-                }
-                total
-            }
-            Self::Multiply(parts) => {
-                let mut product = Rational::ONE;
-                for part in parts {
-                    product *= part.evaluate(leaf)?;
-                }
-                product
-            }
-            Self::Subtract(left, right) => left.evaluate(leaf)? - right.evaluate(leaf)?,
-            Self::Divide(left, right) => {
-                left.evaluate(leaf)?.checked_div(&right.evaluate(leaf)?)?
-            }
-            Self::Negate(part) => -part.evaluate(leaf)?,
-        })
-    }
-}
+pub type Expression = crate::expression::Expression<FluentId>;
 
 /// A ground effect with the condition it depends on.
 #[derive(Clone, Debug, PartialEq)]

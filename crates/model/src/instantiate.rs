@@ -273,34 +273,7 @@ impl Task {
         expression: &Expression,
         binding: &[ObjectId],
     ) -> ground::Expression {
-        let each = |task: &mut Self, parts: &[Expression]| {
-            parts
-                .iter()
-                .map(|part| task.ground_expression(part, binding))
-                .collect()
-        };
-        match expression {
-            Expression::Constant(value) => ground::Expression::Constant(value.clone()),
-            Expression::Fluent(fluent) => {
-                ground::Expression::Fluent(self.ground_fluent(fluent, binding))
-            }
-            Expression::Duration => ground::Expression::Duration,
-            Expression::TotalTime => ground::Expression::TotalTime,
-            Expression::Unknown(unknown) => ground::Expression::Unknown(*unknown),
-            Expression::Add(parts) => ground::Expression::Add(each(self, parts)),
-            Expression::Multiply(parts) => ground::Expression::Multiply(each(self, parts)),
-            Expression::Subtract(left, right) => ground::Expression::Subtract(
-                Box::new(self.ground_expression(left, binding)),
-                Box::new(self.ground_expression(right, binding)),
-            ),
-            Expression::Divide(left, right) => ground::Expression::Divide(
-                Box::new(self.ground_expression(left, binding)),
-                Box::new(self.ground_expression(right, binding)),
-            ),
-            Expression::Negate(part) => {
-                ground::Expression::Negate(Box::new(self.ground_expression(part, binding)))
-            }
-        }
+        expression.map_fluents(&mut |fluent| self.ground_fluent(fluent, binding))
     }
 
     fn ground_atom(&mut self, atom: &Atom, binding: &[ObjectId]) -> FactId {

@@ -21,6 +21,7 @@
 pub mod derivation;
 mod describe;
 mod domains;
+pub mod expression;
 pub mod ground;
 mod hash;
 mod instantiate;

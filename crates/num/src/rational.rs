@@ -1,11 +1,10 @@
 //! The exact fraction, with a fast path for small numbers.
 
+mod operators;
+mod text;
+
 use std::cmp::Ordering;
-use std::fmt;
 use std::hash::{Hash, Hasher};
-use std::iter::Sum;
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
-use std::str::FromStr;
 
 use dashu_int::{IBig, UBig};
 use dashu_ratio::RBig;
@@ -19,11 +18,14 @@ pub struct Rational(Repr);
 
 #[derive(Clone)]
 enum Repr {
-    /// Lowest terms, `denominator > 0`, `numerator != i64::MIN`.
-    Small { numerator: i64, denominator: i64 },
+    /// Numerator and denominator in lowest terms; the numerator is not `i64::MIN`, the denominator
+    /// positive.
+    Small(i64, i64),
     /// Only what does not fit `Small`.
     Big(Box<RBig>),
 }
+
+pub use text::ParseRationalError;
 
 use Repr::{Big, Small};
 
@@ -34,10 +36,7 @@ impl Rational {
     pub const ONE: Self = Self::integer(1);
 
     const fn integer(numerator: i64) -> Self {
-        Self(Small {
-            numerator,
-            denominator: 1,
-        })
+        Self(Small(numerator, 1))
     }
 
     /// The fraction `numerator / denominator`.
@@ -71,10 +70,9 @@ impl Rational {
             (n, d) = (-n, -d);
         }
         match (i64::try_from(n), i64::try_from(d)) {
-            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
-                numerator,
-                denominator,
-            }),
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => {
+                Self(Small(numerator, denominator))
+            }
             _ => Self::from_big(RBig::from_parts(
                 IBig::from(n),
                 UBig::try_from(d).expect("the denominator was made positive"),
@@ -87,29 +85,22 @@ impl Rational {
     fn reduced_small(numerator: i64, denominator: i64) -> Self {
         let divisor = gcd_u64(numerator.unsigned_abs(), denominator.unsigned_abs());
         let divisor = i64::try_from(divisor).expect("not above the denominator");
-        Self(Small {
-            numerator: numerator / divisor,
-            denominator: denominator / divisor,
-        })
+        Self(Small(numerator / divisor, denominator / divisor))
     }
 
     fn from_big(big: RBig) -> Self {
         let (numerator, denominator) = (big.numerator(), big.denominator());
         match (i64::try_from(numerator), i64::try_from(denominator)) {
-            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => Self(Small {
-                numerator,
-                denominator,
-            }),
+            (Ok(numerator), Ok(denominator)) if numerator != i64::MIN => {
+                Self(Small(numerator, denominator))
+            }
             _ => Self(Big(Box::new(big))),
         }
     }
 
     fn to_big(&self) -> RBig {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => RBig::from_parts(
+            Small(numerator, denominator) => RBig::from_parts(
                 IBig::from(*numerator),
                 UBig::try_from(*denominator).expect("denominators are positive"),
             ),
@@ -119,7 +110,7 @@ impl Rational {
 
     /// Whether this is 0.
     pub fn is_zero(&self) -> bool {
-        matches!(self.0, Small { numerator: 0, .. })
+        matches!(self.0, Small(0, _))
     }
 
     /// Whether this is below 0.
@@ -135,7 +126,7 @@ impl Rational {
     /// Whether this is a whole number.
     pub fn is_integer(&self) -> bool {
         match &self.0 {
-            Small { denominator, .. } => *denominator == 1,
+            Small(_, denominator) => *denominator == 1,
             Big(big) => big.is_int(),
         }
     }
@@ -143,7 +134,7 @@ impl Rational {
     /// -1, 0 or 1, as this is below, at or above 0.
     pub fn signum(&self) -> i32 {
         match &self.0 {
-            Small { numerator, .. } => match numerator.cmp(&0) {
+            Small(numerator, _) => match numerator.cmp(&0) {
                 Ordering::Less => -1,
                 Ordering::Equal => 0,
                 Ordering::Greater => 1,
@@ -190,10 +181,7 @@ impl Rational {
     #[must_use]
     pub fn floor(&self) -> Self {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Self::from(numerator.div_euclid(*denominator)),
+            Small(numerator, denominator) => Self::from(numerator.div_euclid(*denominator)),
             Big(big) => Self::from_big(RBig::from(big.floor())),
         }
     }
@@ -211,10 +199,7 @@ impl Rational {
     )]
     pub fn to_f64(&self) -> f64 {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => *numerator as f64 / *denominator as f64,
+            Small(numerator, denominator) => *numerator as f64 / *denominator as f64,
             Big(big) => big.to_f64().value(),
         }
     }
@@ -222,10 +207,7 @@ impl Rational {
     /// Numerator and denominator, when both fit an `i64`.
     pub fn as_small(&self) -> Option<(i64, i64)> {
         match self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Some((numerator, denominator)),
+            Small(numerator, denominator) => Some((numerator, denominator)),
             Big(_) => None,
         }
     }
@@ -233,7 +215,7 @@ impl Rational {
     /// The denominator of the fraction in lowest terms, when it fits an `i64`.
     pub fn denominator(&self) -> Option<i64> {
         match &self.0 {
-            Small { denominator, .. } => Some(*denominator),
+            Small(_, denominator) => Some(*denominator),
             Big(big) => i64::try_from(big.denominator()).ok(),
         }
     }
@@ -328,16 +310,7 @@ impl Default for Rational {
 impl PartialEq for Rational {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => a == c && b == d,
+            (&Small(a, b), &Small(c, d)) => a == c && b == d,
             (Big(a), Big(b)) => a == b,
             _ => false,
         }
@@ -349,10 +322,7 @@ impl Eq for Rational {}
 impl Hash for Rational {
     fn hash<H: Hasher>(&self, state: &mut H) {
         match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => (numerator, denominator).hash(state),
+            Small(numerator, denominator) => (numerator, denominator).hash(state),
             Big(big) => (big.numerator(), big.denominator()).hash(state),
         }
     }
@@ -367,315 +337,16 @@ impl PartialOrd for Rational {
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> Ordering {
         match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => {
+            (&Small(a, b), &Small(c, d)) => {
                 if b == d {
-                    a.cmp(c)
+                    a.cmp(&c)
                 } else {
-                    (i128::from(*a) * i128::from(*d)).cmp(&(i128::from(*c) * i128::from(*b)))
+                    (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
                 }
             }
             _ => self.to_big().cmp(&other.to_big()),
         }
     }
-}
-
-impl<'a> Add<&'a Rational> for &Rational {
-    type Output = Rational;
-    fn add(self, other: &'a Rational) -> Rational {
-        sum(self, other, false)
-    }
-}
-
-impl<'a> Sub<&'a Rational> for &Rational {
-    type Output = Rational;
-    fn sub(self, other: &'a Rational) -> Rational {
-        sum(self, other, true)
-    }
-}
-
-/// `a + b`, or `a - b` when `subtract`.
-fn sum(left: &Rational, right: &Rational, subtract: bool) -> Rational {
-    if let (
-        Small {
-            numerator: a,
-            denominator: b,
-        },
-        Small {
-            numerator: c,
-            denominator: d,
-        },
-    ) = (&left.0, &right.0)
-    {
-        let c = if subtract { -c } else { *c };
-        // With a whole number on one side, the sum is in lowest terms already.
-        let whole = if *d == 1 {
-            c.checked_mul(*b)
-                .and_then(|c| Some((a.checked_add(c)?, *b)))
-        } else if *b == 1 {
-            a.checked_mul(*d)
-                .and_then(|a| Some((a.checked_add(c)?, *d)))
-        } else {
-            None
-        };
-        if let Some((numerator, denominator)) = whole
-            && numerator != i64::MIN
-        {
-            return Rational(Small {
-                numerator,
-                denominator,
-            });
-        }
-        if b == d {
-            return Rational::reduced(i128::from(*a) + i128::from(c), i128::from(*b));
-        }
-        let (a, b, c, d) = (
-            i128::from(*a),
-            i128::from(*b),
-            i128::from(c),
-            i128::from(*d),
-        );
-        return Rational::reduced(a * d + c * b, b * d);
-    }
-    let (a, b) = (left.to_big(), right.to_big());
-    Rational::from_big(if subtract { a - b } else { a + b })
-}
-
-impl<'a> Mul<&'a Rational> for &Rational {
-    type Output = Rational;
-    fn mul(self, other: &'a Rational) -> Rational {
-        match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => {
-                // Most products are with 1 or -1, or of whole numbers.
-                let (is_sign, is_signed) = (d == &1 && c.abs() == 1, b == &1 && a.abs() == 1);
-                if (is_sign || is_signed || (b == &1 && d == &1))
-                    && let Some(numerator) = a.checked_mul(*c)
-                    && numerator != i64::MIN
-                {
-                    return Rational(Small {
-                        numerator,
-                        denominator: b * d,
-                    });
-                }
-                Rational::reduced(
-                    i128::from(*a) * i128::from(*c),
-                    i128::from(*b) * i128::from(*d),
-                )
-            }
-            _ => Rational::from_big(self.to_big() * other.to_big()),
-        }
-    }
-}
-
-/// # Panics
-/// When dividing by zero; see [`Rational::checked_div`].
-impl<'a> Div<&'a Rational> for &Rational {
-    type Output = Rational;
-    fn div(self, other: &'a Rational) -> Rational {
-        assert!(!other.is_zero(), "division of a rational by zero");
-        match (&self.0, &other.0) {
-            (
-                Small {
-                    numerator: a,
-                    denominator: b,
-                },
-                Small {
-                    numerator: c,
-                    denominator: d,
-                },
-            ) => Rational::reduced(
-                i128::from(*a) * i128::from(*d),
-                i128::from(*b) * i128::from(*c),
-            ),
-            _ => Rational::from_big(self.to_big() / other.to_big()),
-        }
-    }
-}
-
-impl Neg for &Rational {
-    type Output = Rational;
-    fn neg(self) -> Rational {
-        match &self.0 {
-            Small {
-                numerator,
-                denominator,
-            } => Rational(Small {
-                numerator: -numerator,
-                denominator: *denominator,
-            }),
-            Big(big) => Rational::from_big(-(**big).clone()),
-        }
-    }
-}
-
-impl Neg for Rational {
-    type Output = Rational;
-    fn neg(self) -> Rational {
-        -&self
-    }
-}
-
-/// The by-value forms of the binary operators, all by way of the by-reference form.
-macro_rules! by_value {
-    ($($operator:ident $method:ident),*) => {$(
-        impl $operator<Rational> for Rational {
-            type Output = Rational;
-            fn $method(self, other: Rational) -> Rational {
-                (&self).$method(&other)
-            }
-        }
-        impl<'a> $operator<&'a Rational> for Rational {
-            type Output = Rational;
-            fn $method(self, other: &'a Rational) -> Rational {
-                (&self).$method(other)
-            }
-        }
-        impl $operator<Rational> for &Rational {
-            type Output = Rational;
-            fn $method(self, other: Rational) -> Rational {
-                self.$method(&other)
-            }
-        }
-    )*};
-}
-by_value!(Add add, Sub sub, Mul mul, Div div);
-
-/// The assigning operators, all by way of the by-reference form.
-macro_rules! assigning {
-    ($($operator:ident $method:ident $plain:ident),*) => {$(
-        impl $operator<Rational> for Rational {
-            fn $method(&mut self, other: Rational) {
-                *self = (&*self).$plain(&other);
-            }
-        }
-        impl<'a> $operator<&'a Rational> for Rational {
-            fn $method(&mut self, other: &'a Rational) {
-                *self = (&*self).$plain(other);
-            }
-        }
-    )*};
-}
-assigning!(AddAssign add_assign add, SubAssign sub_assign sub, MulAssign mul_assign mul);
-
-impl Sum for Rational {
-    fn sum<I: Iterator<Item = Self>>(terms: I) -> Self {
-        terms.fold(Self::ZERO, |total, term| total + term)
-    }
-}
-
-impl<'a> Sum<&'a Rational> for Rational {
-    fn sum<I: Iterator<Item = &'a Self>>(terms: I) -> Self {
-        terms.fold(Self::ZERO, |total, term| total + term)
-    }
-}
-
-/// A whole number, or `p/q` in lowest terms: exactly what [`FromStr`] reads back.
-impl fmt::Display for Rational {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.0 {
-            Small {
-                numerator,
-                denominator: 1,
-            } => f.pad(&numerator.to_string()),
-            Small {
-                numerator,
-                denominator,
-            } => f.pad(&format!("{numerator}/{denominator}")),
-            Big(big) => f.pad(&big.to_string()),
-        }
-    }
-}
-
-impl fmt::Debug for Rational {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
-
-/// A text is not a number in decimal notation or a fraction.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not a number: write a decimal such as 12.5 or a fraction such as 25/2")]
-pub struct ParseRationalError {
-    text: String,
-}
-
-/// Longest numeral accepted; more digits than any measurement has, few enough to stay fast.
-const LONGEST_NUMERAL: usize = 400;
-/// Largest decimal exponent accepted, for the same reason.
-const LARGEST_EXPONENT: i32 = 400;
-
-/// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.
-impl FromStr for Rational {
-    type Err = ParseRationalError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let parsed = match text.split_once('/') {
-            Some((numerator, denominator)) => match (decimal(numerator), decimal(denominator)) {
-                (Some(numerator), Some(denominator)) => numerator.checked_div(&denominator),
-                _ => None,
-            },
-            None => decimal(text),
-        };
-        parsed.ok_or_else(|| ParseRationalError {
-            text: text.chars().take(60).collect(),
-        })
-    }
-}
-
-/// Reads `[+-] digits [. digits] [e [+-] digits]`.
-fn decimal(text: &str) -> Option<Rational> {
-    if text.len() > LONGEST_NUMERAL {
-        return None;
-    }
-    let (negative, text) = match text.as_bytes().first()? {
-        b'-' => (true, &text[1..]),
-        b'+' => (false, &text[1..]),
-        _ => (false, text),
-    };
-    let (mantissa, exponent) = match text.find(['e', 'E']) {
-        Some(at) => (&text[..at], text[at + 1..].parse::<i32>().ok()?),
-        None => (text, 0),
-    };
-    let (whole, part) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-    let digits = format!("{whole}{part}");
-    if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
-        return None;
-    }
-    if exponent.abs() > LARGEST_EXPONENT {
-        return None;
-    }
-    let shift = i32::try_from(part.len()).ok()? - exponent;
-    let power = shift.unsigned_abs();
-    let value = match (digits.parse::<i64>(), 10_i64.checked_pow(power)) {
-        (Ok(digits), Some(scale)) if shift >= 0 => Rational::new(digits, scale),
-        _ => {
-            let digits = IBig::from_str(&digits).ok()?;
-            let scale = UBig::from(10_u8).pow(power as usize);
-            Rational::from_big(if shift >= 0 {
-                RBig::from_parts(digits, scale)
-            } else {
-                RBig::from(digits * IBig::from(scale))
-            })
-        }
-    };
-    Some(if negative { -value } else { value })
 }
 
 #[cfg(test)]

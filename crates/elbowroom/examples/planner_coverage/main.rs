@@ -12,6 +12,8 @@
 //! `--only` keeps instances whose line in the manifest has the text in it; `--every` each Kth of
 //! a domain. `table` makes Markdown of the file.
 //!
+//! `--time` is processor time, so that a busy machine does not change the results.
+//!
 //! All planners run as processes under the same supervision, the embedded one too (this program
 //! calls itself for that), so times include the start of the process, and memory is measured in the
 //! same way. Only plans that the judge accepts count.

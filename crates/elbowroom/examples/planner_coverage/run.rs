@@ -1,8 +1,7 @@
 //! Runs planners on instances, and writes down what became of them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::fs::{self, OpenOptions};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -15,12 +14,13 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::pddl::{Source, read_problem};
 use elbowroom::planner::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 
-use crate::row::{HEADER, Row};
+use crate::row::{self, Row};
 
 struct Options {
     data: PathBuf,
     planners: Vec<String>,
     output: PathBuf,
+    /// Processor time.
     seconds: u64,
     megabytes: u64,
     jobs: usize,
@@ -48,10 +48,11 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
         .append(true)
         .open(&options.output)
         .map_err(|error| format!("{}: {error}", options.output.display()))?;
-    if done.is_empty() && file.metadata().is_ok_and(|file| file.len() == 0) {
-        write(&file, HEADER)?;
-    }
-    let file = Mutex::new(file);
+    let is_new = file.metadata().is_ok_and(|file| file.len() == 0);
+    let writer = csv::WriterBuilder::new()
+        .has_headers(is_new)
+        .from_writer(file);
+    let writer = Mutex::new(writer);
     let next = AtomicUsize::new(0);
     let work = || -> Result<(), String> {
         loop {
@@ -69,8 +70,11 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
                 row.instance,
                 row.outcome
             );
-            let file = file.lock().map_err(|_| "another job has failed")?;
-            write(&file, &row.line())?;
+            let mut writer = writer.lock().map_err(|_| "another job has failed")?;
+            let written = writer.serialize(&row);
+            written
+                .and_then(|()| Ok(writer.flush()?))
+                .map_err(|error| format!("the results cannot be written: {error}"))?;
         }
     };
     thread::scope(|scope| {
@@ -80,10 +84,6 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
         }
         Ok(())
     })
-}
-
-fn write(mut file: &File, line: &str) -> Result<(), String> {
-    writeln!(file, "{line}").map_err(|error| format!("the results cannot be written: {error}"))
 }
 
 fn options(arguments: &[String]) -> Result<Options, String> {
@@ -129,9 +129,7 @@ fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
     if !path.exists() {
         return Ok(BTreeSet::new());
     }
-    let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let rows = text.lines().skip(1).filter_map(Row::parse);
-    Ok(rows.map(|row| row.key()).collect())
+    Ok(row::read(path)?.iter().map(Row::key).collect())
 }
 
 /// All planners on the temporal instances, instance by instance.
@@ -233,7 +231,9 @@ fn run(job: &Job, options: &Options) -> Row {
         Err(error) => return outcome(row, "not started", error),
     };
     let settings = Settings {
-        time_limit: Some(Duration::from_secs(options.seconds)),
+        work_limit: Some(Duration::from_secs(options.seconds)),
+        // For a planner that waits for nothing.
+        time_limit: Some(Duration::from_secs(options.seconds * 6)),
         memory_limit: Some(options.megabytes << 20),
         ..Settings::default()
     };
@@ -306,7 +306,7 @@ fn filled(row: Row, report: &Report) -> Row {
                 .to_owned()
             })
             .unwrap_or_default(),
-        seconds: seconds(statistics.elapsed),
+        seconds: seconds(statistics.work),
         megabytes: (statistics.peak_memory >> 20).to_string(),
         note: note.chars().take(300).collect(),
         ..row

@@ -2,18 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use std::fs;
+use std::path::Path;
 
-use crate::row::Row;
+use crate::row::{self, Row};
 
 /// `table FILE.csv`
 pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     let [path] = arguments else {
         return Err("table FILE.csv".to_owned());
     };
-    let text = fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
-    let rows: Vec<Row> = text.lines().skip(1).filter_map(Row::parse).collect();
-    print!("{}", table(&rows));
+    print!("{}", table(&row::read(Path::new(path))?));
     Ok(())
 }
 

@@ -274,31 +274,15 @@ impl<'a> Relaxation<'a> {
         binding: &[ObjectId],
         blockers: &mut Vec<Event>,
     ) {
-        match expression {
-            Expression::Fluent(fluent) => {
-                let symbol = Symbol::Changed(fluent.function);
-                with_arguments(&fluent.arguments, binding, |arguments| {
-                    let is_open = !self.reached.is_changed(fluent.function, arguments);
-                    if is_open && self.is_written(symbol) {
-                        blockers.push(EventKey { symbol, arguments }.to_event());
-                    }
-                });
-            }
-            Expression::Constant(_)
-            | Expression::Duration
-            | Expression::TotalTime
-            | Expression::Unknown(_) => {}
-            Expression::Add(parts) | Expression::Multiply(parts) => {
-                for part in parts {
-                    self.block_on_fluents(part, binding, blockers);
+        expression.visit_fluents(&mut |fluent| {
+            let symbol = Symbol::Changed(fluent.function);
+            with_arguments(&fluent.arguments, binding, |arguments| {
+                let is_open = !self.reached.is_changed(fluent.function, arguments);
+                if is_open && self.is_written(symbol) {
+                    blockers.push(EventKey { symbol, arguments }.to_event());
                 }
-            }
-            Expression::Subtract(left, right) | Expression::Divide(left, right) => {
-                self.block_on_fluents(left, binding, blockers);
-                self.block_on_fluents(right, binding, blockers);
-            }
-            Expression::Negate(part) => self.block_on_fluents(part, binding, blockers),
-        }
+            });
+        });
     }
 }
 

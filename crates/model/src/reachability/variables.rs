@@ -24,23 +24,7 @@ pub(super) fn of_condition(condition: &Condition, read: &mut [bool]) {
 
 /// Marks each variable read.
 pub(super) fn of_expression(expression: &Expression, read: &mut [bool]) {
-    match expression {
-        Expression::Fluent(fluent) => of_terms(&fluent.arguments, read),
-        Expression::Constant(_)
-        | Expression::Duration
-        | Expression::TotalTime
-        | Expression::Unknown(_) => {}
-        Expression::Add(parts) | Expression::Multiply(parts) => {
-            for part in parts {
-                of_expression(part, read);
-            }
-        }
-        Expression::Subtract(left, right) | Expression::Divide(left, right) => {
-            of_expression(left, read);
-            of_expression(right, read);
-        }
-        Expression::Negate(part) => of_expression(part, read),
-    }
+    expression.visit_fluents(&mut |fluent| of_terms(&fluent.arguments, read));
 }
 
 fn of_terms(terms: &[Term], read: &mut [bool]) {

@@ -153,21 +153,5 @@ pub(super) fn visit_condition(condition: &Condition, wanted: bool, visit: &mut i
 
 /// Calls `visit` for the change of each function read.
 pub(super) fn visit_expression(expression: &Expression, visit: &mut impl FnMut(Symbol)) {
-    match expression {
-        Expression::Fluent(fluent) => visit(Symbol::Changed(fluent.function)),
-        Expression::Constant(_)
-        | Expression::Duration
-        | Expression::TotalTime
-        | Expression::Unknown(_) => {}
-        Expression::Add(parts) | Expression::Multiply(parts) => {
-            for part in parts {
-                visit_expression(part, visit);
-            }
-        }
-        Expression::Subtract(left, right) | Expression::Divide(left, right) => {
-            visit_expression(left, visit);
-            visit_expression(right, visit);
-        }
-        Expression::Negate(part) => visit_expression(part, visit),
-    }
+    expression.visit_fluents(&mut |fluent| visit(Symbol::Changed(fluent.function)));
 }

@@ -98,30 +98,13 @@ fn value(
     expression: &Expression,
     of: &impl Fn(&Fluent) -> Result<Rational, String>,
 ) -> Result<Rational, String> {
-    Ok(match expression {
-        Expression::Constant(value) => value.clone(),
-        Expression::Fluent(fluent) => of(fluent)?,
-        Expression::Add(parts) => {
-            let mut total = Rational::ZERO;
-            for part in parts {
-                total += value(part, of)?;
-            }
-            total
-        }
-        Expression::Multiply(parts) => {
-            let mut product = Rational::ONE;
-            for part in parts {
-                product *= value(part, of)?;
-            }
-            product
-        }
-        Expression::Subtract(left, right) => value(left, of)? - value(right, of)?,
-        Expression::Divide(left, right) => value(left, of)?
-            .checked_div(&value(right, of)?)
-            .ok_or("the domain divides by zero")?,
-        Expression::Negate(part) => -value(part, of)?,
-        Expression::Duration | Expression::TotalTime | Expression::Unknown(_) => {
-            return Err("the domain leaves it open".to_owned());
-        }
-    })
+    let mut mistake = None;
+    let value = expression.evaluate(&mut |leaf| {
+        let value = match leaf {
+            Expression::Fluent(fluent) => of(fluent),
+            _ => Err("the domain leaves it open".to_owned()),
+        };
+        value.map_err(|text| mistake = Some(text)).ok()
+    });
+    value.ok_or_else(|| mistake.unwrap_or_else(|| "the domain divides by zero".to_owned()))
 }

@@ -1,18 +1,21 @@
 //! The symbolic run.
 
+mod changes;
+mod guards;
+
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{
-    Body, Change, Condition, Effect, Expression, FactId, FluentId, SnapAction,
-};
-use elbowroom_model::problem::UpdateOperator;
+use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
 use elbowroom_num::Rational;
 
+use changes::record;
+use guards::{GuardId, GuardPart, effects};
+
 use super::dnf::{Alternatives, Wanted, compared};
-use super::goal::{goal_cases, lasts};
+use super::goal::goal_cases;
 use super::over_all::literal_cases;
 use super::separation::separations;
 use super::timeline::{FluentChange, Reading, Timeline};
@@ -76,16 +79,6 @@ impl Obligations {
     }
 }
 
-/// Which part of which effect's guard: effects of the start come before those of the end, and
-/// those before continuous ones.
-type GuardId = (InstanceId, usize, GuardPart);
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum GuardPart {
-    AtStart,
-    Now,
-}
-
 /// One combination of outcomes of conditional effects, followed up to a position.
 #[derive(Clone)]
 struct Run {
@@ -119,111 +112,6 @@ impl Compiler<'_> {
         }
         self.finish(run, obligations)?;
         Ok(Progress::Finished)
-    }
-
-    /// Settles every guard that is read at the node; `Some` if one can turn out either way.
-    fn decide_guards(
-        &self,
-        run: &mut Run,
-        node: NodeId,
-        obligations: &mut Obligations,
-    ) -> Result<Option<Vec<Run>>, Refusal> {
-        for (id, guard) in self.guards_read_at(node)? {
-            if run.outcomes.contains_key(&id) {
-                continue;
-            }
-            let (instance, index, _) = id;
-            if run.outcomes.get(&(instance, index, GuardPart::AtStart)) == Some(&false) {
-                // The effect will not come about, whatever else its guard says.
-                run.outcomes.insert(id, false);
-                continue;
-            }
-            let reading = self.reading(&run.timeline, node);
-            let held = reading.alternatives(guard, Wanted::True)?;
-            let broken = reading.alternatives(guard, Wanted::False)?;
-            let silent = reading.silent(guard)?;
-            oblige(
-                obligations,
-                Requirement::Defined { node },
-                &run.timeline,
-                silent,
-            );
-            if broken.is_empty() {
-                run.outcomes.insert(id, true);
-            } else if held.is_empty() {
-                run.outcomes.insert(id, false);
-            } else {
-                let branch = |outcome: bool, alternatives: Alternatives| {
-                    alternatives
-                        .into_iter()
-                        .map(|assumed| {
-                            let mut branch = run.clone();
-                            branch.outcomes.insert(id, outcome);
-                            branch.timeline.assumptions.extend(assumed);
-                            branch
-                        })
-                        .collect::<Vec<_>>()
-                };
-                return Ok(Some([branch(true, held), branch(false, broken)].concat()));
-            }
-        }
-        Ok(None)
-    }
-
-    /// The non-trivial guards read on arrival at a node.
-    fn guards_read_at(&self, node: NodeId) -> Result<Vec<(GuardId, &Condition)>, Refusal> {
-        let (instance, is_end) = match self.plan.plan.nodes[node.index()] {
-            Node::Zero | Node::Timed(_) => return Ok(Vec::new()),
-            Node::Start(id) | Node::Instant(id) => (id, false),
-            Node::End(id) => (id, true),
-        };
-        let action = &self.plan.plan.instance(instance).action;
-        let mut guards = Vec::new();
-        let mut read = |index: usize, part: GuardPart, condition| {
-            guards.push(((instance, index, part), condition));
-        };
-        match &action.body {
-            Body::Instantaneous(snap) => {
-                for (index, effect) in snap.effects.iter().enumerate() {
-                    read(index, GuardPart::Now, &effect.guard.now);
-                }
-            }
-            Body::Durative(body) => {
-                let ends = body.start.effects.len();
-                let continuous = ends + body.end.effects.len();
-                let over_all = body.end.effects.iter().map(|effect| &effect.guard);
-                let over_all = over_all.chain(body.continuous.iter().map(|effect| &effect.guard));
-                if over_all
-                    .into_iter()
-                    .any(|guard| !guard.over_all.is_trivial())
-                {
-                    return Err(Refusal::GuardOverAll {
-                        place: action.name.clone(),
-                    });
-                }
-                if is_end {
-                    for (index, effect) in body.end.effects.iter().enumerate() {
-                        read(ends + index, GuardPart::Now, &effect.guard.now);
-                    }
-                } else {
-                    for (index, effect) in body.start.effects.iter().enumerate() {
-                        read(index, GuardPart::Now, &effect.guard.now);
-                    }
-                    for (index, effect) in body.end.effects.iter().enumerate() {
-                        read(ends + index, GuardPart::AtStart, &effect.guard.at_start);
-                    }
-                    for (index, effect) in body.continuous.iter().enumerate() {
-                        read(
-                            continuous + index,
-                            GuardPart::AtStart,
-                            &effect.guard.at_start,
-                        );
-                    }
-                }
-            }
-        }
-        guards.retain(|(_, condition)| !condition.is_trivial());
-        Ok(guards)
     }
 
     /// What the happening at a node requires and changes.
@@ -289,175 +177,6 @@ impl Compiler<'_> {
                 Ok(())
             }
         }
-    }
-
-    /// The continuous changes that begin at the start of an instance, with their rates; `None` is
-    /// an undefined one.
-    fn drifts(
-        &self,
-        run: &Run,
-        node: NodeId,
-        instance: InstanceId,
-    ) -> Result<Vec<(FluentId, Option<Linear>)>, Refusal> {
-        let action = &self.plan.plan.instance(instance).action;
-        let Some(body) = action.durative() else {
-            return Ok(Vec::new());
-        };
-        let first = body.start.effects.len() + body.end.effects.len();
-        let mut drifts = Vec::new();
-        for (index, effect) in body.continuous.iter().enumerate() {
-            if run
-                .outcomes
-                .get(&(instance, first + index, GuardPart::AtStart))
-                == Some(&false)
-            {
-                continue;
-            }
-            let changing = || Refusal::ChangingRate {
-                place: action.name.clone(),
-                fluent: self.task.fluent_name(effect.fluent),
-            };
-            if self.changes_later(&effect.rate, node) {
-                return Err(changing());
-            }
-            let rate = self.reading(&run.timeline, node).linear(&effect.rate)?;
-            let is_linear = |rate: &Linear| rate.times.is_empty() && rate.products.is_empty();
-            if !rate.as_ref().is_none_or(is_linear) {
-                return Err(Refusal::NotLinear {
-                    place: action.name.clone(),
-                    expression: self.task.describe_expression(&effect.rate),
-                });
-            }
-            drifts.push((effect.fluent, rate));
-        }
-        Ok(drifts)
-    }
-
-    /// Whether anything from the node on may change what the expression reads.
-    fn changes_later(&self, expression: &Expression, node: NodeId) -> bool {
-        let mut read = Vec::new();
-        expression.visit_fluents(&mut |fluent| read.push(fluent));
-        if read.is_empty() {
-            return false;
-        }
-        self.order
-            .iter()
-            .skip_while(|&&other| other != node)
-            .any(|&later| {
-                let footprint = self.plan.plan.footprint(self.task, later);
-                read.iter().any(|fluent| {
-                    footprint.shifts.contains(fluent) || footprint.assigns.contains(fluent)
-                })
-            })
-    }
-
-    fn apply<'e>(
-        &self,
-        run: &mut Run,
-        node: NodeId,
-        effects: impl Iterator<Item = (&'e Change, bool)>,
-        obligations: &mut Obligations,
-    ) -> Result<(), Refusal> {
-        let read = self.read_changes(run, node, effects, obligations)?;
-        record(run, node, read);
-        Ok(())
-    }
-
-    /// The changes that come about, with right-hand sides read on arrival; deletions first, so
-    /// that an addition by the same happening wins.
-    fn read_changes<'e>(
-        &self,
-        run: &Run,
-        node: NodeId,
-        effects: impl Iterator<Item = (&'e Change, bool)>,
-        obligations: &mut Obligations,
-    ) -> Result<Vec<Recorded>, Refusal> {
-        let (mut recorded, mut additions) = (Vec::new(), Vec::new());
-        let mut updates: BTreeMap<FluentId, Vec<UpdateOperator>> = BTreeMap::new();
-        for (change, _) in effects.filter(|&(_, happens)| happens) {
-            match change {
-                Change::Add(fact) => additions.push(Recorded::Fact(*fact, true)),
-                Change::Delete(fact) => recorded.push(Recorded::Fact(*fact, false)),
-                Change::Update {
-                    operator,
-                    fluent,
-                    value,
-                } => {
-                    updates.entry(*fluent).or_default().push(*operator);
-                    let reading = self.reading(&run.timeline, node);
-                    let value = reading.linear(value)?;
-                    let old = reading.linear(&Expression::Fluent(*fluent))?;
-                    let new = updated(&reading, *operator, old, value)?;
-                    if new.is_none() {
-                        // An effect without a value breaks the plan, whatever the times are.
-                        obligations.direct.push(Obligation {
-                            requirement: Requirement::Defined { node },
-                            bad_cases: vec![BadCase {
-                                differences: Vec::new(),
-                                inequalities: run.timeline.assumptions.clone(),
-                            }],
-                        });
-                    }
-                    recorded.push(Recorded::Fluent(
-                        *fluent,
-                        new.unwrap_or(FluentChange::Assign(None)),
-                    ));
-                }
-            }
-        }
-        self.forbid_conflicts(run, node, &updates, obligations);
-        recorded.append(&mut additions);
-        Ok(recorded)
-    }
-
-    /// Several updates of one fluent by one happening must all be increases and decreases. Timed
-    /// initials that come after the plan's last action do not count.
-    fn forbid_conflicts(
-        &self,
-        run: &Run,
-        node: NodeId,
-        updates: &BTreeMap<FluentId, Vec<UpdateOperator>>,
-        obligations: &mut Obligations,
-    ) {
-        for (&fluent, operators) in updates {
-            if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
-                continue;
-            }
-            let when = match self.plan.plan.nodes[node.index()] {
-                Node::Timed(_) => lasts(&self.plan.plan)
-                    .into_iter()
-                    .map(|last| vec![Difference::not_after(node, last)])
-                    .collect(),
-                _ => vec![Vec::new()],
-            };
-            let bad_cases = when.into_iter().map(|differences| BadCase {
-                differences,
-                inequalities: run.timeline.assumptions.clone(),
-            });
-            obligations.direct.push(Obligation {
-                requirement: Requirement::OneUpdate { node, fluent },
-                bad_cases: bad_cases.collect(),
-            });
-        }
-    }
-
-    /// A continuous change without a value or a rate breaks the plan, unless its action takes no
-    /// time.
-    fn never_takes_time(
-        &self,
-        run: &Run,
-        node: NodeId,
-        instance: InstanceId,
-        obligations: &mut Obligations,
-    ) {
-        let (start, end) = (self.plan.plan.start(instance), self.plan.plan.end(instance));
-        obligations.direct.push(Obligation {
-            requirement: Requirement::Defined { node },
-            bad_cases: vec![BadCase {
-                differences: vec![Difference::before(start, end)],
-                inequalities: run.timeline.assumptions.clone(),
-            }],
-        });
     }
 
     /// The conditions of a happening.
@@ -611,74 +330,6 @@ impl Compiler<'_> {
             derived: OnceCell::new(),
         }
     }
-}
-
-/// The changes of effects, with whether their guards hold in this run.
-fn effects<'e>(
-    run: &Run,
-    instance: InstanceId,
-    first: usize,
-    effects: &'e [Effect],
-) -> Vec<(&'e Change, bool)> {
-    effects
-        .iter()
-        .enumerate()
-        .map(|(index, effect)| {
-            let held = |part| run.outcomes.get(&(instance, first + index, part)) != Some(&false);
-            (
-                &effect.change,
-                held(GuardPart::Now) && held(GuardPart::AtStart),
-            )
-        })
-        .collect()
-}
-
-/// A change read, not yet recorded.
-enum Recorded {
-    Fact(FactId, bool),
-    Fluent(FluentId, FluentChange),
-}
-
-fn record(run: &mut Run, node: NodeId, changes: Vec<Recorded>) {
-    for change in changes {
-        match change {
-            Recorded::Fact(fact, becomes) => run.timeline.set(node, fact, becomes),
-            Recorded::Fluent(fluent, change) => run.timeline.change(node, fluent, change),
-        }
-    }
-}
-
-/// What an update does to a fluent; `None` if a number it needs is undefined.
-fn updated(
-    reading: &Reading<'_>,
-    operator: UpdateOperator,
-    old: Option<Linear>,
-    value: Option<Linear>,
-) -> Result<Option<FluentChange>, Refusal> {
-    let Some(value) = value else { return Ok(None) };
-    if operator == UpdateOperator::Assign {
-        return Ok(Some(FluentChange::Assign(Some(value))));
-    }
-    let Some(old) = old else { return Ok(None) };
-    let not_linear = || Refusal::NotLinear {
-        place: reading.place.to_owned(),
-        expression: format!("a {} effect", operator.name()),
-    };
-    Ok(Some(match operator {
-        UpdateOperator::Assign => FluentChange::Assign(Some(value)),
-        UpdateOperator::Increase => FluentChange::Shift(value),
-        UpdateOperator::Decrease => FluentChange::Shift(value.scaled(&Rational::from(-1))),
-        UpdateOperator::ScaleUp => {
-            FluentChange::Assign(Some(old.times(&value).ok_or_else(not_linear)?))
-        }
-        UpdateOperator::ScaleDown => {
-            let divisor = value.as_constant().ok_or_else(not_linear)?;
-            let Some(factor) = divisor.reciprocal() else {
-                return Ok(None);
-            };
-            FluentChange::Assign(Some(old.scaled(&factor)))
-        }
-    }))
 }
 
 /// Adds an obligation unless it cannot be violated.

@@ -209,6 +209,8 @@ pub struct Statistics {
     pub plans: usize,
     /// How many plans were refused, or could not be read.
     pub refused: usize,
+    /// The processor time that its processes were seen to use together; Linux only.
+    pub work: Duration,
     /// The most memory that its processes were seen to use together, in bytes.
     pub peak_memory: u64,
     /// How many bytes it printed.

@@ -7,7 +7,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::time::Duration;
 
+use super::supervise::Usage;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 
 /// The variable that carries the mark.
@@ -24,6 +26,8 @@ struct Status {
     start: u64,
     /// Memory in use, in pages.
     resident: u64,
+    /// Processor time of its own and of the children that it has waited for, in clock ticks.
+    worked: u64,
     is_dead: bool,
 }
 
@@ -35,6 +39,7 @@ pub(super) struct Processes {
     since: Option<u64>,
     mark: String,
     page: u64,
+    ticks_per_second: u64,
     members: BTreeSet<Identity>,
     strangers: BTreeSet<Identity>,
 }
@@ -47,15 +52,23 @@ impl Processes {
             since: None,
             mark: format!("{MARK}={mark}"),
             page: rustix::param::page_size() as u64,
+            ticks_per_second: rustix::param::clock_ticks_per_second().max(1),
             members: BTreeSet::new(),
             strangers: BTreeSet::new(),
         }
     }
 
-    /// How much memory they have in use together, in bytes. Pages that they share count for each.
-    pub(super) fn resident(&mut self) -> u64 {
-        let pages: u64 = self.find().iter().map(|(_, status)| status.resident).sum();
-        pages.saturating_mul(self.page)
+    /// What they use now.
+    pub(super) fn usage(&mut self) -> Usage {
+        let (mut pages, mut ticks) = (0_u64, 0_u64);
+        for (_, status) in self.find() {
+            pages = pages.saturating_add(status.resident);
+            ticks = ticks.saturating_add(status.worked);
+        }
+        Usage {
+            memory: pages.saturating_mul(self.page),
+            work: Duration::from_millis(ticks.saturating_mul(1000) / self.ticks_per_second),
+        }
     }
 
     /// Kills all that are left, and says how many were found.
@@ -145,12 +158,14 @@ fn parse(text: &str) -> Option<Status> {
     let fields: Vec<&str> = rest.split_ascii_whitespace().collect();
     // proc(5) counts from 1 and the name is field 2, so field n is at n - 3.
     let field = |number: usize| fields.get(number - 3).copied();
+    let worked = (14..=17).map(|number| field(number)?.parse::<u64>().ok());
     Some(Status {
         is_dead: matches!(field(3)?, "Z" | "X" | "x"),
         parent: field(4)?.parse().ok()?,
         group: field(5)?.parse().ok()?,
         start: field(22)?.parse().ok()?,
         resident: field(24)?.parse().ok()?,
+        worked: worked.sum::<Option<u64>>()?,
     })
 }
 
@@ -160,10 +175,11 @@ mod tests {
 
     #[test]
     fn a_name_with_parentheses_and_spaces_does_not_confuse() {
-        let text = "7 (a) b (c) S 3 5 5 0 -1 4194304 1 0 0 0 0 0 0 0 20 0 1 0 987 1000 42 18446";
+        let text = "7 (a) b (c) S 3 5 5 0 -1 4194304 1 0 0 0 5 6 7 8 20 0 1 0 987 1000 42 18446";
         let status = parse(text).unwrap();
         assert_eq!((status.parent, status.group), (3, 5));
         assert_eq!((status.start, status.resident), (987, 42));
+        assert_eq!(status.worked, 5 + 6 + 7 + 8);
         assert!(!status.is_dead);
     }
 

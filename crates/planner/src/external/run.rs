@@ -29,6 +29,9 @@ pub struct Settings {
     pub epsilon: Rational,
     /// How long it may run.
     pub time_limit: Option<Duration>,
+    /// How much processor time all its processes may use together. Holds as it stands on a busy
+    /// machine too; Linux only.
+    pub work_limit: Option<Duration>,
     /// How much memory all its processes may use together, in bytes.
     pub memory_limit: Option<u64>,
     /// Where its folder is made; by default where the system keeps temporary files.
@@ -41,6 +44,7 @@ impl Default for Settings {
         Self {
             epsilon: Rational::new(1, 1000),
             time_limit: None,
+            work_limit: None,
             memory_limit: None,
             scratch: None,
         }
@@ -131,6 +135,7 @@ impl<'a, 'r> Run<'a, 'r> {
         let shared = Shared::default();
         let limits = Limits {
             time: self.settings.time_limit,
+            work: self.settings.work_limit,
             memory: self.settings.memory_limit,
         };
         let mut reader = Reader::new(planner, workspace, &shared);
@@ -252,6 +257,7 @@ impl<'a, 'r> Run<'a, 'r> {
     ) -> Report {
         self.statistics.elapsed = self.clock.elapsed();
         self.statistics.peak_memory = ended.peak_memory;
+        self.statistics.work = ended.work;
         self.statistics.ending = Some(ended.ending);
         let outcome = match (self.best.take(), &sayings.missing) {
             (Some(found), _) => Outcome::Plan(found),

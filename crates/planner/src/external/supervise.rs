@@ -13,8 +13,19 @@ mod unix;
 pub(super) struct Limits {
     /// Wall-clock time.
     pub(super) time: Option<Duration>,
+    /// Processor time of all its processes together.
+    pub(super) work: Option<Duration>,
     /// Memory of all its processes together, in bytes.
     pub(super) memory: Option<u64>,
+}
+
+/// What processes use together.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Usage {
+    /// Memory, in bytes. Pages that they share count for each.
+    pub(super) memory: u64,
+    /// Processor time, that of ended children included where their parents have waited for them.
+    pub(super) work: Duration,
 }
 
 /// How the process ended.
@@ -36,6 +47,9 @@ pub enum Ending {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ended {
     pub(super) ending: Ending,
+    /// Processor time that its processes were seen to use together; 0 where that cannot be
+    /// measured.
+    pub(super) work: Duration,
     /// The most memory that its processes were seen to use together, in bytes; 0 where that cannot
     /// be measured.
     pub(super) peak_memory: u64,

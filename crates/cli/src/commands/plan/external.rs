@@ -32,6 +32,7 @@ pub(super) fn run(planner: &Planner, mut subject: Subject<'_>) -> Answer {
     let mut watch = Watch::start(arguments);
     let situation = Situation::initial(&subject.task);
     let settings = Settings {
+        work_limit: None,
         epsilon: arguments.epsilon.clone(),
         time_limit: watch.limit(),
         memory_limit: arguments.memory.map(|megabytes| megabytes << 20),

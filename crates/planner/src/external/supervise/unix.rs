@@ -13,11 +13,11 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use super::super::clock::Clock;
-use super::{Ended, Ending, Limits, Stream, Watcher};
+use super::{Ended, Ending, Limits, Stream, Usage, Watcher};
 
 /// How often limits are looked at.
 const TICK: Duration = Duration::from_millis(20);
-/// How often memory is measured: reading `/proc` costs a few milliseconds.
+/// How often memory and processor time are measured: reading `/proc` costs a few milliseconds.
 const MEASURE: Duration = Duration::from_millis(60);
 /// How often the end is looked at when nothing is printed any more.
 const NEAR_END: Duration = Duration::from_millis(2);
@@ -56,6 +56,7 @@ pub(super) fn supervise(
     let ended = run.reap();
     Ok(Ended {
         ending: ending.unwrap_or(ended),
+        work: run.usage.work,
         peak_memory: run.peak_memory,
     })
 }
@@ -75,7 +76,7 @@ struct Run {
     limits: Limits,
     clock: Clock,
     peak_memory: u64,
-    memory: u64,
+    usage: Usage,
     measured: Option<Duration>,
     #[cfg(target_os = "linux")]
     processes: super::super::processes::Processes,
@@ -95,7 +96,7 @@ impl Run {
             limits,
             clock,
             peak_memory: 0,
-            memory: 0,
+            usage: Usage::default(),
             measured: None,
             #[cfg(target_os = "linux")]
             processes: super::super::processes::Processes::of(pid, mark),
@@ -163,10 +164,14 @@ impl Run {
                 return Some(Ending::TimeLimit);
             }
             self.measure(elapsed);
-            if self.limits.memory.is_some_and(|limit| self.memory > limit) {
+            let Usage { memory, work } = self.usage;
+            if self.limits.memory.is_some_and(|limit| memory > limit) {
                 return Some(Ending::MemoryLimit);
             }
-            watcher.tick(self.memory);
+            if self.limits.work.is_some_and(|limit| work >= limit) {
+                return Some(Ending::TimeLimit);
+            }
+            watcher.tick(memory);
             let patience = left.map_or(TICK, |left| left.min(TICK));
             self.wait_for_output(patience);
             self.read(&mut buffer, watcher);
@@ -185,8 +190,8 @@ impl Run {
         // Programs that end at once are not worth it.
         if elapsed >= TICK / 2 && self.measured.is_none_or(is_due) {
             self.measured = Some(elapsed);
-            self.memory = self.processes.resident();
-            self.peak_memory = self.peak_memory.max(self.memory);
+            self.usage = self.processes.usage();
+            self.peak_memory = self.peak_memory.max(self.usage.memory);
         }
     }
 
