@@ -55,24 +55,30 @@ pub fn run(
     part: Part,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
-    let fillings = experiment.fillings();
-    let columns = 0..experiment.columns.len();
-    let settings: Vec<Setting<'_>> = columns
-        .flat_map(|column| {
-            let numbered = fillings.iter().enumerate();
-            numbered.map(move |(problem, filling)| (column, problem, filling))
-        })
-        .map(|(column, problem, filling)| Setting {
-            experiment,
-            column,
-            problem,
-            filling,
-        })
-        .collect();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
         .build()
         .map_err(|error| ExperimentError::other(format!("cannot start threads: {error}")))?;
+    let fillings = experiment.fillings();
+    // Trials of one problem have much in common; they are made one after the other unless there
+    // are more threads than problems. Results are sums, and do not depend on that.
+    let pieces = pool
+        .current_num_threads()
+        .div_ceil(fillings.len().max(1))
+        .max(1);
+    let settings: Vec<Setting<'_>> = fillings
+        .iter()
+        .enumerate()
+        .flat_map(|(problem, filling)| {
+            (0..pieces).map(move |piece| Setting {
+                experiment,
+                problem,
+                filling,
+                piece,
+                pieces,
+            })
+        })
+        .collect();
     let done = AtomicU64::new(0);
     let told = || observe(done.fetch_add(1, Ordering::Relaxed) + 1);
     let parts: Vec<Result<Results, ExperimentError>> = pool.install(|| {

@@ -3,7 +3,9 @@
 
 mod analyst;
 mod facts_only;
+mod memory;
 mod planners;
 
 pub use analyst::{Analyst, WholeRegion};
+pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};

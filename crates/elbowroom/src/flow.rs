@@ -244,7 +244,8 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     nodes
 }
 
-fn judge(task: &Task, plan: &TimeTriggeredPlan, epsilon: &Rational) -> Verdict {
+/// What the judge says of a plan.
+pub(crate) fn judge(task: &Task, plan: &TimeTriggeredPlan, epsilon: &Rational) -> Verdict {
     let settings = validate::Settings {
         epsilon: Some(epsilon.clone()),
         ..validate::Settings::default()

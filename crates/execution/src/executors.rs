@@ -66,7 +66,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct ExecutorSpec {
     /// Which.
     pub registered: &'static Registered,
@@ -100,6 +100,13 @@ impl ExecutorSpec {
     pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
         let zero = Rational::ZERO;
         (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), means.into())
+    }
+}
+
+impl fmt::Debug for ExecutorSpec {
+    /// Its name: where its code lies in memory is another in each process.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ExecutorSpec({self})")
     }
 }
 

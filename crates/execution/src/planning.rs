@@ -11,6 +11,12 @@ pub trait Planner {
     fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned;
 }
 
+impl<P: Planner + ?Sized> Planner for Box<P> {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned {
+        (**self).plan(task, situation)
+    }
+}
+
 /// What a planner answers, and how long it took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {

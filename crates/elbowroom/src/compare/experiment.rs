@@ -284,15 +284,7 @@ impl File {
     fn settings(&self) -> Result<RunSettings, (usize, String)> {
         let mut settings = RunSettings::default();
         if let Some(running) = &self.running {
-            let names = RunningRule::NAMES.iter();
-            let found = names.clone().find(|(_, name)| *name == running.get_ref());
-            let known: Vec<&str> = names.map(|(_, name)| *name).collect();
-            settings.running = found.map(|(rule, _)| *rule).ok_or_else(|| {
-                (
-                    running.span().start,
-                    format!("choose one of {}", known.join(", ")),
-                )
-            })?;
+            settings.running = one_of(running, RunningRule::NAMES)?;
         }
         if let Some(time) = &self.planning_time {
             let number = match time.get_ref() {
@@ -316,6 +308,19 @@ impl File {
         }
         Ok(settings)
     }
+}
+
+/// The value of that name; or where the name stands, and what it may be.
+fn one_of<T: Copy>(
+    given: &Spanned<String>,
+    names: &[(T, &'static str)],
+) -> Result<T, (usize, String)> {
+    let found = names.iter().find(|(_, name)| name == given.get_ref());
+    found.map(|(value, _)| *value).ok_or_else(|| {
+        let known: Vec<&str> = names.iter().map(|(_, name)| *name).collect();
+        let message = format!("choose one of {}", known.join(", "));
+        (given.span().start, message)
+    })
 }
 
 fn text_of(value: &toml::Value) -> String {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
@@ -202,6 +203,23 @@ impl Results {
 }
 
 impl Cell {
+    /// One more run.
+    pub(super) fn count(&mut self, report: &Report) {
+        self.runs += 1;
+        *self
+            .verdicts
+            .entry(report.verdict.name().to_owned())
+            .or_default() += 1;
+        for reason in &report.reasons {
+            let cause = reason.cause.name().to_owned();
+            *self.causes.entry(cause).or_default() += 1;
+        }
+        if report.verdict == Verdict::GoalReached {
+            self.successes += 1;
+            self.replans += report.replans as u64;
+        }
+    }
+
     /// Coverage, and mean number of new plans of successful runs.
     fn words(&self) -> [String; 2] {
         let coverage = Proportion {

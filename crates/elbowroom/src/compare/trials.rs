@@ -1,31 +1,47 @@
-//! The trials of one problem in one column.
+//! The trials of one problem.
 
 use std::sync::Arc;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{self, Ports, Report, Verdict};
-use elbowroom_execution::{NoRecord, PlanAnswer, Planner, World};
+use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
 use elbowroom_sim::{SimWorld, Unreliable, WorldModel};
 
-use super::{Experiment, ExperimentError, Part, Results, clairvoyant};
-use crate::execute::{Analyst, Embedded, WholeRegion};
+use super::{Column, Experiment, ExperimentError, Part, Results, clairvoyant};
+use crate::execute::{Analyst, Embedded, RememberingPlanner, RememberingPreparer, WholeRegion};
 use crate::flow;
 
-/// One problem in one column.
+/// How many plans are remembered for one problem: some megabytes.
+const PLANS: usize = 20_000;
+
+/// How many plans made ready are remembered for one problem and column: some megabytes.
+const PREPARED: usize = 500;
+
+/// One problem, and some of its trials.
 pub(super) struct Setting<'a> {
     pub(super) experiment: &'a Experiment,
-    pub(super) column: usize,
     pub(super) problem: usize,
     pub(super) filling: &'a [(String, String)],
+    /// Which of the part's trials: every `pieces`-th, from this one on.
+    pub(super) piece: usize,
+    pub(super) pieces: usize,
 }
 
-/// An executor with what it knows of the first plan.
-struct Contestant<'a> {
-    spec: &'a ExecutorSpec,
-    analyst: Analyst,
+/// What all trials of a problem have in common.
+struct Common {
+    task: Arc<Task>,
+    first: TimeTriggeredPlan,
+    planner: RememberingPlanner<Embedded<'static>>,
+    columns: Vec<Place>,
+}
+
+/// A column for one problem.
+struct Place {
+    world: WorldModel,
+    preparer: RememberingPreparer<Analyst>,
 }
 
 impl Setting<'_> {
@@ -36,11 +52,22 @@ impl Setting<'_> {
         tell: &(dyn Fn() -> bool + Sync),
     ) -> Result<Results, ExperimentError> {
         let experiment = self.experiment;
+        let mut results = Results::empty(experiment, part);
+        let mut common = self.common()?;
+        for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
+            for column in 0..experiment.columns.len() {
+                self.trial(trial, column, &mut common, &mut results);
+                if !tell() {
+                    return Ok(results);
+                }
+            }
+        }
+        Ok(results)
+    }
+
+    /// Reads the problem, makes the first plan, and makes it ready for all executors.
+    fn common(&self) -> Result<Common, ExperimentError> {
         let mut task = self.task()?;
-        let column = &experiment.columns[self.column];
-        let world = WorldModel::read(&column.world, task.problem()).map_err(|error| {
-            ExperimentError::other(format!("the world of {}: {error}", column.name))
-        })?;
         let situation = Situation::initial(&task);
         let first = match self.planner().plan(&mut task, &situation).answer {
             PlanAnswer::Plan(plan) => plan,
@@ -50,34 +77,36 @@ impl Setting<'_> {
             PlanAnswer::NotFound { why } => return Err(self.wrong(&why)),
         };
         let task = Arc::new(task);
-        let mut contestants = Vec::new();
-        for spec in &experiment.executors {
-            let mut analyst = Analyst::new(self.flow());
-            analyst
-                .remember(&task, &first, spec.registered.need)
+        let columns = self.experiment.columns.iter();
+        let columns = columns.map(|column| self.place(column, &task, &first));
+        Ok(Common {
+            columns: columns.collect::<Result<_, _>>()?,
+            planner: RememberingPlanner::new(self.planner(), PLANS),
+            task,
+            first,
+        })
+    }
+
+    fn place(
+        &self,
+        column: &Column,
+        task: &Arc<Task>,
+        first: &TimeTriggeredPlan,
+    ) -> Result<Place, ExperimentError> {
+        let world = WorldModel::read(&column.world, task.problem()).map_err(|error| {
+            ExperimentError::other(format!("the world of {}: {error}", column.name))
+        })?;
+        let mut preparer = RememberingPreparer::new(Analyst::new(self.flow(column)), PREPARED);
+        for spec in &self.experiment.executors {
+            preparer
+                .prepare(task, first, spec.registered.need)
                 .map_err(|why| self.wrong(&why))?;
-            contestants.push(Contestant { spec, analyst });
         }
-        let mut results = Results::empty(experiment, part);
-        for trial in part.numbers() {
-            self.trial(trial, &task, &first, &world, &mut contestants, &mut results);
-            if !tell() {
-                break;
-            }
-        }
-        Ok(results)
+        Ok(Place { world, preparer })
     }
 
     /// Every executor in the same world.
-    fn trial(
-        &self,
-        trial: u64,
-        task: &Arc<Task>,
-        first: &TimeTriggeredPlan,
-        world: &WorldModel,
-        contestants: &mut [Contestant<'_>],
-        results: &mut Results,
-    ) {
+    fn trial(&self, trial: u64, column: usize, common: &mut Common, results: &mut Results) {
         // The same seed in all columns: their worlds differ only where the columns do.
         let seed = self
             .experiment
@@ -86,23 +115,25 @@ impl Setting<'_> {
             .wrapping_add(self.problem as u64)
             .wrapping_mul(1_000_003)
             .wrapping_add(trial);
-        let mut reached = Vec::with_capacity(contestants.len() + 1);
-        for (row, contestant) in contestants.iter_mut().enumerate() {
-            let report = self.execute(seed, task, first, world, contestant);
+        let executors = &self.experiment.executors;
+        let mut reached = Vec::with_capacity(executors.len() + 1);
+        for (row, spec) in executors.iter().enumerate() {
+            let report = self.execute(seed, spec, column, common);
             reached.push(report.verdict == Verdict::GoalReached);
-            self.count(row, &report, results);
+            results.cells[row][column].count(&report);
         }
         if self.experiment.clairvoyant {
+            let world = &common.columns[column].world;
             // What somebody reached without knowing can be reached knowing.
             let is_possible = reached.contains(&true)
-                || clairvoyant::can_reach(task, world, seed, &mut self.planner());
-            let cell = &mut results.cells[reached.len()][self.column];
+                || clairvoyant::can_reach(&common.task, world, seed, &mut self.planner());
+            let cell = &mut results.cells[reached.len()][column];
             cell.runs += 1;
             cell.successes += u64::from(is_possible);
             reached.push(is_possible);
         }
         for (row, this) in reached.iter().enumerate() {
-            let pair = &mut results.pairs[row][self.column];
+            let pair = &mut results.pairs[row][column];
             pair.only_first += u64::from(reached[0] && !this);
             pair.only_this += u64::from(*this && !reached[0]);
         }
@@ -111,53 +142,39 @@ impl Setting<'_> {
     fn execute(
         &self,
         seed: u64,
-        task: &Arc<Task>,
-        first: &TimeTriggeredPlan,
-        model: &WorldModel,
-        contestant: &mut Contestant<'_>,
+        spec: &ExecutorSpec,
+        column: usize,
+        common: &mut Common,
     ) -> Report {
         let settings = &self.experiment.settings;
-        let sim = SimWorld::new(Arc::clone(task), model, seed);
+        let Place { world, preparer } = &mut common.columns[column];
+        let sim = SimWorld::new(Arc::clone(&common.task), world, seed);
         let (mut plain, mut unreliable);
-        let world: &mut dyn World = if model.reports.is_perfect() {
+        let world: &mut dyn World = if world.reports.is_perfect() {
             plain = sim;
             &mut plain
         } else {
-            let reports = model.reports.clone();
-            unreliable = Unreliable::new(sim, reports, seed, model.resolution.clone());
+            let reports = world.reports.clone();
+            unreliable = Unreliable::new(sim, reports, seed, world.resolution.clone());
             &mut unreliable
         };
-        let mut executor = contestant.spec.build(Box::new(WholeRegion {
+        let mut executor = spec.build(Box::new(WholeRegion {
             epsilon: settings.epsilon.clone(),
         }));
         let ports = Ports {
             world,
-            planner: &mut self.planner(),
-            preparer: &mut contestant.analyst,
+            planner: &mut common.planner,
+            preparer,
             executor: executor.as_mut(),
-            need: contestant.spec.registered.need,
+            need: spec.registered.need,
             recorder: &mut NoRecord,
         };
-        run::run(Arc::clone(task), Some(first), settings, ports)
-    }
-
-    fn count(&self, row: usize, report: &Report, results: &mut Results) {
-        let cell = &mut results.cells[row][self.column];
-        cell.runs += 1;
-        *cell
-            .verdicts
-            .entry(report.verdict.name().to_owned())
-            .or_default() += 1;
-        for reason in &report.reasons {
-            *cell
-                .causes
-                .entry(reason.cause.name().to_owned())
-                .or_default() += 1;
-        }
-        if report.verdict == Verdict::GoalReached {
-            cell.successes += 1;
-            cell.replans += report.replans as u64;
-        }
+        run::run(
+            Arc::clone(&common.task),
+            Some(&common.first),
+            settings,
+            ports,
+        )
     }
 
     fn planner(&self) -> Embedded<'static> {
@@ -172,10 +189,10 @@ impl Setting<'_> {
         }
     }
 
-    fn flow(&self) -> flow::Settings {
+    fn flow(&self, column: &Column) -> flow::Settings {
         let mut flow = flow::Settings {
             epsilon: self.experiment.settings.epsilon.clone(),
-            vary: self.experiment.columns[self.column].vary.clone(),
+            vary: column.vary.clone(),
             ..flow::Settings::default()
         };
         flow.search.precision = self.experiment.precision.clone();

@@ -15,50 +15,17 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 use super::facts_only::{facts_only, sorted};
 use crate::flow;
 
-/// Makes plans ready with [`flow`], and remembers the last first plan: many runs begin with the
-/// same one.
+/// Makes plans ready with [`flow`].
 #[derive(Clone, Debug)]
 pub struct Analyst {
     settings: flow::Settings,
-    remembered: Option<Remembered>,
-}
-
-#[derive(Clone, Debug)]
-struct Remembered {
-    task: Arc<Task>,
-    plan: TimeTriggeredPlan,
-    need: Need,
-    prepared: Prepared,
 }
 
 impl Analyst {
     /// `settings.vary` says what to leave open of each plan; what a plan does not have, it cannot
     /// leave open.
     pub fn new(settings: flow::Settings) -> Self {
-        Self {
-            settings,
-            remembered: None,
-        }
-    }
-
-    /// Makes a plan ready, and remembers it for all runs that begin with it.
-    ///
-    /// # Errors
-    /// As [`Preparer::prepare`].
-    pub fn remember(
-        &mut self,
-        task: &Arc<Task>,
-        plan: &TimeTriggeredPlan,
-        need: Need,
-    ) -> Result<(), String> {
-        let prepared = self.prepare(task, plan, need)?;
-        self.remembered = Some(Remembered {
-            task: Arc::clone(task),
-            plan: plan.clone(),
-            need,
-            prepared,
-        });
-        Ok(())
+        Self { settings }
     }
 
     /// The specifications that fit something in the plan.
@@ -121,15 +88,10 @@ impl Preparer for Analyst {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, String> {
-        if let Some(known) = &self.remembered
-            && known.need == need
-            && known.task.initial() == task.initial()
-            && known.task.timed() == task.timed()
-            && known.plan == *plan
-        {
-            return Ok(known.prepared.clone());
-        }
         let epsilon = &self.settings.epsilon;
+        if need == Need::Orderings && flow::judge(task, plan, epsilon).is_valid() {
+            return self.orderings(task, plan);
+        }
         let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
         if need == Need::Orderings {
             return self.orderings(task, plan);

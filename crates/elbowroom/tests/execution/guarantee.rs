@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use elbowroom::execute::Analyst;
+use elbowroom::execute::{Analyst, RememberingPreparer};
 use elbowroom::execution::NoRecord;
 use elbowroom::execution::run::Verdict;
 use elbowroom::num::Rational;
@@ -25,14 +25,10 @@ fn within_the_envelope_the_goal_is_always_reached() {
     let count = runs("ELBOWROOM_GUARANTEED_RUNS", 300) / scenes.len() as u64;
     for (name, scene) in scenes {
         let model = world_of_the_envelope(&scene);
-        let mut analyst = Analyst::new(scene.flow.clone());
-        let need = elbowroom::execution::Need::Envelope;
-        analyst
-            .remember(&scene.task, &scene.plan, need)
-            .expect("a correct test");
+        let mut preparer = RememberingPreparer::new(Analyst::new(scene.flow.clone()), 1);
         for seed in 0..count {
             let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
-            let report = scene.run_in("guarded", &mut world, &mut analyst, &mut NoRecord);
+            let report = scene.run_in("guarded", &mut world, &mut preparer, &mut NoRecord);
             assert_eq!(
                 report.verdict,
                 Verdict::GoalReached,

@@ -98,7 +98,7 @@ impl Scene {
         &self,
         executor: &str,
         world: &mut dyn World,
-        analyst: &mut Analyst,
+        preparer: &mut dyn Preparer,
         recorder: &mut dyn Recorder,
     ) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
@@ -112,7 +112,7 @@ impl Scene {
             Ports {
                 world,
                 planner: &mut self.planner(),
-                preparer: analyst,
+                preparer,
                 executor: decider.as_mut(),
                 need: spec.registered.need,
                 recorder,
@@ -138,12 +138,12 @@ impl Scene {
         model: &WorldModel,
         reports: &Reports,
         seed: u64,
-        analyst: &mut Analyst,
+        preparer: &mut dyn Preparer,
     ) -> (Report, bool) {
         let sim = SimWorld::new(Arc::clone(&self.task), model, seed);
         let resolution = model.resolution.clone();
         let mut world = Unreliable::new(sim, reports.clone(), seed, resolution);
-        let report = self.run_in(executor, &mut world, analyst, &mut NoRecord);
+        let report = self.run_in(executor, &mut world, preparer, &mut NoRecord);
         let is_goal = world.inner().truth().is_goal() == Ok(true);
         (report, is_goal)
     }

@@ -1,0 +1,172 @@
+//! Planners and preparers that remember what they were asked.
+//!
+//! A planner whose limits are counted, not timed, is a function: the same task and situation have
+//! the same answer. In a comparison the same questions come again and again. Executors that give a
+//! plan up over the same observation stand in the same situation, and so do trials in which a step
+//! outlives the same bound. Questions are compared in full, so results are the same with and
+//! without memory, and whatever was forgotten.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+use elbowroom_execution::{Need, PlanAnswer, Planner, PlannerAnswer, Prepared, Preparer};
+use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan, TimedHappening};
+use elbowroom_num::Rational;
+use indexmap::IndexMap;
+
+/// Questions and their answers. When it is full, everything is forgotten.
+#[derive(Clone, Debug)]
+struct Memory<Q, A> {
+    /// By the hash of the question.
+    known: IndexMap<u64, Vec<(Q, A)>>,
+    count: usize,
+    most: usize,
+}
+
+impl<Q, A: Clone> Memory<Q, A> {
+    fn new(most: usize) -> Self {
+        Self {
+            known: IndexMap::new(),
+            count: 0,
+            most,
+        }
+    }
+
+    fn recall(&self, hash: u64, is_same: impl Fn(&Q) -> bool) -> Option<A> {
+        let mut known = self.known.get(&hash)?.iter();
+        let (_, answer) = known.find(|(question, _)| is_same(question))?;
+        Some(answer.clone())
+    }
+
+    fn store(&mut self, hash: u64, question: Q, answer: A) {
+        if self.count >= self.most {
+            self.known.clear();
+            self.count = 0;
+        }
+        self.count += 1;
+        self.known.entry(hash).or_default().push((question, answer));
+    }
+}
+
+/// A planner that is asked each question only once.
+///
+/// It may be asked about one problem only, and the planner must be a function of task and
+/// situation: no clock, no chance.
+#[derive(Clone, Debug)]
+pub struct RememberingPlanner<P> {
+    planner: P,
+    memory: Memory<Situation, PlanAnswer>,
+    /// The size of the table of facts and fluents that the remembered answers refer to.
+    table: Option<(usize, usize)>,
+}
+
+impl<P: Planner> RememberingPlanner<P> {
+    /// Remembers at most so many answers.
+    pub fn new(planner: P, most: usize) -> Self {
+        Self {
+            planner,
+            memory: Memory::new(most),
+            table: None,
+        }
+    }
+}
+
+impl<P: Planner> Planner for RememberingPlanner<P> {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+        let table = table(task);
+        if *self.table.get_or_insert(table) != table {
+            // Numbers that were given later may mean other facts in another run.
+            return self.planner.plan(task, situation);
+        }
+        let hash = hash(&(&situation.time, parts(&situation.state)));
+        let known = self.memory.recall(hash, |known| known == situation);
+        if let Some(answer) = known {
+            let seconds = None;
+            return PlannerAnswer { answer, seconds };
+        }
+        let planned = self.planner.plan(task, situation);
+        if self::table(task) == table {
+            let answer = planned.answer.clone();
+            self.memory.store(hash, situation.clone(), answer);
+        }
+        planned
+    }
+}
+
+/// A preparer that is asked each question only once. It may be asked about one problem only.
+#[derive(Clone, Debug)]
+pub struct RememberingPreparer<P> {
+    preparer: P,
+    memory: Memory<Question, Result<Prepared, String>>,
+    table: Option<(usize, usize)>,
+}
+
+/// What a preparer is asked.
+#[derive(Clone, Debug)]
+struct Question {
+    need: Need,
+    initial: State,
+    timed: Vec<TimedHappening>,
+    plan: TimeTriggeredPlan,
+}
+
+impl<P: Preparer> RememberingPreparer<P> {
+    /// Remembers at most so many answers.
+    pub fn new(preparer: P, most: usize) -> Self {
+        Self {
+            preparer,
+            memory: Memory::new(most),
+            table: None,
+        }
+    }
+}
+
+impl<P: Preparer> Preparer for RememberingPreparer<P> {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String> {
+        let table = table(task);
+        if *self.table.get_or_insert(table) != table {
+            return self.preparer.prepare(task, plan, need);
+        }
+        let times: Vec<&Rational> = plan.steps.iter().map(|step| &step.start).collect();
+        let timed: Vec<&Rational> = task.timed().iter().map(|timed| &timed.time).collect();
+        let hash = hash(&(need as u8, parts(task.initial()), times, timed));
+        let known = self.memory.recall(hash, |known| {
+            known.need == need
+                && known.plan == *plan
+                && known.timed == task.timed()
+                && known.initial == *task.initial()
+        });
+        if let Some(answer) = known {
+            return answer;
+        }
+        let answer = self.preparer.prepare(task, plan, need);
+        let question = Question {
+            need,
+            initial: task.initial().clone(),
+            timed: task.timed().to_vec(),
+            plan: plan.clone(),
+        };
+        self.memory.store(hash, question, answer.clone());
+        answer
+    }
+}
+
+/// Tables only grow, so one of the same problem and size is the same.
+fn table(task: &Task) -> (usize, usize) {
+    (task.fact_count(), task.fluent_count())
+}
+
+fn parts(state: &State) -> impl Hash + '_ {
+    (&state.facts, &state.values)
+}
+
+fn hash(question: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    question.hash(&mut hasher);
+    hasher.finish()
+}
