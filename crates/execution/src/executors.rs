@@ -4,6 +4,7 @@
 //! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
 //! made from that list.
 
+mod adaptable;
 mod fixed;
 mod guarded;
 mod live;
@@ -11,8 +12,10 @@ mod stn;
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use elbowroom_num::Rational;
+use elbowroom_probability::Likelihoods;
 
 use crate::executor::{Decided, Decision, Executor};
 use crate::preparation::{Need, Region};
@@ -24,6 +27,7 @@ pub const EXECUTORS: &[Registered] = &[
     stn::REGISTERED,
     guarded::REGISTERED,
     live::REGISTERED,
+    adaptable::REGISTERED,
 ];
 
 /// What there is to know of an executor before there is one.
@@ -40,7 +44,25 @@ pub struct Registered {
     /// What it needs to know of a plan.
     pub need: Need,
     /// Makes one.
-    make: fn(&Rational, Box<dyn Region>) -> Box<dyn Executor>,
+    make: fn(&Rational, Means) -> Box<dyn Executor>,
+}
+
+/// What an executor may ask while it executes.
+pub struct Means {
+    /// The whole envelope.
+    pub region: Box<dyn Region>,
+    /// How likely everything is.
+    pub likelihoods: Arc<Likelihoods>,
+}
+
+impl<R: Region + 'static> From<Box<R>> for Means {
+    /// Everything is certain.
+    fn from(region: Box<R>) -> Self {
+        Self {
+            region,
+            likelihoods: Arc::new(Likelihoods::certain()),
+        }
+    }
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
@@ -74,10 +96,10 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Makes the executor. `region` is asked by those that look at the whole envelope.
-    pub fn build(&self, region: Box<dyn Region>) -> Box<dyn Executor> {
+    /// Makes the executor, from the envelope alone, or from all [`Means`].
+    pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
         let zero = Rational::ZERO;
-        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), region)
+        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), means.into())
     }
 }
 
@@ -168,7 +190,15 @@ mod tests {
 
     #[test]
     fn names_are_read_as_they_are_written() {
-        for text in ["fixed:0", "fixed:30", "fixed:5/2", "stn", "guarded", "live"] {
+        for text in [
+            "fixed:0",
+            "fixed:30",
+            "fixed:5/2",
+            "stn",
+            "guarded",
+            "live",
+            "adaptable",
+        ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);
         }

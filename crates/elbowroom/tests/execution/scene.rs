@@ -15,7 +15,7 @@ use elbowroom::planner::embedded;
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
 /// The executors that there are, one of each.
-pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live"];
+pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live", "adaptable"];
 
 /// A problem with a plan.
 pub(crate) struct Scene {

@@ -20,9 +20,9 @@ pub(super) const REGISTERED: Registered = Registered {
               even if nothing deviates any more.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
-    make: |_, region| {
+    make: |_, means| {
         Box::new(Live {
-            region,
+            region: means.region,
             state: None,
         })
     },
