@@ -15,6 +15,7 @@ use std::str::FromStr;
 use elbowroom_num::Rational;
 
 use crate::executor::{Decided, Decision, Executor};
+use crate::odds::Odds;
 use crate::preparation::{Need, Region};
 use crate::reason::{Cause, Reason};
 
@@ -33,6 +34,8 @@ pub struct Registered {
     pub name: &'static str,
     /// What the number after its name and a colon means, if it takes one.
     pub argument: Option<&'static str>,
+    /// Whether that number can be left out.
+    pub is_optional: bool,
     /// What it does, in one sentence.
     pub summary: &'static str,
     /// Where it comes from.
@@ -40,7 +43,15 @@ pub struct Registered {
     /// What it needs to know of a plan.
     pub need: Need,
     /// Makes one.
-    make: fn(&Rational, Box<dyn Region>) -> Box<dyn Executor>,
+    make: fn(Ask) -> Box<dyn Executor>,
+}
+
+/// What an executor is made of.
+struct Ask {
+    /// The number after its name, if one was given.
+    argument: Option<Rational>,
+    region: Box<dyn Region>,
+    odds: Option<Box<dyn Odds>>,
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
@@ -74,10 +85,19 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Makes the executor. `region` is asked by those that look at the whole envelope.
-    pub fn build(&self, region: Box<dyn Region>) -> Box<dyn Executor> {
-        let zero = Rational::ZERO;
-        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), region)
+    /// Makes the executor. `region` is asked by those that look at the whole envelope, `odds` by
+    /// those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not look.
+    pub fn build(&self, region: Box<dyn Region>, odds: Option<Box<dyn Odds>>) -> Box<dyn Executor> {
+        (self.registered.make)(Ask {
+            argument: self.argument.clone(),
+            region,
+            odds,
+        })
+    }
+
+    /// Whether the executor looks for plans that are likelier to succeed.
+    pub fn asks_odds(&self) -> bool {
+        self.registered.is_optional && self.argument.is_some()
     }
 }
 
@@ -122,6 +142,7 @@ impl FromStr for ExecutorSpec {
         let argument = match (registered.argument, argument) {
             (None, None) => None,
             (None, Some(_)) => return Err(wrong(format!("`{name}` takes no number"))),
+            (Some(_), None) if registered.is_optional => None,
             (Some(meaning), None) => {
                 return Err(wrong(format!(
                     "say which {meaning}, as in `{}`",
@@ -145,9 +166,10 @@ impl FromStr for ExecutorSpec {
 }
 
 impl Registered {
-    /// How one asks for it: `guarded`, `fixed:X`.
+    /// How one asks for it: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
+            Some(_) if self.is_optional => format!("{}[:X]", self.name),
             Some(_) => format!("{}:X", self.name),
             None => self.name.to_owned(),
         }
@@ -168,7 +190,15 @@ mod tests {
 
     #[test]
     fn names_are_read_as_they_are_written() {
-        for text in ["fixed:0", "fixed:30", "fixed:5/2", "stn", "guarded", "live"] {
+        for text in [
+            "fixed:0",
+            "fixed:30",
+            "fixed:5/2",
+            "stn",
+            "guarded",
+            "live",
+            "live:5",
+        ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);
         }

@@ -51,6 +51,8 @@ pub enum Cause {
     Silence,
     /// What is left of the plan is no longer guaranteed to work.
     GuaranteeLost,
+    /// Another plan is likelier to succeed.
+    Likelier,
     /// The plan came too late to be started.
     Late,
     /// The plan is done, but the goal is not reached.
@@ -75,6 +77,7 @@ impl Cause {
         (Self::Surprise, "surprise"),
         (Self::Silence, "silence"),
         (Self::GuaranteeLost, "guarantee-lost"),
+        (Self::Likelier, "likelier"),
         (Self::Late, "late"),
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
@@ -171,6 +174,7 @@ impl Reason {
             Cause::GuaranteeLost => {
                 format!("the rest of the plan is no longer guaranteed: {about}")
             }
+            Cause::Likelier => format!("there is a likelier plan: {about}"),
             Cause::Late => format!("the plan came too late: {about}"),
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),

@@ -14,7 +14,7 @@ use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
 };
-use elbowroom::execution::{Planner, Recorder, World};
+use elbowroom::execution::{Odds, Planner, Recorder, World};
 use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -51,6 +51,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         None => None,
     };
     let choices = Choices::of(arguments)?;
+    who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
     let header = header(arguments, &texts, world.as_deref());
@@ -70,7 +71,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
             Some(command) => {
                 let within = &arguments.answer_within;
                 let mut world = process::ProcessWorld::start(command, &job.task, within)?;
-                let report = job.run(&mut world, &mut writer);
+                let report = job.run(&mut world, None, &mut writer);
                 world.stop();
                 report
             }
@@ -97,13 +98,18 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run(&self, world: &mut dyn World, recorder: &mut dyn Recorder) -> Report {
+    /// A run in a world; `model` is what is known of it.
+    fn run(
+        &self,
+        world: &mut dyn World,
+        model: Option<&WorldModel>,
+        recorder: &mut dyn Recorder,
+    ) -> Report {
         let (choices, first) = (&self.choices, self.first.as_ref());
-        let epsilon = &choices.settings.epsilon;
+        let run =
+            |planning: Planning<'_>| choices.run_with(&self.task, first, world, planning, recorder);
         self.who
-            .with(self.arguments, &self.texts, epsilon, &mut |planner| {
-                choices.run_with(&self.task, first, world, planner, recorder)
-            })
+            .with(self.arguments, &self.texts, choices, model, run)
     }
 
     fn simulated(
@@ -137,8 +143,8 @@ impl Job<'_> {
             &mut unreliable
         };
         Ok(match &arguments.realtime {
-            None => self.run(world, recorder),
-            Some(factor) => self.run(&mut Realtime::new(world, factor), recorder),
+            None => self.run(world, Some(&model), recorder),
+            Some(factor) => self.run(&mut Realtime::new(world, factor), Some(&model), recorder),
         })
     }
 }
@@ -154,6 +160,12 @@ impl Texts {
         let read = elbowroom::pddl::read_problem(&self.domain, &self.problem);
         Ok(Task::new(Arc::new(input::with_warnings(read)?)))
     }
+}
+
+/// Who makes plans, and who knows of likelier ones.
+pub(super) struct Planning<'a> {
+    pub(super) planner: &'a mut dyn Planner,
+    pub(super) odds: Option<Box<dyn Odds>>,
 }
 
 /// How to run, from the command line.
@@ -215,16 +227,17 @@ impl Choices {
         task: &Arc<Task>,
         first: Option<&TimeTriggeredPlan>,
         world: &mut dyn World,
-        planner: &mut dyn Planner,
+        planning: Planning<'_>,
         recorder: &mut dyn Recorder,
     ) -> Report {
         let mut analyst = Analyst::new(self.flow.clone());
-        let mut executor = self.executor.build(Box::new(WholeRegion {
+        let region = Box::new(WholeRegion {
             epsilon: self.settings.epsilon.clone(),
-        }));
+        });
+        let mut executor = self.executor.build(region, planning.odds);
         let ports = Ports {
             world,
-            planner,
+            planner: planning.planner,
             preparer: &mut analyst,
             executor: executor.as_mut(),
             need: self.executor.registered.need,
@@ -277,6 +290,8 @@ fn header(arguments: &RunArgs, texts: &Texts, world: Option<&str>) -> Value {
         "has_plan": arguments.plan.is_some(),
         "executor": arguments.executor,
         "seed": arguments.seed,
+        "planner_states": arguments.planner_states,
+        "improve_states": arguments.improve_states,
         "vary": arguments.vary,
         "precision": arguments.precision.to_string(),
         "running": format!("{:?}", arguments.running).to_lowercase(),
