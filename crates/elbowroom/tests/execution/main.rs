@@ -3,6 +3,7 @@
 mod bad_worlds;
 mod campaigns;
 mod guarantee;
+mod likelier;
 mod reasons;
 mod reports;
 mod scene;

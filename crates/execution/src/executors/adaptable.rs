@@ -25,6 +25,7 @@ use crate::reason::{Cause, Reason};
 pub(super) const REGISTERED: Registered = Registered {
     name: "adaptable",
     argument: None,
+    is_optional: false,
     summary: "Does next what the order of the plan's happenings that is most likely to succeed \
               has next, as things stand: it skips, repeats and re-orders actions where that is \
               likelier and there is time for it, and replans when no order can work.",
