@@ -232,6 +232,11 @@ impl<'a> Search<'a> {
         self.relaxed.size()
     }
 
+    /// How many pairs the stronger bound has looked up.
+    pub(crate) fn lookups(&self) -> u64 {
+        self.pairs.as_ref().map_or(0, |pairs| pairs.work)
+    }
+
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         if self.nodes.is_empty() {
