@@ -34,6 +34,7 @@ mod waiting;
 mod writes;
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 use crate::derivation::GroundRule;
 use crate::domains::Domains;
@@ -45,6 +46,12 @@ use constants::{Memory, Unwritten};
 use event::Symbol;
 use fixpoint::{Arguments, Reachable, fixpoint};
 use relaxation::Relaxation;
+
+/// How many steps lie between two questions whether to go on.
+const STEPS_PER_QUESTION: u64 = 8192;
+
+/// How many actions are made between two such questions.
+const ACTIONS_PER_QUESTION: usize = 256;
 
 /// When to give up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +77,7 @@ impl Default for Settings {
 pub enum Answer {
     /// All that can be reached was found.
     Complete(Grounding),
-    /// One of the [`Settings`]' limits was reached.
+    /// One of the [`Settings`]' limits was reached, or [`ground_while`] was told to stop.
     LimitReached,
 }
 
@@ -95,14 +102,34 @@ pub struct Grounding {
 /// Finds all ground actions that can be reached, and enters the facts and fluents that they
 /// mention into the task's table.
 pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
+    ground_while(task, settings, &mut || true)
+}
+
+/// The same as [`ground`], as long as `goes_on` says so: it is asked every few thousand steps,
+/// which is about every millisecond, and not again once it has said no.
+pub fn ground_while(
+    task: &mut Task,
+    settings: &Settings,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Answer {
     let (problem, domains) = (task.problem.clone(), task.domains.clone());
-    let mut steps = settings.step_limit;
-    let Some(reachable) = reach(&problem, &domains, settings, &mut steps) else {
+    let mut steps = 0;
+    let mut count = || {
+        steps += 1;
+        if steps > settings.step_limit || steps % STEPS_PER_QUESTION == 0 && !goes_on() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let Some(reachable) = reach(&problem, &domains, settings, &mut count) else {
         return Answer::LimitReached;
     };
     let facts = enter_facts(task, &reachable.relaxation);
     let mut memory = Memory::default();
-    let actions = actions(task, &reachable, &mut memory);
+    let Some(actions) = actions(task, &reachable, &mut memory, goes_on) else {
+        return Answer::LimitReached;
+    };
     let mut constants = Unwritten {
         task,
         relaxation: &reachable.relaxation,
@@ -133,7 +160,7 @@ pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
         rules,
         goal,
         unreachable_goals,
-        steps: settings.step_limit - steps,
+        steps,
     })
 }
 
@@ -142,7 +169,7 @@ fn reach<'a>(
     problem: &'a Problem,
     domains: &'a Domains,
     settings: &Settings,
-    steps: &mut u64,
+    count: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Reachable<'a>> {
     let read = writes::read(problem);
     let mut banned: Vec<BTreeSet<Arguments>> = vec![BTreeSet::new(); problem.schemas.len()];
@@ -150,7 +177,7 @@ fn reach<'a>(
         let mut relaxation = Relaxation::initially(problem, domains);
         let rules = rule::rules_of(&relaxation, |schema| writes::is_start_silent(schema, &read));
         add_timed(&mut relaxation);
-        let reachable = fixpoint(relaxation, &rules, &banned, settings, steps)?;
+        let reachable = fixpoint(relaxation, &rules, &banned, settings, count)?;
         let mut can_all_end = true;
         for (index, instances) in reachable.instances.iter().enumerate() {
             for (arguments, &can_end) in instances.iter().zip(&reachable.can_end[index]) {
@@ -184,9 +211,15 @@ fn enter_facts(task: &mut Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
         .collect()
 }
 
-/// The reached instances as actions, by schema and arguments.
-fn actions(task: &mut Task, reachable: &Reachable, memory: &mut Memory) -> Vec<Action> {
+/// The reached instances as actions, by schema and arguments; `None` if told to stop.
+fn actions(
+    task: &mut Task,
+    reachable: &Reachable,
+    memory: &mut Memory,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Option<Vec<Action>> {
     let mut actions = Vec::new();
+    let mut count = 0_usize;
     for (index, instances) in reachable.instances.iter().enumerate() {
         let mut instances: Vec<&[ObjectId]> = instances.iter().map(|a| &**a).collect();
         instances.sort_unstable();
@@ -201,9 +234,13 @@ fn actions(task: &mut Task, reachable: &Reachable, memory: &mut Memory) -> Vec<A
             if !action.is_contradiction() {
                 actions.push(action);
             }
+            count += 1;
+            if count.is_multiple_of(ACTIONS_PER_QUESTION) && !goes_on() {
+                return None;
+            }
         }
     }
-    actions
+    Some(actions)
 }
 
 /// Collects the conjuncts of the condition that are not possible.

@@ -98,7 +98,7 @@ impl Dice {
 /// Prints the percentiles of the time to a plan or a proof from situations in mid-execution.
 fn latencies() {
     let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
-    let mut times: Vec<f64> = Vec::new();
+    let (mut times, mut states): (Vec<f64>, Vec<u64>) = (Vec::new(), Vec::new());
     let (mut plans, mut proofs, mut unanswered) = (0, 0, 0);
     let mut starts: Vec<(Task, TimeTriggeredPlan)> = Vec::new();
     for problem in PROBLEMS {
@@ -124,6 +124,12 @@ fn latencies() {
         let begin = Instant::now();
         let answer = first_plan(&mut task, &situation);
         times.push(begin.elapsed().as_secs_f64() * 1e3);
+        states.push(match &answer {
+            Answer::Plan { counts, .. }
+            | Answer::Unsolvable { counts, .. }
+            | Answer::NoneFound { counts, .. } => counts.evaluated,
+            Answer::Unsupported(_) => 0,
+        });
         match &answer {
             Answer::Plan { found, .. } => {
                 let strictness = validate::Settings::default();
@@ -139,7 +145,9 @@ fn latencies() {
         return;
     }
     times.sort_by(f64::total_cmp);
-    let percentile = |percent: usize| times[(times.len() - 1) * percent / 100];
+    states.sort_unstable();
+    let place = |percent: usize| (times.len() - 1) * percent / 100;
+    let percentile = |percent: usize| times[place(percent)];
     println!(
         "replanning from {} situations: {plans} plans, {proofs} proofs, {unanswered} unanswered; \
          median {:.2} ms, 90th percentile {:.2} ms, 99th percentile {:.2} ms, worst {:.2} ms",
@@ -148,6 +156,13 @@ fn latencies() {
         percentile(90),
         percentile(99),
         percentile(100),
+    );
+    println!(
+        "states: median {}, 90th percentile {}, 99th percentile {}, most {}",
+        states[place(50)],
+        states[place(90)],
+        states[place(99)],
+        states[place(100)],
     );
 }
 

@@ -44,7 +44,7 @@ pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Setti
 pub use compile::Unsupported;
 
 use apply::Step;
-use compile::{Compiled, Eagerness};
+use compile::{Compiled, Eagerness, Failure};
 use reasons::Names;
 use search::{PATIENCE, Search, Style, Turn};
 use symmetry::Symmetry;
@@ -52,6 +52,9 @@ use time::{NEVER, Ticks};
 
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
+
+/// How many looked-up pairs lie between two reports at most: some milliseconds.
+const REPORT_LOOKUPS: u64 = 4_000_000;
 
 /// The most turns between two reports where each state is a linear program.
 const REPORT_SYMBOLIC_TURNS: u64 = 8;
@@ -89,8 +92,16 @@ pub fn plan(
         &mut continued
     };
     let limits = reachability::Settings::default();
-    let grounding = match reachability::ground(grounded, &limits) {
+    let mut is_stopped = false;
+    let mut goes_on = || {
+        is_stopped = observe(&progress).is_break();
+        !is_stopped
+    };
+    let grounding = match reachability::ground_while(grounded, &limits, &mut goes_on) {
         reachability::Answer::Complete(grounding) => grounding,
+        reachability::Answer::LimitReached if is_stopped => {
+            return none_found(Stopped::Interrupted, progress.counts);
+        }
         reachability::Answer::LimitReached => {
             return none_found(Stopped::OutOfMemory, progress.counts);
         }
@@ -102,10 +113,17 @@ pub fn plan(
             counts: progress.counts,
         };
     }
-    let compiled = compile::compile(grounded, &grounding, situation, &settings.epsilon);
-    let compiled = match compiled {
+    let mut goes_on = || observe(&progress).is_continue();
+    let compiled = match compile::compile(
+        grounded,
+        &grounding,
+        situation,
+        &settings.epsilon,
+        &mut goes_on,
+    ) {
         Ok(compiled) => compiled,
-        Err(unsupported) => return Answer::Unsupported(unsupported),
+        Err(Failure::Unsupported(unsupported)) => return Answer::Unsupported(unsupported),
+        Err(Failure::Stopped) => return none_found(Stopped::Interrupted, progress.counts),
     };
     let names = Names::of(grounded, &compiled);
     if compiled.is_relaxation_exact()
@@ -116,7 +134,13 @@ pub fn plan(
             counts: progress.counts,
         };
     }
+    if observe(&progress).is_break() {
+        return none_found(Stopped::Interrupted, progress.counts);
+    }
     let symmetry = Symmetry::of(grounded, &compiled);
+    if observe(&progress).is_break() {
+        return none_found(Stopped::Interrupted, progress.counts);
+    }
     Planner {
         names: &names,
         symmetry: &symmetry,
@@ -187,7 +211,7 @@ impl Planner<'_> {
         if self.best.is_none()
             && stopped.is_none_or(|stopped| stopped == Stopped::Exhausted)
             && compiled.is_relaxation_exact()
-            && let Some(proof) = reasons::pairs_proof(self.names, compiled)
+            && let Some(proof) = self.pairs_proof()
         {
             let counts = self.progress.counts;
             return Answer::Unsolvable { proof, counts };
@@ -239,6 +263,19 @@ impl Planner<'_> {
         }
     }
 
+    /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.
+    fn pairs_proof(&mut self) -> Option<Proof> {
+        let Self {
+            observe,
+            progress,
+            names,
+            compiled,
+            ..
+        } = self;
+        let mut goes_on = || observe(progress).is_continue();
+        reasons::pairs_proof(names, compiled, &mut goes_on)
+    }
+
     /// Lets a search look at so many states.
     fn work(&mut self, search: &mut Search<'_>, phase: Phase, budget: u64) -> Outcome {
         self.progress.phase = phase;
@@ -252,7 +289,8 @@ impl Planner<'_> {
             REPORT_TURNS
         };
         let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
-        for turn in 0..budget {
+        let mut reported = (0, search.lookups());
+        for turn in 1..=budget {
             match search.turn() {
                 Turn::Over => {
                     self.count(&before, search);
@@ -266,7 +304,9 @@ impl Planner<'_> {
                     }
                 }
             }
-            if turn % report_every == report_every - 1 {
+            let lookups = search.lookups() - reported.1;
+            if turn - reported.0 >= report_every || lookups >= REPORT_LOOKUPS {
+                reported = (turn, search.lookups());
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
                     return Outcome::Stop(Stopped::Interrupted);

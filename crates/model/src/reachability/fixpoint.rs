@@ -32,15 +32,15 @@ pub(super) struct Reachable<'a> {
 }
 
 /// Runs to the fixpoint, without the `banned` instances (for each schema). `None` if a limit was
-/// reached.
+/// reached; `count` is told of each step, and breaks at the limit of steps.
 pub(super) fn fixpoint<'a>(
     relaxation: Relaxation<'a>,
     rules: &[Rule<'a>],
     banned: &[BTreeSet<Arguments>],
     settings: &Settings,
-    steps: &mut u64,
+    count: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Reachable<'a>> {
-    let mut fixpoint = Fixpoint::new(relaxation, rules, banned, settings, steps);
+    let mut fixpoint = Fixpoint::new(relaxation, rules, banned, settings, count);
     match fixpoint.run() {
         ControlFlow::Continue(()) => Some(fixpoint.reachable),
         ControlFlow::Break(()) => None,
@@ -54,7 +54,7 @@ pub(super) struct Fixpoint<'f, 'a> {
     banned: &'f [BTreeSet<Arguments>],
     /// How many instances may still be found.
     room: usize,
-    steps: &'f mut u64,
+    count: &'f mut dyn FnMut() -> ControlFlow<()>,
     /// For each predicate, the rules' atoms that match its facts, static ones aside.
     triggers: Vec<Vec<(usize, usize)>>,
     waiting: WaitingRoom,
@@ -66,7 +66,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         rules: &'f [Rule<'a>],
         banned: &'f [BTreeSet<Arguments>],
         settings: &Settings,
-        steps: &'f mut u64,
+        count: &'f mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let mut triggers = vec![Vec::new(); relaxation.problem.predicates.len()];
         for (index, rule) in rules.iter().enumerate() {
@@ -86,7 +86,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
             rules,
             banned,
             room: settings.action_limit,
-            steps,
+            count,
             triggers,
             waiting: WaitingRoom::new(settings.action_limit),
         }
@@ -129,7 +129,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
         let mut own = Vec::new();
         let (reachable, banned, room) = (&self.reachable, self.banned, self.room);
         let relaxation = &reachable.relaxation;
-        join(rule, relaxation, trigger, self.steps, &mut |binding| {
+        join(rule, relaxation, trigger, self.count, &mut |binding| {
             let arguments = &binding[..rule.parameter_count];
             if possible.contains(arguments) || !reachable.is_new(rule.head, arguments, banned) {
                 return ControlFlow::Continue(());
@@ -264,11 +264,7 @@ impl<'f, 'a> Fixpoint<'f, 'a> {
     }
 
     pub(super) fn count_step(&mut self) -> ControlFlow<()> {
-        match self.steps.checked_sub(1) {
-            Some(left) => *self.steps = left,
-            None => return ControlFlow::Break(()),
-        }
-        ControlFlow::Continue(())
+        (self.count)()
     }
 }
 

@@ -21,12 +21,13 @@ pub(super) struct Trigger {
     pub(super) event: u32,
 }
 
-/// Calls `sink` for each binding until it breaks; breaks itself when `steps` are used up.
+/// Calls `sink` for each binding until it breaks; breaks itself when `count`, which is told of each
+/// step, does.
 pub(super) fn join(
     rule: &Rule,
     relaxation: &Relaxation,
     trigger: Option<Trigger>,
-    steps: &mut u64,
+    count: &mut dyn FnMut() -> ControlFlow<()>,
     sink: &mut dyn FnMut(&[ObjectId]) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
     let mut join = Join {
@@ -38,7 +39,7 @@ pub(super) fn join(
         trail: Vec::new(),
         remaining: (0..rule.atoms.len()).collect(),
         scratch: Vec::new(),
-        steps,
+        count,
         sink,
     };
     match trigger {
@@ -61,7 +62,7 @@ struct Join<'r, 'a> {
     /// Atoms not yet matched, in no order.
     remaining: Vec<usize>,
     scratch: Vec<ObjectId>,
-    steps: &'r mut u64,
+    count: &'r mut dyn FnMut() -> ControlFlow<()>,
     sink: &'r mut dyn FnMut(&[ObjectId]) -> ControlFlow<()>,
 }
 
@@ -202,11 +203,7 @@ impl<'r> Join<'r, '_> {
     }
 
     fn count_step(&mut self) -> ControlFlow<()> {
-        match self.steps.checked_sub(1) {
-            Some(left) => *self.steps = left,
-            None => return ControlFlow::Break(()),
-        }
-        ControlFlow::Continue(())
+        (self.count)()
     }
 }
 

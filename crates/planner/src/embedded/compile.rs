@@ -19,7 +19,7 @@ use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
 pub use builder::Unsupported;
-pub(crate) use builder::compile;
+pub(crate) use builder::{Failure, compile};
 
 use super::formula::{Formula, Numeric, Test};
 use super::state::State;

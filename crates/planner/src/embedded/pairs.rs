@@ -55,6 +55,10 @@ pub(crate) struct Pairs<'a> {
     action_round: Vec<u32>,
     operator_round: Vec<u32>,
     round: u32,
+    /// For each atom when it can hold together with what an operator does.
+    with: Vec<Ticks>,
+    /// How many pairs were looked up so far.
+    pub(crate) work: u64,
 }
 
 impl<'a> Pairs<'a> {
@@ -78,6 +82,8 @@ impl<'a> Pairs<'a> {
             action_round: vec![0; actions],
             operator_round: vec![0; operators],
             round: 0,
+            with: Vec::new(),
+            work: 0,
             graph,
             model,
         })
@@ -287,24 +293,26 @@ impl<'a> Pairs<'a> {
                 changed |= self.note_started(action, one, begin);
             }
         }
-        for atom in 0..self.count {
-            let Some(time) = self.with(state, number, atom, begin) else {
-                continue;
-            };
-            for &one in &adds {
-                changed |= self.lower(one, atom, time);
-            }
-            if let Kind::Start(action) = kind {
-                changed |= self.note_started(action, atom, time);
-            }
-            let is_running = atom >= self.model.literals.len() && atom < self.model.atom_count;
-            if is_running {
-                let action = self.model.action_of(atom);
+        let mut with = std::mem::take(&mut self.with);
+        self.find_companions(state, number, begin, &mut with);
+        for &one in &adds {
+            changed |= self.lower_row(one, &with);
+        }
+        if let Kind::Start(action) = kind {
+            changed |= self.lower_started(action, &with);
+        }
+        for (offset, &time) in with[self.model.literals.len()..self.model.atom_count]
+            .iter()
+            .enumerate()
+        {
+            if time < NEVER {
+                let action = self.model.action_of(self.model.literals.len() + offset);
                 for &one in &adds {
                     changed |= self.note_meanwhile(action, one, time);
                 }
             }
         }
+        self.with = with;
         changed
     }
 
@@ -376,31 +384,67 @@ impl<'a> Pairs<'a> {
         end
     }
 
-    /// The earliest time at which an operator has happened and an atom holds that held before;
-    /// `None` if that cannot be.
-    fn with(&self, state: &State, number: usize, atom: usize, begin: Ticks) -> Option<Ticks> {
+    /// For each atom, the earliest time at which an operator has happened and the atom holds that
+    /// held before; [`NEVER`] if that cannot be.
+    fn find_companions(
+        &mut self,
+        state: &State,
+        number: usize,
+        begin: Ticks,
+        with: &mut Vec<Ticks>,
+    ) {
         let operator = &self.model.operators[number];
-        if operator.ends.get(atom).copied().unwrap_or(false) {
-            return None;
-        }
-        let row = &self.time[atom * self.count..(atom + 1) * self.count];
-        let mut time = begin.max(row[atom]);
+        let count = self.count;
+        with.clear();
+        with.resize(count, begin);
+        let row = |atom: usize| &self.time[atom * count..(atom + 1) * count];
         for &need in &self.needs[number] {
-            time = time.max(row[need]);
+            for (time, &known) in with.iter_mut().zip(row(need)) {
+                *time = (*time).max(known);
+            }
         }
-        if time >= NEVER || !operator.keeps.iter().all(|&kept| row[kept] < NEVER) {
-            return None;
+        if self.needs[number].is_empty() {
+            for (atom, time) in with.iter_mut().enumerate() {
+                *time = (*time).max(row(atom)[atom]);
+            }
         }
-        match operator.kind {
-            Kind::Start(_) => {
-                if self.is_before(number, atom) {
-                    time = self.in_windows(operator.relaxed, time);
+        self.work += ((1 + self.needs[number].len() + operator.adds.len()) * count) as u64;
+        for &kept in &operator.keeps {
+            for (time, &known) in with.iter_mut().zip(row(kept)) {
+                if known >= NEVER {
+                    *time = NEVER;
                 }
             }
-            Kind::End(action) => time = time.max(self.end_with(state, action, atom)),
-            Kind::Timed(_) => return Some(time),
         }
-        (time <= self.latest(atom)).then_some(time)
+        for (time, &ends) in with.iter_mut().zip(&operator.ends) {
+            if ends {
+                *time = NEVER;
+            }
+        }
+        let mut has_windows = false;
+        match operator.kind {
+            Kind::Timed(_) => return,
+            Kind::Start(_) => {
+                has_windows = !self.graph.operators[operator.relaxed as usize]
+                    .windows
+                    .is_empty();
+            }
+            Kind::End(_) => {}
+        }
+        for (atom, time) in with.iter_mut().enumerate() {
+            if *time >= NEVER {
+                continue;
+            }
+            if has_windows && self.is_before(number, atom) {
+                *time = self.in_windows(operator.relaxed, *time);
+            }
+            if let Kind::End(action) = operator.kind {
+                *time = (*time).max(self.end_with(state, action, atom));
+            }
+            if *time > self.latest(atom) {
+                *time = NEVER;
+            }
+        }
     }
 
     /// The latest time that counts for an atom. Timed initials need not come before the end of the
@@ -465,6 +509,33 @@ impl<'a> Pairs<'a> {
         self.row_round[one] = self.round;
         self.row_round[other] = self.round;
         true
+    }
+
+    /// Lowers the pairs of an atom with all others.
+    fn lower_row(&mut self, one: usize, with: &[Ticks]) -> bool {
+        let mut changed = false;
+        for (other, &time) in with.iter().enumerate() {
+            if time < self.time[one * self.count + other] {
+                changed |= self.lower(one, other, time);
+            }
+        }
+        changed
+    }
+
+    fn lower_started(&mut self, action: u32, with: &[Ticks]) -> bool {
+        let most = self.model.atom_count + MOST_ENDED;
+        let row = &mut self.started[action as usize * most..];
+        let mut changed = false;
+        for (known, &time) in row.iter_mut().zip(with) {
+            if time < *known {
+                *known = time;
+                changed = true;
+            }
+        }
+        if changed {
+            self.action_round[action as usize] = self.round;
+        }
+        changed
     }
 
     fn note_started(&mut self, action: u32, atom: usize, time: Ticks) -> bool {

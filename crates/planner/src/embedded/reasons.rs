@@ -80,8 +80,13 @@ pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof>
     ))
 }
 
-/// A proof that no plan exists, if no two parts of the goal can hold together in time.
-pub(crate) fn pairs_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
+/// A proof that no plan exists, if two parts of the goal cannot hold together in time. It names
+/// the deadlines that are to blame as long as `goes_on` says so.
+pub(crate) fn pairs_proof(
+    names: &Names,
+    compiled: &Compiled,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Option<Proof> {
     let mut pairs = Pairs::of(compiled)?;
     if !pairs.is_hopeless(&compiled.initial) {
         return None;
@@ -95,7 +100,12 @@ pub(crate) fn pairs_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
             suspect
         })
         .collect();
+    let mut is_stopped = false;
     let mut fails_without = |ignored: &[usize]| {
+        is_stopped = is_stopped || !goes_on();
+        if is_stopped {
+            return true;
+        }
         let kept: Vec<_> = ignored
             .iter()
             .map(|&number| (number, pairs.ignore_timetable(number)))

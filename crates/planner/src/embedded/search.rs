@@ -19,34 +19,43 @@ use super::time::{NEVER, Ticks};
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
 
-/// After how many states the stronger bound is asked too.
+/// After how many states the stronger bound is asked about the beginning.
 pub(crate) const PATIENCE: u64 = 64;
 
-/// The most states between two questions to the stronger bound.
-const LONGEST_PAUSE: u32 = 15;
+/// After how many states the stronger bound is asked about the next ones too.
+const DOUBT: u64 = 512;
 
-/// How many states pass before the stronger bound is asked again: more and more while it cuts
-/// nothing.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pause {
-    length: u32,
-    left: u32,
+/// How much of the time the stronger bound may take: more if it cuts many states.
+///
+/// Time is counted in pairs looked up; an estimate takes as long as some hundred of them for each
+/// of its operators.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    /// How many pairs may be looked up now.
+    credit: u64,
+    /// How many the last answer took.
+    price: u64,
+    /// How many of the last answers have cut a state, in 256ths.
+    cuts: u64,
 }
 
-impl Pause {
-    fn is_over(&mut self) -> bool {
-        let is_over = self.left == 0;
-        self.left = self.left.saturating_sub(1);
-        is_over
+impl Share {
+    const START: Self = Self {
+        credit: 0,
+        price: 0,
+        cuts: 64,
+    };
+
+    /// One more state with an estimate of that size. Whether to ask.
+    fn asks(&mut self, size: u64) -> bool {
+        self.credit = (self.credit + (50 + 4 * self.cuts) * size).min(2 * self.price);
+        self.credit >= self.price
     }
 
-    fn note(&mut self, has_cut: bool) {
-        self.length = if has_cut {
-            0
-        } else {
-            (2 * self.length + 1).min(LONGEST_PAUSE)
-        };
-        self.left = self.length;
+    fn note(&mut self, price: u64, has_cut: bool) {
+        self.price = price;
+        self.credit = self.credit.saturating_sub(price);
+        self.cuts = (7 * self.cuts + if has_cut { 256 } else { 0 }) / 8;
     }
 }
 
@@ -86,7 +95,9 @@ pub(crate) struct Search<'a> {
     relaxed: Relaxed<'a>,
     /// A stronger bound, once the search takes long.
     pairs: Option<Pairs<'a>>,
-    pause: Pause,
+    share: Share,
+    /// Whether there are too many pairs for that.
+    is_too_large: bool,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
     known: Map<u64, Vec<u32>>,
@@ -111,6 +122,17 @@ struct Node {
     state: State,
     /// What of the unsettled past matters, in a search that compares it exactly.
     outlook: Option<Box<Outlook>>,
+    hope: Hope,
+}
+
+/// What the stronger bound says of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hope {
+    /// It was not asked.
+    Unknown,
+    /// There may be a plan, or nobody asks any more.
+    Some,
+    None,
 }
 
 const ROOT: u32 = u32::MAX;
@@ -165,7 +187,8 @@ impl<'a> Search<'a> {
             stepper: Stepper::new(compiled),
             relaxed: Relaxed::new(compiled, style.haste),
             pairs: None,
-            pause: Pause::default(),
+            share: Share::START,
+            is_too_large: false,
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
@@ -209,6 +232,11 @@ impl<'a> Search<'a> {
         self.relaxed.size()
     }
 
+    /// How many pairs the stronger bound has looked up.
+    pub(crate) fn lookups(&self) -> u64 {
+        self.pairs.as_ref().map_or(0, |pairs| pairs.work)
+    }
+
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         if self.nodes.is_empty() {
@@ -229,6 +257,9 @@ impl<'a> Search<'a> {
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
+        if self.is_cut(parent) {
+            return Turn::Nothing;
+        }
         let Some((step, state)) = self.make(parent, step) else {
             return Turn::Nothing;
         };
@@ -294,9 +325,6 @@ impl<'a> Search<'a> {
         let Some(mut estimate) = self.relaxed.evaluate(&state) else {
             return Turn::Nothing;
         };
-        if self.is_cut(&state) {
-            return Turn::Nothing;
-        }
         self.symmetry
             .thin_out(&state, self.is_timeless, &mut estimate.applicable);
         let kept = &estimate.applicable;
@@ -313,6 +341,7 @@ impl<'a> Search<'a> {
             step,
             state,
             outlook,
+            hope: Hope::Unknown,
         });
         if is_goal {
             // A state in which the goal holds may still have successors worth looking at: the
@@ -324,24 +353,37 @@ impl<'a> Search<'a> {
         Turn::Nothing
     }
 
-    /// Whether the stronger bound shows that no plan begins like this. It is asked as often as it
-    /// pays.
-    fn is_cut(&mut self, state: &State) -> bool {
-        if self.evaluated == PATIENCE {
+    /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
+    /// successor of a state has its turn, and gets a share of the time.
+    fn is_cut(&mut self, number: u32) -> bool {
+        if self.pairs.is_none()
+            && self.evaluated >= DOUBT
+            && !self.is_timeless
+            && !self.is_too_large
+        {
             self.pairs = Pairs::of(self.compiled);
-        }
-        if self.is_timeless {
-            return false;
+            self.is_too_large = self.pairs.is_none();
         }
         let Some(pairs) = &mut self.pairs else {
             return false;
         };
-        if !self.pause.is_over() {
+        let node = &mut self.nodes[number as usize];
+        match node.hope {
+            Hope::Some => return false,
+            Hope::None => return true,
+            Hope::Unknown => {}
+        }
+        node.hope = Hope::Some;
+        if !self.share.asks(self.relaxed.size()) {
             return false;
         }
         pairs.horizon = self.stepper.horizon;
-        let is_hopeless = pairs.is_hopeless(state);
-        self.pause.note(is_hopeless);
+        let before = pairs.work;
+        let is_hopeless = pairs.is_hopeless(&node.state);
+        self.share.note(pairs.work - before, is_hopeless);
+        if is_hopeless {
+            node.hope = Hope::None;
+        }
         is_hopeless
     }
 

@@ -30,23 +30,39 @@ pub struct Unsupported {
     pub place: String,
 }
 
-/// Compiles `grounding`, which is what `task` can reach from `situation`.
+/// How many actions are compiled between two questions whether to go on.
+const ACTIONS_PER_QUESTION: usize = 256;
+
+/// Why there is no compiled problem.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Failure {
+    Unsupported(Unsupported),
+    /// It was told to stop.
+    Stopped,
+}
+
+/// Compiles `grounding`, which is what `task` can reach from `situation`, as long as `goes_on`
+/// says so.
 pub(crate) fn compile(
     task: &mut Task,
     grounding: &Grounding,
     situation: &Situation,
     epsilon: &Rational,
-) -> Result<Compiled, Unsupported> {
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Result<Compiled, Failure> {
     let mut full = full_actions(task, grounding);
+    if !goes_on() {
+        return Err(Failure::Stopped);
+    }
     let mut builder = Builder::new(task);
     builder.links = Links::new(has_fixed_numbers(grounding, situation));
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
-        check(&running.action)?;
+        check(&running.action).map_err(Failure::Unsupported)?;
         builder.links_of(&running.action);
     }
     for action in &grounding.actions {
-        check(action)?;
+        check(action).map_err(Failure::Unsupported)?;
         builder.links_of(action);
     }
     let scale = scale_of(task, grounding, situation, epsilon);
@@ -55,7 +71,11 @@ pub(crate) fn compile(
         builder.running(&running.action);
     }
     for (number, action) in grounding.actions.iter().enumerate() {
-        builder.action(action, full.get_mut(number).and_then(Option::take).as_ref());
+        let full = full.get_mut(number).and_then(Option::take);
+        builder.action(action, full.as_ref());
+        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !goes_on() {
+            return Err(Failure::Stopped);
+        }
     }
     Ok(builder.finish(grounding, situation, scale))
 }

@@ -188,7 +188,7 @@ proptest! {
             panic!("a small task");
         };
         let epsilon = Rational::new(1, 1000);
-        let compiled = compile(&mut task, &grounding, &situation, &epsilon).expect("plain");
+        let compiled = compile(&mut task, &grounding, &situation, &epsilon, &mut || true).expect("plain");
         let mut pairs = Pairs::of(&compiled).expect("small");
         let mut budget = 3_000;
         earliest_end(&compiled, &mut pairs, &compiled.initial, MOST, &mut budget);
