@@ -229,6 +229,10 @@ pub(crate) struct RunArgs {
     /// Who decides
     #[arg(long, value_name = "NAME", default_value = "guarded")]
     pub(crate) executor: String,
+    /// How likely actions and effects are to succeed, and facts to change by themselves, for
+    /// executors that go by that; without it, everything is certain
+    #[arg(long, value_name = "FILE")]
+    pub(crate) likelihoods: Option<PathBuf>,
     /// Which of the possible trajectories of the world to take
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,

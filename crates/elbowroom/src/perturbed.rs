@@ -8,15 +8,16 @@
 mod experiment;
 mod results;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use elbowroom_execution::untimed::{
-    Adaptable, AsPublished, Esterel, Foresighted, Limits, Shortest, UntimedExecutor, UntimedWorld,
-    all_actions, trial,
+    ActionName, Adaptable, AsPublished, Esterel, Foresighted, Game, Limits, Shortest,
+    UntimedExecutor, UntimedWorld, all_actions, trial,
 };
-use elbowroom_model::Task;
 use elbowroom_model::ground::Action;
+use elbowroom_model::{State, Task};
 use elbowroom_pddl::{Source, read_problem};
+use elbowroom_probability::optimum::{self, DeadEnds};
 use elbowroom_probability::{Likelihoods, Semantics};
 use elbowroom_sim::perturbed::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use rayon::prelude::*;
@@ -37,6 +38,7 @@ struct Setting<'e> {
     likelihoods: Arc<Likelihoods>,
     chances: Chances,
     perturbed: Option<PerturbedFacts>,
+    foresight: OnceLock<Result<Foresighted, PerturbedError>>,
 }
 
 /// Makes `trials` trials of each case, in each world, with each executor; on `jobs` threads, 0: as
@@ -108,21 +110,37 @@ impl<'e> Setting<'e> {
             likelihoods: Arc::new(likelihoods),
             chances,
             perturbed,
+            foresight: OnceLock::new(),
         })
     }
 
-    fn foresighted(&self) -> Result<Foresighted, PerturbedError> {
-        let settings = elbowroom_probability::optimum::Settings {
-            most_running: self.experiment.most_running,
-            ..Default::default()
-        };
-        Foresighted::new(
-            &self.task,
-            self.actions.clone(),
-            &self.likelihoods,
-            settings,
-        )
-        .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
+    /// The table of the sound world, made when it is first asked for.
+    fn foresight(&self) -> Result<&Foresighted, PerturbedError> {
+        let made = self.foresight.get_or_init(|| {
+            // The first plan takes a round; each step that ends in a dead end takes another.
+            let patience = self.experiment.rounds.saturating_sub(1).max(1);
+            let settings = optimum::Settings {
+                most_running: self.experiment.most_running,
+                dead_ends: DeadEnds::Patience(patience),
+                ..optimum::Settings::default()
+            };
+            let actions = self.actions.clone();
+            Foresighted::new(&self.task, actions, &self.likelihoods, settings)
+                .map_err(|error| PerturbedError::other(format!("{}: {error}", self.case.name)))
+        });
+        made.as_ref().map_err(Clone::clone)
+    }
+
+    fn executor(&self, kind: ExecutorKind) -> Result<Box<dyn UntimedExecutor>, PerturbedError> {
+        let (task, likelihoods) = (Arc::clone(&self.task), Arc::clone(&self.likelihoods));
+        Ok(match kind {
+            ExecutorKind::Esterel => Box::new(Esterel::new(task)),
+            ExecutorKind::Adaptable => {
+                Box::new(Adaptable::new(task, likelihoods, Semantics::Paper))
+            }
+            ExecutorKind::AsPublished => Box::new(AsPublished::new(task, likelihoods)),
+            ExecutorKind::Lookahead => Box::new(self.foresight()?.clone()),
+        })
     }
 
     fn row(
@@ -132,31 +150,26 @@ impl<'e> Setting<'e> {
         trials: u64,
         observe: &(dyn Fn() -> bool + Sync),
     ) -> Result<Row, PerturbedError> {
-        let (task, likelihoods) = (&self.task, &self.likelihoods);
-        let mut optimum = None;
-        let mut executor: Box<dyn UntimedExecutor> = match kind {
-            ExecutorKind::Esterel => Box::new(Esterel::new(Arc::clone(task))),
-            ExecutorKind::Adaptable => Box::new(Adaptable::new(
-                Arc::clone(task),
-                Arc::clone(likelihoods),
-                Semantics::Paper,
-            )),
-            ExecutorKind::AsPublished => {
-                Box::new(AsPublished::new(Arc::clone(task), Arc::clone(likelihoods)))
-            }
-            ExecutorKind::Lookahead => {
-                let foresighted = self.foresighted()?;
-                // The table is of the sound world; elsewhere it promises nothing.
-                optimum = (world == WorldKind::Sound).then(|| foresighted.value());
-                Box::new(foresighted)
-            }
+        let mut executor = self.executor(kind)?;
+        // The table is of the sound world; elsewhere it promises nothing.
+        let foresight = match world {
+            WorldKind::Sound => Some(self.foresight()?),
+            WorldKind::AsPublished => None,
         };
-        let mut planner = Shortest::new(Arc::clone(task), self.actions.clone());
-        let limits = Limits {
-            rounds: self.experiment.rounds,
-            ..Limits::default()
+        let is_dead_end = foresight.map(|foresight| {
+            move |state: &State, running: &[ActionName]| foresight.is_dead_end(state, running)
+        });
+        let mut planner = Shortest::new(Arc::clone(&self.task), self.actions.clone());
+        let mut game = Game {
+            task: &self.task,
+            plans: &mut |state| planner.plan(state),
+            dead_ends: is_dead_end.as_ref().map(|watch| watch as _),
+            limits: Limits {
+                rounds: self.experiment.rounds,
+                ..Limits::default()
+            },
         };
-        let mut row = Row::new(self.case, world, kind, optimum);
+        let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
         let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
             .wrapping_add(self.number.wrapping_mul(1_000_000_007));
         for number in 0..trials {
@@ -168,11 +181,10 @@ impl<'e> Setting<'e> {
                     published = PublishedWorld::new(&self.chances, perturbed, seed);
                     &mut published
                 } else {
-                    sound = SoundWorld::new(&self.chances, task.initial(), seed);
+                    sound = SoundWorld::new(&self.chances, self.task.initial(), seed);
                     &mut sound
                 };
-            let mut plans = |state: &_| planner.plan(state);
-            row.add(trial(task, world, &mut plans, &mut *executor, limits));
+            row.add(trial(&mut game, world, &mut *executor));
         }
         if observe() {
             Ok(row)

@@ -46,7 +46,7 @@ fn events(bencher: Bencher<'_, '_>, executor: &str, nodes: usize) {
     bencher
         .counter(ItemsCount::new(EVENTS))
         .with_inputs(|| {
-            let mut executor = spec.build(Box::new(Everywhere), None);
+            let mut executor = spec.build(Box::new(Everywhere));
             executor.adopt(&mission).expect("a consistent plan");
             executor
         })

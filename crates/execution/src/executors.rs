@@ -4,6 +4,7 @@
 //! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
 //! made from that list.
 
+mod adaptable;
 mod fixed;
 mod guarded;
 mod live;
@@ -11,8 +12,10 @@ mod stn;
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use elbowroom_num::Rational;
+use elbowroom_probability::Likelihoods;
 
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
@@ -25,6 +28,7 @@ pub const EXECUTORS: &[Registered] = &[
     stn::REGISTERED,
     guarded::REGISTERED,
     live::REGISTERED,
+    adaptable::REGISTERED,
 ];
 
 /// What there is to know of an executor before there is one.
@@ -43,15 +47,37 @@ pub struct Registered {
     /// What it needs to know of a plan.
     pub need: Need,
     /// Makes one.
-    make: fn(Ask) -> Box<dyn Executor>,
+    make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
 }
 
-/// What an executor is made of.
-struct Ask {
-    /// The number after its name, if one was given.
-    argument: Option<Rational>,
-    region: Box<dyn Region>,
-    odds: Option<Box<dyn Odds>>,
+/// What an executor may ask while it executes.
+pub struct Means {
+    /// The whole envelope.
+    pub region: Box<dyn Region>,
+    /// How likely everything is.
+    pub likelihoods: Arc<Likelihoods>,
+    /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
+    /// look.
+    pub odds: Option<Box<dyn Odds>>,
+}
+
+impl Means {
+    /// With these odds.
+    #[must_use]
+    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
+        Self { odds, ..self }
+    }
+}
+
+impl<R: Region + 'static> From<Box<R>> for Means {
+    /// Everything is certain, and no plan likelier than another.
+    fn from(region: Box<R>) -> Self {
+        Self {
+            region,
+            likelihoods: Arc::new(Likelihoods::certain()),
+            odds: None,
+        }
+    }
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
@@ -85,14 +111,9 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Makes the executor. `region` is asked by those that look at the whole envelope, `odds` by
-    /// those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not look.
-    pub fn build(&self, region: Box<dyn Region>, odds: Option<Box<dyn Odds>>) -> Box<dyn Executor> {
-        (self.registered.make)(Ask {
-            argument: self.argument.clone(),
-            region,
-            odds,
-        })
+    /// Makes the executor, from the envelope alone, or from all [`Means`].
+    pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
+        (self.registered.make)(self.argument.clone(), means.into())
     }
 
     /// Whether the executor looks for plans that are likelier to succeed.
@@ -198,6 +219,7 @@ mod tests {
             "guarded",
             "live",
             "live:5",
+            "adaptable",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);

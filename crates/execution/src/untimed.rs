@@ -11,6 +11,11 @@
 //!   under way then counts as let go;
 //! - where there is no plan, all rounds that are left are lost, as nothing changes between rounds.
 //!
+//! One rule is ours, and holds only where somebody looks out for dead ends ([`Game::dead_ends`]): a
+//! step that ends where there is no plan uses up a round, as asking for a plan there would. Without
+//! it an executor could do something, no matter what, until what is broken mends itself, and how
+//! often executors succeed would say how stubborn they are.
+//!
 //! Executors here choose steps, not times, and so are of another kind than
 //! [`Executor`](crate::Executor): there is nothing to wait for.
 
@@ -24,6 +29,7 @@ mod shortest;
 use std::sync::Arc;
 
 use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
+use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_model::{State, Task, TimeTriggeredPlan};
 
 pub use actions::{Unsupported, all_actions};
@@ -80,6 +86,26 @@ impl Default for Limits {
     }
 }
 
+/// Says whether a state is a dead end while these actions are under way: whether the goal could not
+/// be reached from it even if nothing went wrong any more.
+pub type DeadEndWatch<'a> = dyn Fn(&State, &[ActionName]) -> bool + 'a;
+
+/// A ground action: its schema and its arguments.
+pub type ActionName = (SchemaId, Vec<ObjectId>);
+
+/// What a trial is played by.
+pub struct Game<'g> {
+    /// The problem.
+    pub task: &'g Task,
+    /// Who plans.
+    pub plans: &'g mut Plans<'g>,
+    /// Who looks out for dead ends, if somebody does; then each step that ends in one uses up a
+    /// round, and the trial is lost with the last one.
+    pub dead_ends: Option<&'g DeadEndWatch<'g>>,
+    /// When it is over in any case.
+    pub limits: Limits,
+}
+
 /// What was done in a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
@@ -108,7 +134,8 @@ impl Tally {
 pub struct Trial {
     /// Whether the goal held when an execution ended.
     pub is_success: bool,
-    /// Rounds without success: 0 if the first plan led to the goal.
+    /// Executions without success: 0 if the first plan led to the goal. Where the trial has failed,
+    /// all rounds.
     pub replans: usize,
     /// What was done.
     pub tally: Tally,
@@ -120,6 +147,12 @@ pub struct Stage<'w> {
     world: &'w mut dyn UntimedWorld,
     tally: Tally,
     most_steps: u64,
+    dead_ends: Option<&'w DeadEndWatch<'w>>,
+    /// What has started in this execution and not ended; known only where dead ends are looked for.
+    running: Vec<ActionName>,
+    rounds_left: usize,
+    is_dead_end: bool,
+    is_lost: bool,
 }
 
 impl Stage<'_> {
@@ -138,9 +171,20 @@ impl Stage<'_> {
         self.holds(self.task.goal())
     }
 
-    /// Whether nothing may be done any more ([`Limits::steps`]).
+    /// Whether nothing may be done any more: all steps are used up ([`Limits::steps`]), or, in a
+    /// dead end, all rounds.
     pub fn is_over(&self) -> bool {
-        self.tally.steps() >= self.most_steps
+        self.is_lost || self.tally.steps() >= self.most_steps
+    }
+
+    /// Whether the last step has ended in a dead end; `None` if nobody looks out for them.
+    pub fn is_dead_end(&self) -> Option<bool> {
+        self.dead_ends.map(|_| self.is_dead_end)
+    }
+
+    /// How many more steps may end in a dead end; the next one after these loses the trial.
+    pub fn patience(&self) -> usize {
+        self.rounds_left.saturating_sub(1)
     }
 
     /// Tries to start an action whose start condition holds.
@@ -151,6 +195,10 @@ impl Stage<'_> {
         } else {
             self.tally.failed_starts += 1;
         }
+        if self.dead_ends.is_some() && has_started && action.durative().is_some() {
+            self.running.push(name_of(action));
+        }
+        self.look_out();
         has_started
     }
 
@@ -158,43 +206,75 @@ impl Stage<'_> {
     pub fn end(&mut self, action: &Action) {
         self.world.end(action);
         self.tally.ends += 1;
+        if self.dead_ends.is_some() {
+            let name = name_of(action);
+            self.running.retain(|other| *other != name);
+        }
+        self.look_out();
     }
+
+    /// Lets an action go that has started: it will not be ended. That is no step.
+    pub fn let_go(&mut self, action: &Action) {
+        let name = name_of(action);
+        self.running.retain(|other| *other != name);
+    }
+
+    /// Asks whether the step has ended in a dead end, and what that costs.
+    fn look_out(&mut self) {
+        let Some(dead_ends) = self.dead_ends else {
+            return;
+        };
+        self.is_dead_end = dead_ends(self.world.state(), &self.running);
+        if self.is_dead_end {
+            self.rounds_left = self.rounds_left.saturating_sub(1);
+            self.is_lost = self.rounds_left == 0;
+        }
+    }
+}
+
+fn name_of(action: &Action) -> ActionName {
+    (action.schema, action.arguments.clone())
 }
 
 /// Makes a trial.
 pub fn trial(
-    task: &Task,
+    game: &mut Game<'_>,
     world: &mut dyn UntimedWorld,
-    plans: &mut Plans<'_>,
     executor: &mut dyn UntimedExecutor,
-    limits: Limits,
 ) -> Trial {
     executor.begin();
     let mut stage = Stage {
-        task,
+        task: game.task,
         world,
         tally: Tally::default(),
-        most_steps: limits.steps as u64,
+        most_steps: game.limits.steps as u64,
+        dead_ends: game.dead_ends,
+        running: Vec::new(),
+        rounds_left: game.limits.rounds,
+        is_dead_end: false,
+        is_lost: false,
     };
-    for round in 0..limits.rounds {
-        let Some(plan) = plans(stage.state()) else {
+    let mut executions = 0;
+    while stage.rounds_left > 0 && !stage.is_over() {
+        let Some(plan) = (game.plans)(stage.state()) else {
             break;
         };
+        stage.rounds_left -= 1;
+        stage.running.clear();
+        stage.is_dead_end = false;
         executor.execute(&plan, &mut stage);
         if stage.is_goal() {
             return Trial {
                 is_success: true,
-                replans: round,
+                replans: executions,
                 tally: stage.tally,
             };
         }
-        if stage.is_over() {
-            break;
-        }
+        executions += 1;
     }
     Trial {
         is_success: false,
-        replans: limits.rounds,
+        replans: game.limits.rounds,
         tally: stage.tally,
     }
 }

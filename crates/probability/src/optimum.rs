@@ -19,13 +19,15 @@
 //! ([`Settings::enforces_over_all`] changes that).
 //!
 //! The number that limits a run is that of its steps ([`Horizon`]). The experiments limit planning
-//! rounds instead: a run is over when no plan is found ten times, and as nothing changes without a
-//! step, that means: when there is no plan. [`Settings::needs_plan`] says so; then steps need no
-//! limit.
+//! rounds instead: a run is over when no plan is found so many times. [`DeadEnds`] says what that
+//! means here. Where broken things can mend themselves, such a rule is needed, because otherwise
+//! whoever does something, no matter what, for long enough succeeds for certain.
 
 mod process;
+mod sweeps;
 mod table;
 
+use elbowroom_model::State;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::circumstances::Circumstances;
@@ -41,6 +43,18 @@ pub enum Horizon {
     Unlimited,
 }
 
+/// What becomes of a run in a dead end: where the goal could not be reached even if nothing went
+/// wrong any more, so that who plans does not find a plan. Only luck leads out of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeadEnds {
+    /// It goes on.
+    Harmless,
+    /// It is lost.
+    Lost,
+    /// It goes on, until so many of its steps have ended in one; that one is the last. At least 1.
+    Patience(usize),
+}
+
 /// The rules of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -48,9 +62,8 @@ pub struct Settings {
     pub horizon: Horizon,
     /// How many actions can be under way at once.
     pub most_running: usize,
-    /// Whether a run is lost in a state from which the goal could not be reached even if nothing
-    /// went wrong any more: who plans does not find a plan there.
-    pub needs_plan: bool,
+    /// What becomes of a run where there is no plan.
+    pub dead_ends: DeadEnds,
     /// Whether an action whose over-all condition fails is abandoned at once.
     pub enforces_over_all: bool,
 }
@@ -61,7 +74,7 @@ impl Default for Settings {
         Self {
             horizon: Horizon::Unlimited,
             most_running: usize::MAX,
-            needs_plan: true,
+            dead_ends: DeadEnds::Lost,
             enforces_over_all: false,
         }
     }
@@ -103,32 +116,52 @@ pub enum Move {
 /// The value of each state for the best of all agents, and what it does there.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    pub(crate) values: Vec<Vec<f64>>,
-    pub(crate) moves: Vec<Vec<Move>>,
+    values: sweeps::Values,
+    moves: Vec<Vec<Vec<Move>>>,
     /// How many sweeps it took.
     pub sweeps: usize,
 }
 
 impl Optimum {
-    /// The greatest probability of success from here, in [0, 1].
+    /// The greatest probability of success from here, in [0, 1], with all patience left.
     ///
     /// With [`Horizon::Unlimited`] it is approached from below; the sweeps stop when none of them
     /// adds more than 1e-12 to any state.
     pub fn value(&self, process: &Perturbed, circumstances: &Circumstances) -> f64 {
+        let values = self.values.last().map_or(&[][..], Vec::as_slice);
         process
             .weights(circumstances)
             .into_iter()
-            .map(|(set, state, weight)| weight * self.values[set][state])
+            .map(|(set, state, weight)| weight * values[set][state])
             .sum()
     }
 
-    /// What to do, with all steps of the horizon still to come.
+    /// What to do, with all steps of the horizon and all patience still to come.
     ///
     /// Of an uncertain belief, the most likely state counts.
     pub fn choose(&self, process: &Perturbed, circumstances: &Circumstances) -> Move {
         let mut weights = process.weights(circumstances);
         weights.sort_by(|(.., a), (.., b)| b.total_cmp(a));
         let likeliest = weights.first();
-        likeliest.map_or(Move::Stop, |(set, state, _)| self.moves[*set][*state])
+        let moves = self.moves.last();
+        likeliest
+            .zip(moves)
+            .map_or(Move::Stop, |((set, state, _), moves)| moves[*set][*state])
+    }
+
+    /// What to do where everything is known, and when `patience` more steps may end in a dead end
+    /// ([`DeadEnds::Patience`]; 0: none, the next that does is the last).
+    pub fn choose_at(
+        &self,
+        process: &Perturbed,
+        state: &State,
+        running: &[InstanceId],
+        patience: usize,
+    ) -> Move {
+        let moves = self.moves.get(patience).or_else(|| self.moves.last());
+        let place = process.place(state, running);
+        place
+            .zip(moves)
+            .map_or(Move::Stop, |((set, state), moves)| moves[set][state])
     }
 }

@@ -10,7 +10,7 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Change, Condition, FactId, SnapAction};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
-use elbowroom_probability::optimum::{Horizon, Move, Perturbed, Settings};
+use elbowroom_probability::optimum::{DeadEnds, Horizon, Move, Perturbed, Settings};
 use elbowroom_probability::{
     Choice, Circumstances, LayerDispatch, Likelihoods, Lookahead, Model, OrderSearch, Reconsider,
     SearchSettings, Semantics,
@@ -22,7 +22,7 @@ use twin::random::{Case, Taste, case};
 fn steps(count: usize) -> Settings {
     Settings {
         horizon: Horizon::Steps(count),
-        needs_plan: false,
+        dead_ends: DeadEnds::Harmless,
         ..Settings::default()
     }
 }
@@ -65,7 +65,7 @@ const SMALL: Taste = Taste {
 #[test]
 fn the_optimum_is_that_of_a_plain_recursion() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let mut between = 0;
+    let (mut between, mut dead_ends_matter) = (0, 0);
     for _ in 0..150 {
         let mut case = case(&mut rng, SMALL);
         case.circumstances = Circumstances::initial(&case.task);
@@ -76,82 +76,150 @@ fn the_optimum_is_that_of_a_plain_recursion() {
             Semantics::World,
         );
         let model = model.unwrap();
+        let state: Vec<bool> = (0..case.task.fact_count())
+            .map(|at| case.circumstances.belief.probability(fact(at)) > 0.5)
+            .collect();
         for count in 0..4 {
-            let process = Perturbed::new(model.clone(), steps(count)).unwrap();
-            let optimum = process.optimum().value(&process, &case.circumstances);
-            let state: Vec<bool> = (0..case.task.fact_count())
-                .map(|at| case.circumstances.belief.probability(fact(at)) > 0.5)
-                .collect();
-            let expected = best(&case, &state, &[], count);
-            assert!(
-                (optimum - expected).abs() < 1e-12,
-                "{optimum} {expected} {}",
-                case.text
-            );
-            between += usize::from(optimum > 0.0 && optimum < 1.0);
+            let mut values = Vec::new();
+            for patience in [None, Some(1), Some(2)] {
+                let settings = Settings {
+                    dead_ends: patience.map_or(DeadEnds::Harmless, DeadEnds::Patience),
+                    ..steps(count)
+                };
+                let process = Perturbed::new(model.clone(), settings).unwrap();
+                let optimum = process.optimum().value(&process, &case.circumstances);
+                let left = Left {
+                    steps: count,
+                    patience,
+                };
+                let expected = best(&case, &state, &[], left);
+                assert!(
+                    (optimum - expected).abs() < 1e-12,
+                    "{patience:?}: {optimum} {expected} {}",
+                    case.text
+                );
+                values.push(optimum);
+            }
+            between += usize::from(values[0] > 0.0 && values[0] < 1.0);
+            dead_ends_matter += usize::from(values[1] < values[2] - 1e-9);
         }
     }
     assert!(between > 50, "{between}");
+    assert!(dead_ends_matter > 10, "{dead_ends_matter}");
+}
+
+/// What of a run is left.
+#[derive(Clone, Copy, Debug)]
+struct Left {
+    steps: usize,
+    /// How many steps that end in a dead end lose the run; `None`: no number of them.
+    patience: Option<usize>,
+}
+
+/// Whether the goal can be reached if nothing goes wrong: by trying everything.
+fn is_dead_end(case: &Case, state: &[bool], running: &[InstanceId]) -> bool {
+    let mut open = vec![(state.to_vec(), running.to_vec())];
+    let mut seen = open.clone();
+    while let Some((state, running)) = open.pop() {
+        // What is under way can be let go.
+        if holds(case.task.goal(), &state) {
+            return false;
+        }
+        let mut next = Vec::new();
+        for &id in &running {
+            next.push((state.clone(), without(&running, id)));
+        }
+        for (snap, _, after) in steps_from(case, &state, &running) {
+            let mut changed = state.clone();
+            for wanted in [false, true] {
+                for effect in &snap.effects {
+                    match effect.change {
+                        Change::Add(fact) if wanted => changed[fact.index()] = true,
+                        Change::Delete(fact) if !wanted => changed[fact.index()] = false,
+                        _ => {}
+                    }
+                }
+            }
+            next.push((changed, after));
+        }
+        for place in next {
+            if !seen.contains(&place) {
+                seen.push(place.clone());
+                open.push(place);
+            }
+        }
+    }
+    true
+}
+
+fn without(running: &[InstanceId], id: InstanceId) -> Vec<InstanceId> {
+    let others = running.iter().copied().filter(|other| *other != id);
+    others.collect()
 }
 
 fn fact(index: usize) -> FactId {
     FactId(u32::try_from(index).unwrap())
 }
 
-/// The best chance of success with so many steps left.
-fn best(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -> f64 {
+/// The best chance of success with so much left.
+fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     if running.is_empty() && holds(case.task.goal(), state) {
         return 1.0;
     }
     let mut most: f64 = 0.0;
     for &id in running {
-        let fewer: Vec<_> = running
-            .iter()
-            .copied()
-            .filter(|other| *other != id)
-            .collect();
-        most = most.max(best(case, state, &fewer, left));
+        most = most.max(best(case, state, &without(running, id), left));
     }
-    if left == 0 {
+    if left.steps == 0 {
         return most;
     }
-    for (id, instance) in case.plan.instances() {
-        let action = &instance.action;
-        let is_running = running.contains(&id);
-        let (snap, success, next): (&SnapAction, f64, Vec<InstanceId>) = match &action.body {
-            Body::Durative(body) if is_running => {
-                let fewer = running
-                    .iter()
-                    .copied()
-                    .filter(|other| *other != id)
-                    .collect();
-                (&body.end, 1.0, fewer)
-            }
-            Body::Durative(body) => {
-                let more = running.iter().copied().chain([id]).collect();
-                (&body.start, case.likelihoods.start(action).unwrap(), more)
-            }
-            Body::Instantaneous(snap) => (
-                snap,
-                case.likelihoods.start(action).unwrap(),
-                running.to_vec(),
-            ),
+    let fewer = Left {
+        steps: left.steps - 1,
+        ..left
+    };
+    for (snap, id, next) in steps_from(case, state, running) {
+        let action = &case.plan.instance(id).action;
+        let success = if running.contains(&id) {
+            1.0
+        } else {
+            case.likelihoods.start(action).unwrap()
         };
-        if !holds(&snap.condition, state) {
-            continue;
-        }
         let mut value = 0.0;
         for (after, weight) in effects(case, action, snap, state) {
-            value += success * weight * perturbed(case, &after, &next, left - 1);
+            value += success * weight * perturbed(case, &after, &next, fewer);
         }
-        value += (1.0 - success) * perturbed(case, state, running, left - 1);
+        value += (1.0 - success) * perturbed(case, state, running, fewer);
         most = most.max(value);
     }
     most
 }
 
+/// The starts and ends that are possible: what each does, whose it is, and what is under way after
+/// it.
+fn steps_from<'c>(
+    case: &'c Case,
+    state: &[bool],
+    running: &[InstanceId],
+) -> Vec<(&'c SnapAction, InstanceId, Vec<InstanceId>)> {
+    let mut steps = Vec::new();
+    for (id, instance) in case.plan.instances() {
+        let (snap, next) = match &instance.action.body {
+            Body::Durative(body) if running.contains(&id) => (&body.end, without(running, id)),
+            Body::Durative(body) => {
+                let more = running.iter().copied().chain([id]).collect();
+                (&body.start, more)
+            }
+            Body::Instantaneous(snap) => (snap, running.to_vec()),
+        };
+        if holds(&snap.condition, state) {
+            steps.push((snap, id, next));
+        }
+    }
+    steps
+}
+
 /// The value after every fact has had its chance to change.
-fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -> f64 {
+fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     let mut worlds = vec![(Vec::new(), 1.0)];
     for (at, &is_true) in state.iter().enumerate() {
         let flip = case.likelihoods.flip(&case.task, fact(at)).unwrap();
@@ -165,10 +233,23 @@ fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: usize) -
             .filter(|(_, weight)| *weight > 0.0)
             .collect();
     }
+    let value = |state: &[bool]| match left.patience {
+        Some(patience) if is_dead_end(case, state, running) => {
+            let patience = patience - 1;
+            let left = Left {
+                patience: Some(patience),
+                ..left
+            };
+            if patience == 0 {
+                0.0
+            } else {
+                best(case, state, running, left)
+            }
+        }
+        _ => best(case, state, running, left),
+    };
     let worlds = worlds.iter();
-    worlds
-        .map(|(state, weight)| weight * best(case, state, running, left))
-        .sum()
+    worlds.map(|(state, weight)| weight * value(state)).sum()
 }
 
 fn effects(
@@ -255,7 +336,7 @@ fn no_executor_beats_the_optimum_of_the_authors_worlds() {
         let initial = Circumstances::initial(&world.task);
         let optimum = process.optimum();
         let best = optimum.value(&process, &initial);
-        let followed = process.success_of(&initial, &mut |now| optimum.choose(&process, now));
+        let followed = process.success_of(&initial, &mut |now, _| optimum.choose(&process, now));
         assert!(
             (best - followed).abs() < 1e-9,
             "{}: {best} {followed}",
@@ -270,11 +351,11 @@ fn no_executor_beats_the_optimum_of_the_authors_worlds() {
             );
             let search = OrderSearch::new(model.unwrap(), SearchSettings::default());
             let mut dispatch = LayerDispatch::new(search, Reconsider::Always);
-            let p = process.success_of(&initial, &mut |now| adaptable(&mut dispatch, now));
+            let p = process.success_of(&initial, &mut |now, _| adaptable(&mut dispatch, now));
             assert!(p <= best + 1e-9, "{}: {p} {best}", world.name);
             assert!(p > 0.8 * best, "{}: {p} {best}", world.name);
             let mut lookahead = Lookahead::new(dispatch, process.settings().clone());
-            let p = process.success_of(&initial, &mut |now| {
+            let p = process.success_of(&initial, &mut |now, _| {
                 let choice = lookahead.choose(now, &mut patient).unwrap();
                 as_move(&choice)
             });

@@ -10,7 +10,7 @@ mod trace_file;
 use std::sync::Arc;
 
 use elbowroom::execute::{Analyst, WholeRegion};
-use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
 };
@@ -19,6 +19,7 @@ use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::Source;
+use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::report::trace;
 use elbowroom::sim::{SimWorld, Unreliable, WorldModel};
 use serde_json::{Value, json};
@@ -50,11 +51,12 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         Some(path) => Some(time_triggered(&mut task, path)?),
         None => None,
     };
-    let choices = Choices::of(arguments)?;
+    let likelihoods = likelihoods_text(arguments)?;
+    let choices = Choices::of(arguments, likelihoods.as_ref(), &task)?;
     who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
-    let header = header(arguments, &texts, world.as_deref());
+    let header = header(arguments, &texts, world.as_deref(), likelihoods.as_ref());
     let job = Job {
         arguments,
         texts,
@@ -173,11 +175,13 @@ pub(super) struct Choices {
     pub(super) executor: ExecutorSpec,
     pub(super) settings: RunSettings,
     pub(super) flow: flow::Settings,
+    /// Certain, unless there is a file.
+    pub(super) likelihoods: Arc<Likelihoods>,
 }
 
 impl Choices {
-    fn of(arguments: &RunArgs) -> Result<Self, Failure> {
-        Self::new(
+    fn of(arguments: &RunArgs, likelihoods: Option<&Source>, task: &Task) -> Result<Self, Failure> {
+        let choices = Self::new(
             &arguments.executor,
             &arguments.vary,
             &arguments.precision,
@@ -193,7 +197,26 @@ impl Choices {
                 time_limit: arguments.time_limit.clone(),
                 ..RunSettings::default()
             },
-        )
+        )?;
+        match likelihoods {
+            Some(text) => choices.with_likelihoods(text, task),
+            None => Ok(choices),
+        }
+    }
+
+    /// Goes by these likelihoods.
+    pub(super) fn with_likelihoods(self, text: &Source, task: &Task) -> Result<Self, Failure> {
+        let read = likelihoods::read(text.text().as_bytes(), task);
+        let likelihoods = read.map_err(|error| {
+            Failure::new(
+                format!("{}, {error}", text.name()),
+                "docs/formats/likelihoods.md describes likelihood files",
+            )
+        })?;
+        Ok(Self {
+            likelihoods: Arc::new(likelihoods),
+            ..self
+        })
     }
 
     pub(super) fn new(
@@ -219,6 +242,7 @@ impl Choices {
             executor,
             settings,
             flow,
+            likelihoods: Arc::new(Likelihoods::certain()),
         })
     }
 
@@ -231,10 +255,13 @@ impl Choices {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let mut analyst = Analyst::new(self.flow.clone());
-        let region = Box::new(WholeRegion {
-            epsilon: self.settings.epsilon.clone(),
+        let mut executor = self.executor.build(Means {
+            region: Box::new(WholeRegion {
+                epsilon: self.settings.epsilon.clone(),
+            }),
+            likelihoods: Arc::clone(&self.likelihoods),
+            odds: planning.odds,
         });
-        let mut executor = self.executor.build(region, planning.odds);
         let ports = Ports {
             world,
             planner: planning.planner,
@@ -265,6 +292,12 @@ fn world_text(arguments: &RunArgs) -> Result<Option<String>, Failure> {
     Ok(Some(source.text().to_owned()))
 }
 
+fn likelihoods_text(arguments: &RunArgs) -> Result<Option<Source>, Failure> {
+    let path = arguments.likelihoods.as_deref();
+    path.map(|path| input::source(path, "likelihoods"))
+        .transpose()
+}
+
 fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
     if text == "measured" {
         return Ok(PlanningTime::Measured);
@@ -279,7 +312,12 @@ fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
 }
 
 /// Everything that the run depends on, so that it can be played back.
-fn header(arguments: &RunArgs, texts: &Texts, world: Option<&str>) -> Value {
+fn header(
+    arguments: &RunArgs,
+    texts: &Texts,
+    world: Option<&str>,
+    likelihoods: Option<&Source>,
+) -> Value {
     let source = |source: &Source| json!({ "name": source.name(), "text": source.text() });
     json!({
         "domain": source(&texts.domain),
@@ -287,6 +325,7 @@ fn header(arguments: &RunArgs, texts: &Texts, world: Option<&str>) -> Value {
         "world": world,
         "world_process": arguments.world_process,
         "planner": arguments.planner,
+        "likelihoods": likelihoods.map(source),
         "has_plan": arguments.plan.is_some(),
         "executor": arguments.executor,
         "seed": arguments.seed,

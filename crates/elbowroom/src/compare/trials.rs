@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::executors::{ExecutorSpec, Means};
 use elbowroom_execution::run::{self, PlanningTime, Ports, Report, Verdict};
 use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -195,7 +195,8 @@ impl Setting<'_> {
             epsilon: settings.epsilon.clone(),
         });
         let asks_odds = spec.asks_odds();
-        let mut executor = spec.build(region, asks_odds.then(|| Box::new(odds.clone()) as _));
+        let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
+        let mut executor = spec.build(Means::from(region).with_odds(odds));
         let ports = Ports {
             world,
             planner: if asks_odds {

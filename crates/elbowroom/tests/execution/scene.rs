@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom::execute::{Analyst, Embedded, Likeliest, SharedLikeliest, WholeRegion};
-use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
 use elbowroom::flow;
@@ -15,7 +15,7 @@ use elbowroom::planner::embedded;
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
 /// The executors that there are, one of each.
-pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live"];
+pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live", "adaptable"];
 
 /// A problem with a plan.
 pub(crate) struct Scene {
@@ -87,7 +87,8 @@ impl Scene {
         let region = Box::new(WholeRegion {
             epsilon: self.settings.epsilon.clone(),
         });
-        let mut decider = spec.build(region, Some(Box::new(likeliest.clone())));
+        let mut decider =
+            spec.build(Means::from(region).with_odds(Some(Box::new(likeliest.clone()))));
         let ports = Ports {
             world: &mut world,
             planner: &mut likeliest,
@@ -134,7 +135,7 @@ impl Scene {
         let region = Box::new(WholeRegion {
             epsilon: self.settings.epsilon.clone(),
         });
-        let mut decider = spec.build(region, None);
+        let mut decider = spec.build(region);
         run::run(
             Arc::clone(&self.task),
             Some(&self.plan),

@@ -31,12 +31,9 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
     use elbowroom::execution::run::{self, Ports};
     let stored = Stored::read(text).expect("a correct test");
     let spec: ExecutorSpec = executor.parse().expect("a correct test");
-    let mut decider = spec.build(
-        Box::new(WholeRegion {
-            epsilon: scene.settings.epsilon.clone(),
-        }),
-        None,
-    );
+    let mut decider = spec.build(Box::new(WholeRegion {
+        epsilon: scene.settings.epsilon.clone(),
+    }));
     let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
     run::run(
         Arc::clone(&scene.task),

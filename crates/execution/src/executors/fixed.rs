@@ -19,7 +19,7 @@ pub(super) const REGISTERED: Registered = Registered {
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
     need: Need::Orderings,
-    make: |ask| Box::new(Fixed::new(&ask.argument.unwrap_or_default())),
+    make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),
 };
 
 /// See [`REGISTERED`].

@@ -19,7 +19,7 @@ pub(super) const REGISTERED: Registered = Registered {
               upper end, or too little time is left.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",
     need: Need::Envelope,
-    make: |_| Box::new(Guarded { state: None }),
+    make: |_, _| Box::new(Guarded { state: None }),
 };
 
 /// See [`REGISTERED`].

@@ -24,11 +24,11 @@ pub(super) const REGISTERED: Registered = Registered {
               that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
-    make: |ask| {
-        let advantage = ask.argument.map(|points| points / Rational::from(100));
+    make: |argument, means| {
+        let advantage = argument.map(|points| points / Rational::from(100));
         Box::new(Live {
-            region: ask.region,
-            odds: ask.odds.zip(advantage),
+            region: means.region,
+            odds: means.odds.zip(advantage),
             state: None,
         })
     },

@@ -15,7 +15,7 @@ pub(super) const REGISTERED: Registered = Registered {
               durations that the domain allows, and replans when one is missed.",
     paper: "Dechter, Meiri & Pearl (1991); Muscettola, Morris & Tsamardinos (1998)",
     need: Need::Network,
-    make: |_| Box::new(Stn { state: None }),
+    make: |_, _| Box::new(Stn { state: None }),
 };
 
 /// See [`REGISTERED`].

@@ -11,7 +11,7 @@ use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, patient};
 use elbowroom_probability::{
-    Circumstances, Likelihoods, Model, OrderSearch, Running, SearchSettings, Semantics,
+    Candidates, Circumstances, Likelihoods, Model, OrderSearch, Running, SearchSettings, Semantics,
     TotalOrderPlan,
 };
 
@@ -20,6 +20,10 @@ use super::{Stage, UntimedExecutor, start_of};
 /// After every step, the lattermost layer that fits says what is next; where none fits, the order
 /// most likely to succeed from here is looked for; where there is none, the plan is given up
 /// (paper 2, Algorithm 1 and section 2.2.1).
+///
+/// A plan is not given up where there is no other: in a dead end, orders count that succeed only if
+/// something changes by itself ([`Candidates::All`]). The paper leaves open what is done there; its
+/// P(A ∩ G) of such an order is not 0, and giving up is no better.
 ///
 /// What was chosen is remembered by order, state and what is under way.
 #[derive(Clone, Debug)]
@@ -34,6 +38,8 @@ pub struct Adaptable {
 #[derive(Clone, Debug)]
 struct Prepared {
     search: OrderSearch,
+    /// The search for orders that count on luck.
+    lucky: OrderSearch,
     /// All orders found so far.
     orders: Vec<TotalOrderPlan>,
     known: BTreeMap<Key, Chosen>,
@@ -66,8 +72,14 @@ impl Adaptable {
         known.unwrap_or_else(|| {
             let prepared =
                 model(&self.task, plan, state, &self.likelihoods, self.semantics).map(|model| {
+                    let model = Arc::new(model);
+                    let lucky = SearchSettings {
+                        candidates: Candidates::All,
+                        ..SearchSettings::default()
+                    };
                     Prepared {
-                        search: OrderSearch::new(model, SearchSettings::default()),
+                        search: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
+                        lucky: OrderSearch::new(model, lucky),
                         orders: Vec::new(),
                         known: BTreeMap::new(),
                     }
@@ -137,17 +149,24 @@ pub(super) fn perform(
 }
 
 impl Prepared {
-    fn choose(&mut self, order: Option<usize>, state: &State, running: &[InstanceId]) -> Chosen {
+    fn choose(
+        &mut self,
+        order: Option<usize>,
+        stage: &Stage<'_>,
+        running: &[InstanceId],
+    ) -> Chosen {
+        let state = stage.state();
         let key = (order, state.facts.clone(), running.to_vec());
         if let Some(known) = self.known.get(&key) {
             return *known;
         }
-        let chosen = self.consider(order, &circumstances(state, running));
+        let is_dead_end = stage.is_dead_end() == Some(true);
+        let chosen = self.consider(order, &circumstances(state, running), is_dead_end);
         self.known.insert(key, chosen);
         chosen
     }
 
-    fn consider(&mut self, order: Option<usize>, now: &Circumstances) -> Chosen {
+    fn consider(&mut self, order: Option<usize>, now: &Circumstances, is_dead_end: bool) -> Chosen {
         let stop = Chosen { next: None, order };
         if now.running.is_empty() && goal_holds(self.search.model(), now) {
             return stop;
@@ -161,6 +180,12 @@ impl Prepared {
         // A condition that couples too many facts: as if there were no order.
         let found = self.search.best_order(now, &mut patient).ok();
         let Some(found) = found.and_then(|found| found.order) else {
+            if is_dead_end && let Some(next) = self.by_luck(now) {
+                return Chosen {
+                    next: Some(next),
+                    order: None,
+                };
+            }
             // The plan does not lead to the goal from here. What is under way ends before it is
             // given up: a robot that is let go between two places is at neither.
             let model = self.search.model();
@@ -188,6 +213,12 @@ impl Prepared {
             order: Some(index),
         }
     }
+
+    /// The first happening of the order most likely to succeed, though it cannot without luck.
+    fn by_luck(&mut self, now: &Circumstances) -> Option<NodeId> {
+        let found = self.lucky.best_order(now, &mut patient).ok()?;
+        found.order?.sequence.first().copied()
+    }
 }
 
 impl UntimedExecutor for Adaptable {
@@ -199,7 +230,7 @@ impl UntimedExecutor for Adaptable {
         let model = Arc::clone(prepared.search.model());
         let (mut order, mut running) = (None, Vec::new());
         while !stage.is_over() {
-            let chosen = prepared.choose(order, stage.state(), &running);
+            let chosen = prepared.choose(order, stage, &running);
             order = chosen.order;
             let is_done = |node| perform(&model, node, &mut running, stage);
             if !chosen.next.is_some_and(is_done) {

@@ -1,16 +1,17 @@
 //! The executor that knows the world: [`Foresighted`].
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::ground::Action;
-use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_model::{State, Task, TimeTriggeredPlan};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::likelihoods::Missing;
 use elbowroom_probability::optimum::{Move, NotSmall, Optimum, Perturbed, Settings};
 use elbowroom_probability::{Likelihoods, Model, Semantics};
 
 use super::adaptable::{circumstances, perform};
-use super::{Stage, UntimedExecutor};
+use super::{ActionName, Stage, UntimedExecutor};
 
 /// Does what is best in the world of the likelihoods, whatever the plan says: what
 /// [`Lookahead`](elbowroom_probability::Lookahead) does with a plan of everything that can be done.
@@ -18,6 +19,7 @@ use super::{Stage, UntimedExecutor};
 pub struct Foresighted {
     process: Perturbed,
     optimum: Optimum,
+    instances: BTreeMap<ActionName, InstanceId>,
 }
 
 /// The world cannot be tabulated.
@@ -46,7 +48,24 @@ impl Foresighted {
         let model = Model::new(Arc::clone(task), plan, likelihoods, Semantics::World)?;
         let process = Perturbed::new(model, settings)?;
         let optimum = process.optimum();
-        Ok(Self { process, optimum })
+        let instances = process.model().plan().instances();
+        let instances = instances.map(|(id, instance)| {
+            let action = &instance.action;
+            ((action.schema, action.arguments.clone()), id)
+        });
+        Ok(Self {
+            instances: instances.collect(),
+            process,
+            optimum,
+        })
+    }
+
+    /// Whether who plans finds no plan from here; what is not in the table is not called a dead
+    /// end. See [`Game::dead_ends`](super::Game::dead_ends).
+    pub fn is_dead_end(&self, state: &State, running: &[ActionName]) -> bool {
+        let find = |name: &ActionName| self.instances.get(name).copied();
+        let running: Option<Vec<InstanceId>> = running.iter().map(find).collect();
+        running.is_some_and(|running| self.process.is_dead_end_at(state, &running))
     }
 
     /// The best success probability that any executor can have from the beginning.
@@ -62,14 +81,25 @@ impl UntimedExecutor for Foresighted {
         let model = Arc::clone(self.process.model());
         let mut running: Vec<InstanceId> = Vec::new();
         while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
-            let now = circumstances(stage.state(), &running);
-            match self.optimum.choose(&self.process, &now) {
+            // Where nobody looks out for dead ends, luck is not tried, as it could be for ever.
+            if stage.is_dead_end().is_none() && self.process.is_dead_end_at(stage.state(), &running)
+            {
+                return;
+            }
+            let patience = stage.patience();
+            let chosen = self
+                .optimum
+                .choose_at(&self.process, stage.state(), &running, patience);
+            match chosen {
                 Move::Do(node) => {
                     if !perform(&model, node, &mut running, stage) {
                         return;
                     }
                 }
-                Move::Abandon(id) => running.retain(|&other| other != id),
+                Move::Abandon(id) => {
+                    running.retain(|&other| other != id);
+                    stage.let_go(&model.plan().instance(id).action);
+                }
                 Move::Stop => return,
             }
         }

@@ -1,11 +1,11 @@
-//! The Markov decision process of a perturbed world, and dynamic programming over it.
+//! The Markov decision process of a perturbed world: states, moves, and what they lead to.
 
 use std::sync::Arc;
 
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::table::{check, holds, table};
-use super::{Horizon, Move, NotSmall, Optimum, Settings};
+use super::{DeadEnds, Move, NotSmall, Settings};
 use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
 
@@ -16,16 +16,16 @@ const MOST_STATES: usize = 1 << 22;
 #[derive(Clone, Debug)]
 pub struct Perturbed {
     model: Arc<Model>,
-    settings: Settings,
+    pub(super) settings: Settings,
     /// The sets of actions that can be under way, as bits, those with fewer actions first.
-    sets: Vec<u32>,
+    pub(super) sets: Vec<u32>,
     /// The position of each set.
     place: Vec<usize>,
     /// By node: in which states its condition holds.
     is_possible: Vec<Vec<bool>>,
     /// By instance: in which states its over-all condition holds.
     goes_on: Vec<Vec<bool>>,
-    goal: Vec<bool>,
+    pub(super) goal: Vec<bool>,
     /// By set and state: whether a plan exists.
     is_solvable: Vec<Vec<bool>>,
     starts: Vec<NodeId>,
@@ -100,120 +100,13 @@ impl Perturbed {
         &self.settings
     }
 
-    /// The best that can be done, and how.
-    pub fn optimum(&self) -> Optimum {
-        let states = self.goal.len();
-        let mut optimum = Optimum {
-            values: vec![vec![0.0; states]; self.sets.len()],
-            moves: vec![vec![Move::Stop; states]; self.sets.len()],
-            sweeps: 0,
-        };
-        self.reward(&mut optimum.values);
-        // Letting go takes no step, so it can be done when none is left.
-        for set in 1..self.sets.len() {
-            for state in (0..states).filter(|state| self.goal[*state]) {
-                if let Some(id) = self.members(set).next() {
-                    optimum.values[set][state] = 1.0;
-                    optimum.moves[set][state] = Move::Abandon(id);
-                }
-            }
-        }
-        loop {
-            if matches!(self.settings.horizon, Horizon::Steps(most) if optimum.sweeps >= most) {
-                return optimum;
-            }
-            let flipped = self.flipped(&optimum.values);
-            let mut greatest: f64 = 0.0;
-            for set in 0..self.sets.len() {
-                for state in 0..states {
-                    if self.is_over(set, state) {
-                        continue;
-                    }
-                    let mut best = optimum.values[set][state];
-                    let mut chosen = None;
-                    for option in self.options(set, state) {
-                        let value = self.value_of(set, state, option, &flipped, &optimum.values);
-                        // A move is kept until a better one is found, so that moves lead on.
-                        if value > best + 1e-14 {
-                            (best, chosen) = (value, Some(option));
-                        }
-                    }
-                    if let Some(chosen) = chosen {
-                        greatest = greatest.max(best - optimum.values[set][state]);
-                        optimum.values[set][state] = best;
-                        optimum.moves[set][state] = chosen;
-                    }
-                }
-            }
-            optimum.sweeps += 1;
-            if greatest < 1e-12 {
-                return optimum;
-            }
-        }
-    }
-
-    /// How likely an agent is to succeed that always does the same in the same state.
-    ///
-    /// `agent` is asked once for each state that is not over, with all its facts certain. A move
-    /// that is not possible counts as stopping.
-    pub fn success_of(
-        &self,
-        initial: &Circumstances,
-        agent: &mut dyn FnMut(&Circumstances) -> Move,
-    ) -> f64 {
-        let states = self.goal.len();
-        let mut moves = vec![vec![Move::Stop; states]; self.sets.len()];
-        for (set, moves) in moves.iter_mut().enumerate() {
-            for (state, chosen) in moves.iter_mut().enumerate() {
-                if self.is_over(set, state) {
-                    continue;
-                }
-                let wanted = agent(&self.circumstances(set, state, initial));
-                if self.options(set, state).contains(&wanted) {
-                    *chosen = wanted;
-                }
-            }
-        }
-        let mut values = vec![vec![0.0; states]; self.sets.len()];
-        self.reward(&mut values);
-        for set in 1..self.sets.len() {
-            for state in 0..states {
-                if let Move::Abandon(id) = moves[set][state] {
-                    values[set][state] = values[self.without(set, id)][state];
-                }
-            }
-        }
-        let mut sweeps = 0;
-        loop {
-            if matches!(self.settings.horizon, Horizon::Steps(most) if sweeps >= most) {
-                break;
-            }
-            let flipped = self.flipped(&values);
-            let mut greatest: f64 = 0.0;
-            for set in 0..self.sets.len() {
-                for state in 0..states {
-                    if self.is_over(set, state) || moves[set][state] == Move::Stop {
-                        continue;
-                    }
-                    let chosen = moves[set][state];
-                    let value = self.value_of(set, state, chosen, &flipped, &values);
-                    greatest = greatest.max((value - values[set][state]).abs());
-                    values[set][state] = value;
-                }
-            }
-            sweeps += 1;
-            if greatest < 1e-12 {
-                break;
-            }
-        }
-        let weights = self.weights(initial).into_iter();
-        weights
-            .map(|(set, state, weight)| weight * values[set][state])
-            .sum()
-    }
-
     /// The circumstances in which the facts are as in a state and a set of actions is under way.
-    fn circumstances(&self, set: usize, state: usize, like: &Circumstances) -> Circumstances {
+    pub(super) fn circumstances(
+        &self,
+        set: usize,
+        state: usize,
+        like: &Circumstances,
+    ) -> Circumstances {
         let mut circumstances = like.clone();
         for (place, &fact) in self.model.facts.iter().enumerate() {
             let truth = state & (1 << place) != 0;
@@ -232,7 +125,7 @@ impl Perturbed {
     /// The states that a belief may stand for, with how likely they are.
     pub(super) fn weights(&self, circumstances: &Circumstances) -> Vec<(usize, usize, f64)> {
         let running = circumstances.running.iter();
-        let set: u32 = running.map(|running| 1 << running.instance.0).sum();
+        let set = running.fold(0_u32, |set, running| set | 1 << running.instance.0);
         let Some(&set) = self
             .place
             .get(set as usize)
@@ -258,30 +151,52 @@ impl Perturbed {
             .collect()
     }
 
-    fn reward(&self, values: &mut [Vec<f64>]) {
-        for (state, value) in values[0].iter_mut().enumerate() {
-            *value = f64::from(u8::from(self.goal[state]));
-        }
-    }
-
     /// Whether nothing is left to decide: success, or no way to it.
-    fn is_over(&self, set: usize, state: usize) -> bool {
+    pub(super) fn is_over(&self, set: usize, state: usize) -> bool {
         (set == 0 && self.goal[state])
-            || (self.settings.needs_plan && !self.is_solvable[set][state])
+            || (self.settings.dead_ends == DeadEnds::Lost && self.is_dead_end(set, state))
     }
 
-    fn members(&self, set: usize) -> impl Iterator<Item = InstanceId> + '_ {
+    /// Whether the goal could not be reached from here even if nothing went wrong any more.
+    pub(super) fn is_dead_end(&self, set: usize, state: usize) -> bool {
+        !self.is_solvable[set][state]
+    }
+
+    /// Whether who plans finds no way to the goal from here: all facts are as in `state`, and the
+    /// actions of these instances are under way. What is not in the table is not called one.
+    pub fn is_dead_end_at(&self, state: &elbowroom_model::State, running: &[InstanceId]) -> bool {
+        self.place(state, running)
+            .is_some_and(|(set, state)| self.is_dead_end(set, state))
+    }
+
+    /// The position of a state in the tables; `None` if more is under way than they have room for.
+    pub(super) fn place(
+        &self,
+        state: &elbowroom_model::State,
+        running: &[InstanceId],
+    ) -> Option<(usize, usize)> {
+        let set = running
+            .iter()
+            .fold(0_u32, |set, instance| set | 1 << instance.0);
+        let set = *self.place.get(set as usize)?;
+        let facts = self.model.facts.iter().enumerate();
+        let bits = facts.filter(|(_, fact)| state.facts.contains(fact));
+        let bits = bits.map(|(place, _)| 1 << place).sum();
+        (set != usize::MAX).then_some((set, bits))
+    }
+
+    pub(super) fn members(&self, set: usize) -> impl Iterator<Item = InstanceId> + '_ {
         let bits = self.sets[set];
         let ids = self.model.plan().instances().map(|(id, _)| id);
         ids.filter(move |id| bits & (1 << id.0) != 0)
     }
 
-    fn without(&self, set: usize, id: InstanceId) -> usize {
+    pub(super) fn without(&self, set: usize, id: InstanceId) -> usize {
         self.place[(self.sets[set] & !(1 << id.0)) as usize]
     }
 
     /// What can be done, in the order of the plan.
-    fn options(&self, set: usize, state: usize) -> Vec<Move> {
+    pub(super) fn options(&self, set: usize, state: usize) -> Vec<Move> {
         let mut options = Vec::new();
         let bits = self.sets[set];
         for (index, (&start, &end)) in self.starts.iter().zip(&self.ends).enumerate() {
@@ -311,7 +226,7 @@ impl Perturbed {
         self.place[bits as usize]
     }
 
-    fn value_of(
+    pub(super) fn value_of(
         &self,
         set: usize,
         state: usize,
@@ -362,7 +277,7 @@ impl Perturbed {
     }
 
     /// The expected values before facts change by themselves, fact by fact.
-    fn flipped(&self, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub(super) fn flipped(&self, values: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let mut flipped: Vec<Vec<f64>> = values.to_vec();
         if self.settings.enforces_over_all {
             for (set, row) in flipped.iter_mut().enumerate() {

@@ -39,7 +39,10 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     } else {
         None
     };
-    let choices = header.choices()?;
+    let choices = match header.source("likelihoods") {
+        Some(text) => header.choices()?.with_likelihoods(&text, &task)?,
+        None => header.choices()?,
+    };
     let task = Arc::new(task);
     let mut world = ReplayWorld::new(&stored, &task);
     let mut planner = ReplayPlanner::new(&stored);
