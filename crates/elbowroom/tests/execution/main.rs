@@ -1,8 +1,11 @@
 //! Whole runs: executors, worlds, planner and envelopes together.
 
+mod adaptable;
 mod bad_worlds;
 mod campaigns;
 mod guarantee;
 mod reasons;
 mod scene;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod traces;
