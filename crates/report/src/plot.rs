@@ -133,7 +133,7 @@ impl IntervalPlot {
             });
             chart.draw_series(intervals).map_err(text)?;
             let values =
-                points().map(|(x, point)| Circle::new((x, point.value), 4, colour.filled()));
+                points().map(|(x, point)| Circle::new((x, point.value), 3, colour.filled()));
             chart.draw_series(values).map_err(text)?;
         }
         Ok(())
@@ -146,7 +146,7 @@ impl IntervalPlot {
         let mut x = 20;
         for (number, series) in self.series.iter().enumerate() {
             let colour = COLOURS[number % COLOURS.len()];
-            root.draw(&Circle::new((x, 48), 4, colour.filled()))
+            root.draw(&Circle::new((x, 48), 3, colour.filled()))
                 .map_err(text)?;
             x = legend_name(root, &series.name, x + 10)?;
         }

@@ -111,12 +111,7 @@ pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
                 interval: None,
             })
         };
-        let success = |row: &Row| {
-            Some(Point {
-                value: 100.0 * row.success.share()?,
-                interval: row.success.wilson().map(|(a, b)| (100.0 * a, 100.0 * b)),
-            })
-        };
+        let success = |row: &Row| share(row.success);
         let actions = |work: super::Work| {
             // Messages and failed starts are counted in the same trials.
             let mut both = work.messages;
@@ -132,6 +127,7 @@ pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
             &success,
         );
         successes.reference = reference(results, world);
+        successes.series.extend(published(results, world));
         [
             ("success", successes),
             (
@@ -195,6 +191,25 @@ fn picture(
         groups,
         reference: None,
     }
+}
+
+/// A share in percent, with Wilson's interval.
+fn share(of: Proportion) -> Option<Point> {
+    Some(Point {
+        value: 100.0 * of.share()?,
+        interval: of.wilson().map(|(a, b)| (100.0 * a, 100.0 * b)),
+    })
+}
+
+/// What was published, executor by executor.
+fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
+    let published = |row: &Row| row.published.and_then(share);
+    let mut series = picture(results, world, ("", ""), &published).series;
+    series.retain(|series| series.points.iter().any(Option::is_some));
+    for series in &mut series {
+        series.name += ", published";
+    }
+    series
 }
 
 /// The optimum, where it is known.

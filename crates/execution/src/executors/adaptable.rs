@@ -71,7 +71,6 @@ impl Executor for Adaptable {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let settings = deorder::Settings {
             epsilon: mission.epsilon.clone(),
-            ..deorder::Settings::default()
         };
         let plan = partial_order(&mission.task, &mission.time_triggered, &settings);
         let task = Arc::clone(&mission.task);
