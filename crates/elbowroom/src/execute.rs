@@ -2,10 +2,14 @@
 //! behind them.
 
 mod analyst;
+#[cfg(feature = "external")]
+mod external;
 mod facts_only;
 mod memory;
 mod planners;
 
 pub use analyst::{Analyst, WholeRegion};
+#[cfg(feature = "external")]
+pub use external::External;
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};

@@ -23,6 +23,7 @@ mod formula;
 mod hash;
 mod metric;
 mod network;
+mod pairs;
 mod reasons;
 mod relaxed;
 mod search;
@@ -44,7 +45,8 @@ pub use compile::Unsupported;
 
 use apply::Step;
 use compile::{Compiled, Eagerness};
-use search::{Search, Style, Turn};
+use reasons::Names;
+use search::{PATIENCE, Search, Style, Turn};
 use symmetry::Symmetry;
 use time::{NEVER, Ticks};
 
@@ -105,8 +107,10 @@ pub fn plan(
         Ok(compiled) => compiled,
         Err(unsupported) => return Answer::Unsupported(unsupported),
     };
-    let is_provable = compiled.is_exact && (compiled.gap.is_none() || compiled.is_symbolic);
-    if is_provable && let Some(proof) = reasons::relaxed_proof(grounded, &compiled) {
+    let names = Names::of(grounded, &compiled);
+    if compiled.is_relaxation_exact()
+        && let Some(proof) = reasons::relaxed_proof(&names, &compiled)
+    {
         return Answer::Unsolvable {
             proof,
             counts: progress.counts,
@@ -114,6 +118,7 @@ pub fn plan(
     }
     let symmetry = Symmetry::of(grounded, &compiled);
     Planner {
+        names: &names,
         symmetry: &symmetry,
         task,
         situation,
@@ -150,6 +155,7 @@ struct Planner<'a> {
     observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
     compiled: &'a Compiled,
     symmetry: &'a Symmetry,
+    names: &'a Names,
     progress: Progress,
     best: Option<Found>,
     /// Only plans that end by then are of interest.
@@ -170,8 +176,24 @@ impl Planner<'_> {
             .map(|&style| Search::new(compiled, self.symmetry, style))
             .collect();
         let mut is_over = vec![false; searches.len()];
+        let mut stopped = match self.work(&mut searches[0], Phase::Hasty, PATIENCE) {
+            Outcome::Stop(stopped) => Some(stopped),
+            Outcome::BudgetSpent => None,
+            Outcome::Over => {
+                is_over[0] = searches[0].is_incomplete();
+                (!is_over[0]).then_some(Stopped::Exhausted)
+            }
+        };
+        if self.best.is_none()
+            && stopped.is_none_or(|stopped| stopped == Stopped::Exhausted)
+            && compiled.is_relaxation_exact()
+            && let Some(proof) = reasons::pairs_proof(self.names, compiled)
+        {
+            let counts = self.progress.counts;
+            return Answer::Unsolvable { proof, counts };
+        }
         let mut budget = HASTE;
-        let stopped = 'turns: loop {
+        while stopped.is_none() {
             for (number, search) in searches.iter_mut().enumerate() {
                 if is_over[number] {
                     continue;
@@ -181,17 +203,21 @@ impl Planner<'_> {
                     None => (Phase::Complete, budget / COMPLETE_SHARE),
                 };
                 match self.work(search, phase, share) {
-                    Outcome::Stop(stopped) => break 'turns stopped,
+                    Outcome::Stop(reason) => stopped = Some(reason),
                     Outcome::BudgetSpent => {}
                     Outcome::Over if search.is_incomplete() => is_over[number] = true,
-                    Outcome::Over => break 'turns Stopped::Exhausted,
+                    Outcome::Over => stopped = Some(Stopped::Exhausted),
+                }
+                if stopped.is_some() {
+                    break;
                 }
             }
             if !is_over.contains(&false) {
-                break Stopped::Exhausted;
+                stopped = stopped.or(Some(Stopped::Exhausted));
             }
             budget = budget.saturating_mul(2);
-        };
+        }
+        let stopped = stopped.unwrap_or(Stopped::Exhausted);
         let is_proof = stopped == Stopped::Exhausted
             && compiled.is_exact
             && compiled.gap.is_none()

@@ -5,6 +5,7 @@ mod bad_worlds;
 mod campaigns;
 mod guarantee;
 mod reasons;
+mod reports;
 mod scene;
 #[path = "../shared/mod.rs"]
 mod shared;

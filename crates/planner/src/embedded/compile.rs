@@ -8,6 +8,7 @@
 //! here once, and the search only takes maxima.
 
 mod builder;
+mod directions;
 mod eager;
 mod gaps;
 mod interference;
@@ -61,6 +62,8 @@ pub(crate) struct Compiled {
     /// Whether an instance of some action could be needed that this form cannot express; also an
     /// obstacle to proofs. Says why.
     pub(crate) gap: Option<&'static str>,
+    /// The same for a form in which numbers, and what is reached once, are never lost.
+    pub(crate) relaxed_gap: Option<&'static str>,
     /// Whether some value depends on when things happen.
     pub(crate) is_symbolic: bool,
 }
@@ -189,6 +192,11 @@ pub(crate) struct Rule {
 }
 
 impl Compiled {
+    /// Whether a goal that is out of reach of a relaxation is out of reach.
+    pub(crate) fn is_relaxation_exact(&self) -> bool {
+        self.is_exact && self.relaxed_gap.is_none()
+    }
+
     /// The snap of that number.
     pub(crate) fn snap(&self, number: u32) -> &Snap {
         &self.snaps[number as usize]

@@ -1,60 +1,184 @@
-//! Why the goal is out of reach even when nothing that was reached is ever lost.
+//! Why the goal is out of reach of a relaxation: in words, with the deadlines that are to blame.
 
 use elbowroom_model::Task;
 
 use super::answer::Proof;
 use super::compile::{Compiled, Eagerness};
 use super::formula::Literal;
+use super::pairs::Pairs;
 use super::relaxed::{Missing, Relaxed};
+use super::time::Ticks;
 
-/// A proof that no plan exists, if the relaxed goal is out of reach from the beginning.
-pub(crate) fn relaxed_proof(task: &Task, compiled: &Compiled) -> Option<Proof> {
+/// The most deadlines that are looked at one by one.
+const MOST_SUSPECTS: usize = 24;
+
+/// What the parts of a proof are called.
+#[derive(Debug)]
+pub(crate) struct Names {
+    /// By position in [`Compiled::facts`]; empty where no proof mentions it.
+    facts: Vec<String>,
+}
+
+impl Names {
+    /// The names of what the goal reads and timed initials change. `task` is the one that was
+    /// grounded.
+    pub(crate) fn of(task: &Task, compiled: &Compiled) -> Self {
+        let mut facts = vec![String::new(); compiled.facts.len()];
+        let mut name = |fact: u32| {
+            facts[fact as usize] = task.fact_name(compiled.facts[fact as usize]);
+        };
+        compiled
+            .goal
+            .visit_literals(&mut |literal| name(literal.fact()));
+        for timed in &compiled.timed {
+            timed
+                .adds
+                .iter()
+                .chain(&timed.deletes)
+                .for_each(|&fact| name(fact));
+        }
+        Self { facts }
+    }
+
+    fn literal(&self, literal: Literal) -> String {
+        let name = &self.facts[literal.fact() as usize];
+        if literal.truth() {
+            name.clone()
+        } else {
+            format!("(not {name})")
+        }
+    }
+}
+
+/// A proof that no plan exists, if the goal is out of reach from the beginning even when nothing
+/// that was reached is ever lost.
+pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
     let no_haste: Option<Eagerness> = None;
     let mut relaxed = Relaxed::new(compiled, no_haste);
     if relaxed.evaluate(&compiled.initial).is_some() {
         return None;
     }
-    let name = |literal: Literal| {
-        let name = task.fact_name(compiled.facts[literal.fact() as usize]);
-        if literal.truth() {
-            name
-        } else {
-            format!("(not {name})")
+    let suspects = (0..relaxed.timetable_count()).map(|number| {
+        let mut copy = Relaxed::new(compiled, no_haste);
+        copy.ignore_timetable(number)
+    });
+    let suspects: Vec<_> = suspects.collect();
+    let mut fails_without = |ignored: &[usize]| {
+        let mut without = Relaxed::new(compiled, no_haste);
+        for &number in ignored {
+            without.ignore_timetable(number);
         }
+        without.evaluate(&compiled.initial).is_none()
     };
-    let goals: Vec<String> = relaxed
-        .missing_goals()
+    let missing = relaxed.missing_goals();
+    Some(explained(
+        names,
+        compiled,
+        &missing,
+        &suspects,
+        &mut fails_without,
+    ))
+}
+
+/// A proof that no plan exists, if no two parts of the goal can hold together in time.
+pub(crate) fn pairs_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
+    let mut pairs = Pairs::of(compiled)?;
+    if !pairs.is_hopeless(&compiled.initial) {
+        return None;
+    }
+    let missing = pairs.missing_goals();
+    let suspects: Vec<_> = (0..pairs.timetable_count())
+        .map(|number| {
+            let kept = pairs.ignore_timetable(number);
+            let suspect = pairs.deadline(number, &kept);
+            pairs.restore_timetable(number, kept);
+            suspect
+        })
+        .collect();
+    let mut fails_without = |ignored: &[usize]| {
+        let kept: Vec<_> = ignored
+            .iter()
+            .map(|&number| (number, pairs.ignore_timetable(number)))
+            .collect();
+        let is_hopeless = pairs.is_hopeless(&compiled.initial);
+        for (number, spans) in kept {
+            pairs.restore_timetable(number, spans);
+        }
+        is_hopeless
+    };
+    Some(explained(
+        names,
+        compiled,
+        &missing,
+        &suspects,
+        &mut fails_without,
+    ))
+}
+
+/// The reason: what is missing, and the deadlines without which it would be within reach.
+fn explained(
+    names: &Names,
+    compiled: &Compiled,
+    missing: &[Missing],
+    suspects: &[Option<(Literal, Ticks)>],
+    fails_without: &mut dyn FnMut(&[usize]) -> bool,
+) -> Proof {
+    let goals: Vec<String> = missing
         .iter()
         .map(|missing| match missing {
-            Missing::Literal(literal) => format!("`{}`", name(*literal)),
+            Missing::Literal(literal) => format!("`{}`", names.literal(*literal)),
             Missing::Other => "a part of the goal".to_owned(),
         })
         .collect();
-    let what = if goals.is_empty() {
+    let goal = if goals.is_empty() {
         "the end of an action under way".to_owned()
     } else {
         goals.join(" and ")
     };
-    // The deadline without which it would be within reach is to blame.
-    for number in 0..relaxed.timetable_count() {
-        let mut without = Relaxed::new(compiled, no_haste);
-        let Some((literal, end)) = without.ignore_timetable(number) else {
-            continue;
+    let guilty = guilty(suspects, fails_without);
+    if guilty.is_empty() {
+        return Proof::Unreachable(vec![format!("{goal} cannot be reached")]);
+    }
+    let deadlines = guilty.iter().map(|&(literal, end)| {
+        let end = compiled.scale.units(end).to_decimal(3);
+        let verb = if literal.truth() {
+            "closes"
+        } else {
+            "no longer holds"
         };
-        if without.evaluate(&compiled.initial).is_some() {
-            let end = compiled.scale.units(end).to_decimal(3);
-            let (name, closes) = if literal.truth() {
-                (name(literal), "closes")
-            } else {
-                (name(literal), "no longer holds")
-            };
-            return Some(Proof::TooLate {
-                goal: what,
-                deadline: format!("`{name}` {closes} at {end}"),
-            });
+        format!("`{}` {verb} at {end}", names.literal(literal))
+    });
+    Proof::TooLate {
+        goal,
+        deadline: deadlines.collect::<Vec<_>>().join(" and "),
+    }
+}
+
+/// A smallest set of deadlines without which the goal would be within reach, in the sense that
+/// none of them can be left out; one alone if possible.
+fn guilty(
+    suspects: &[Option<(Literal, Ticks)>],
+    fails_without: &mut dyn FnMut(&[usize]) -> bool,
+) -> Vec<(Literal, Ticks)> {
+    let numbers = (0..suspects.len()).filter(|&number| suspects[number].is_some());
+    let mut ignored: Vec<usize> = numbers.collect();
+    if ignored.is_empty() || fails_without(&ignored) {
+        return Vec::new();
+    }
+    if ignored.len() <= MOST_SUSPECTS {
+        let alone = ignored.iter().find(|&&number| !fails_without(&[number]));
+        if let Some(&number) = alone {
+            ignored = vec![number];
+        } else {
+            for number in ignored.clone() {
+                let without: Vec<usize> =
+                    ignored.iter().copied().filter(|&n| n != number).collect();
+                if !fails_without(&without) {
+                    ignored = without;
+                }
+            }
         }
     }
-    Some(Proof::Unreachable(vec![format!(
-        "{what} cannot be reached"
-    )]))
+    let found = ignored.iter().filter_map(|&number| suspects[number]);
+    found.collect()
 }

@@ -20,6 +20,7 @@ use super::state::State;
 use super::network::SETTLED;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
+pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
 use graph::Kind;
 
@@ -144,12 +145,8 @@ impl<'a> Relaxed<'a> {
 
     /// Takes a literal to be true at all times, and says when it last would have become false.
     pub(crate) fn ignore_timetable(&mut self, number: usize) -> Option<(Literal, Ticks)> {
-        let spans = std::mem::replace(&mut self.graph.timetable[number], vec![(-NEVER, NEVER)]);
-        let end = spans
-            .iter()
-            .map(|span| span.1)
-            .filter(|&end| end < NEVER)
-            .max()?;
+        let spans = self.graph.forget_timetable(number);
+        let end = last_end(&spans)?;
         Some((self.graph.timetable_literal(number)?, end))
     }
 
@@ -399,6 +396,12 @@ impl<'a> Relaxed<'a> {
         estimate.applicable.sort_unstable();
         estimate.applicable.dedup();
     }
+}
+
+/// When the literal of a timetable last becomes false.
+pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
+    let ends = spans.iter().map(|span| span.1);
+    ends.filter(|&end| end < NEVER).max()
 }
 
 /// Whether times decide the test; then it is taken for granted.

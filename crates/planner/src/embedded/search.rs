@@ -10,6 +10,7 @@ use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::compile::{Compiled, Eagerness, NONE};
 use super::hash::Map;
+use super::pairs::Pairs;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
 use super::symmetry::Symmetry;
@@ -17,6 +18,37 @@ use super::time::{NEVER, Ticks};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
+
+/// After how many states the stronger bound is asked too.
+pub(crate) const PATIENCE: u64 = 64;
+
+/// The most states between two questions to the stronger bound.
+const LONGEST_PAUSE: u32 = 15;
+
+/// How many states pass before the stronger bound is asked again: more and more while it cuts
+/// nothing.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pause {
+    length: u32,
+    left: u32,
+}
+
+impl Pause {
+    fn is_over(&mut self) -> bool {
+        let is_over = self.left == 0;
+        self.left = self.left.saturating_sub(1);
+        is_over
+    }
+
+    fn note(&mut self, has_cut: bool) {
+        self.length = if has_cut {
+            0
+        } else {
+            (2 * self.length + 1).min(LONGEST_PAUSE)
+        };
+        self.left = self.length;
+    }
+}
 
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +84,9 @@ pub(crate) struct Search<'a> {
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
+    /// A stronger bound, once the search takes long.
+    pairs: Option<Pairs<'a>>,
+    pause: Pause,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
     known: Map<u64, Vec<u32>>,
@@ -129,6 +164,8 @@ impl<'a> Search<'a> {
             style,
             stepper: Stepper::new(compiled),
             relaxed: Relaxed::new(compiled, style.haste),
+            pairs: None,
+            pause: Pause::default(),
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
@@ -257,6 +294,9 @@ impl<'a> Search<'a> {
         let Some(mut estimate) = self.relaxed.evaluate(&state) else {
             return Turn::Nothing;
         };
+        if self.is_cut(&state) {
+            return Turn::Nothing;
+        }
         self.symmetry
             .thin_out(&state, self.is_timeless, &mut estimate.applicable);
         let kept = &estimate.applicable;
@@ -282,6 +322,27 @@ impl<'a> Search<'a> {
         }
         self.expand(number, &estimate);
         Turn::Nothing
+    }
+
+    /// Whether the stronger bound shows that no plan begins like this. It is asked as often as it
+    /// pays.
+    fn is_cut(&mut self, state: &State) -> bool {
+        if self.evaluated == PATIENCE {
+            self.pairs = Pairs::of(self.compiled);
+        }
+        if self.is_timeless {
+            return false;
+        }
+        let Some(pairs) = &mut self.pairs else {
+            return false;
+        };
+        if !self.pause.is_over() {
+            return false;
+        }
+        pairs.horizon = self.stepper.horizon;
+        let is_hopeless = pairs.is_hopeless(state);
+        self.pause.note(is_hopeless);
+        is_hopeless
     }
 
     fn expand(&mut self, number: u32, estimate: &super::relaxed::Estimate) {

@@ -6,6 +6,7 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, Task};
 use elbowroom_num::{End, Rational};
 
+use super::directions::Shifts;
 use super::eager;
 use super::gaps;
 use super::interference::{Access, Links, Stamps, TimedWishes, Wishes};
@@ -36,8 +37,9 @@ pub(crate) fn compile(
     situation: &Situation,
     epsilon: &Rational,
 ) -> Result<Compiled, Unsupported> {
-    let mut footprints = full_footprints(task, grounding);
+    let mut full = full_actions(task, grounding);
     let mut builder = Builder::new(task);
+    builder.links = Links::new(has_fixed_numbers(grounding, situation));
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
         check(&running.action)?;
@@ -53,7 +55,7 @@ pub(crate) fn compile(
         builder.running(&running.action);
     }
     for (number, action) in grounding.actions.iter().enumerate() {
-        builder.action(action, footprints.get_mut(number).and_then(Option::take));
+        builder.action(action, full.get_mut(number).and_then(Option::take).as_ref());
     }
     Ok(builder.finish(grounding, situation, scale))
 }
@@ -102,10 +104,10 @@ struct Builder<'a> {
     over_all: Vec<Condition>,
 }
 
-/// The footprints of start and end, as the judge sees them, of the actions of which grounding may have
-/// dropped something that reads or writes a changing fact: a conditional effect that never happens,
-/// or a part of a disjunction that other parts decide. These interfere all the same.
-fn full_footprints(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Footprint, Footprint)>> {
+/// In full, as the judge sees them, the actions of which grounding may have dropped something that
+/// reads or writes a changing fact: a conditional effect that never happens, or a part of a
+/// disjunction that other parts decide. These interfere all the same.
+fn full_actions(task: &mut Task, grounding: &Grounding) -> Vec<Option<ground::Action>> {
     let schemas = &task.problem().schemas;
     let is_shortened: Vec<bool> = schemas.iter().map(may_be_shortened).collect();
     if !is_shortened.contains(&true) {
@@ -118,11 +120,24 @@ fn full_footprints(task: &mut Task, grounding: &Grounding) -> Vec<Option<(Footpr
             if !is_shortened[action.schema.index()] {
                 return None;
             }
-            let full = task.instantiate(action.schema, &action.arguments).ok()?;
-            let starts = Footprint::of_start(task, &full);
-            Some((starts, Footprint::of_end(task, &full)))
+            task.instantiate(action.schema, &action.arguments).ok()
         })
         .collect()
+}
+
+/// Whether it is plain that no number depends on when things happen: nothing changes continuously,
+/// and no duration is chosen.
+fn has_fixed_numbers(grounding: &Grounding, situation: &Situation) -> bool {
+    let running = situation.running.iter().map(|running| &running.action);
+    running.chain(&grounding.actions).all(|action| {
+        action.durative().is_none_or(|body| {
+            let is_fixed = body
+                .duration
+                .iter()
+                .any(|bound| bound.comparison == Comparison::Equal);
+            body.continuous.is_empty() && is_fixed
+        })
+    })
 }
 
 fn may_be_shortened(schema: &problem::Schema) -> bool {
@@ -271,14 +286,17 @@ impl<'a> Builder<'a> {
         self.over_all.push(body.over_all.clone());
     }
 
-    fn action(&mut self, action: &ground::Action, footprints: Option<(Footprint, Footprint)>) {
-        let (starts, ends) = footprints.unwrap_or_else(|| {
-            (
-                Footprint::of_start(self.task, action),
-                Footprint::of_end(self.task, action),
-            )
-        });
-        let mut wishes = Wishes::of(&starts, self.epsilon, &self.links);
+    fn action(&mut self, action: &ground::Action, full: Option<&ground::Action>) {
+        let full = full.unwrap_or(action);
+        let (starts, ends) = (
+            Footprint::of_start(self.task, full),
+            Footprint::of_end(self.task, full),
+        );
+        let shifts = match &full.body {
+            Body::Instantaneous(body) => Shifts::of(&body.effects),
+            Body::Durative(body) => Shifts::of(&body.start.effects),
+        };
+        let mut wishes = Wishes::of(&starts, &shifts, self.epsilon, &self.links);
         match &action.body {
             Body::Instantaneous(body) => {
                 let snap = self.snap(body, &mut Vec::new());
@@ -305,12 +323,14 @@ impl<'a> Builder<'a> {
                 self.over_all.push(Condition::TRUE);
             }
             Body::Durative(body) => {
-                let over_all = Footprint::of_condition(self.task, &body.over_all);
-                wishes.need_from_now_on(&over_all);
+                wishes.need_from_now_on(self.task, &body.over_all, &self.links);
                 let mut guards = Vec::new();
                 let snap = self.snap(&body.start, &mut guards);
                 let start = self.push_snap(snap, wishes);
-                let end = self.end_with(body, &ends, &mut guards);
+                let shifts = full
+                    .durative()
+                    .map_or_else(Shifts::default, |body| Shifts::of(&body.end.effects));
+                let end = self.end_with(body, &ends, &shifts, &mut guards);
                 let compiled = self.durative(action, body, start, end, guards);
                 self.actions.push(compiled);
                 self.over_all.push(body.over_all.clone());
@@ -324,17 +344,19 @@ impl<'a> Builder<'a> {
         for effect in &mut decided.end.effects {
             effect.guard.at_start = Condition::TRUE;
         }
-        self.end_with(&decided, footprint, &mut Vec::new())
+        let shifts = Shifts::of(&body.end.effects);
+        self.end_with(&decided, footprint, &shifts, &mut Vec::new())
     }
 
     fn end_with(
         &mut self,
         body: &DurativeBody,
         footprint: &Footprint,
+        shifts: &Shifts,
         guards: &mut Vec<Formula>,
     ) -> u32 {
-        let mut wishes = Wishes::of(footprint, self.epsilon, &self.links);
-        wishes.needed_until_now(self.task, &body.over_all);
+        let mut wishes = Wishes::of(footprint, shifts, self.epsilon, &self.links);
+        wishes.needed_until_now(self.task, &body.over_all, &self.links);
         let snap = self.snap(&body.end, guards);
         self.push_snap(snap, wishes)
     }
@@ -478,7 +500,10 @@ impl<'a> Builder<'a> {
             .collect();
         let timed_wishes: Vec<Wishes> = coming
             .iter()
-            .map(|timed| Wishes::of(&Footprint::of_timed(timed), self.epsilon, &self.links))
+            .map(|timed| {
+                let footprint = Footprint::of_timed(timed);
+                Wishes::of(&footprint, &Shifts::default(), self.epsilon, &self.links)
+            })
             .collect();
         let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
         let waiting = TimedWishes::of(&timed_wishes);
@@ -492,7 +517,7 @@ impl<'a> Builder<'a> {
                 let mut needs = Wishes::default();
                 for conjunct in over_all.conjuncts() {
                     if matches!(conjunct, Condition::Fact(_) | Condition::Not(_)) {
-                        needs.needed_until_now(self.task, conjunct);
+                        needs.needed_until_now(self.task, conjunct, &self.links);
                     }
                 }
                 let breaking = waiting.before(&needs.makes);
@@ -563,9 +588,8 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        let goal_reads = Footprint::of_condition(self.task, &grounding.goal);
         let mut goal_wishes = Wishes::default();
-        goal_wishes.need_from_now_on(&goal_reads);
+        goal_wishes.need_from_now_on(self.task, &grounding.goal, &self.links);
         let goal_accesses: Vec<_> = goal_wishes
             .after
             .iter()
@@ -605,10 +629,14 @@ impl<'a> Builder<'a> {
             initial: State::default(),
             is_exact,
             gap: None,
+            relaxed_gap: None,
             is_symbolic: false,
         };
         compiled.is_symbolic = is_symbolic(&compiled);
-        compiled.gap = gaps::gap(&compiled.actions, &compiled.snaps, compiled.facts.len());
+        let fact_count = compiled.facts.len();
+        compiled.relaxed_gap = gaps::among_facts(&compiled.actions, &compiled.snaps, fact_count);
+        compiled.gap = gaps::among_numbers(&compiled.actions, &compiled.snaps, fact_count)
+            .or(compiled.relaxed_gap);
         if compiled.is_symbolic {
             compiled.gap = Some("values that depend on when things happen");
         }

@@ -8,6 +8,7 @@ use crate::embedded::hash::Map;
 use crate::embedded::time::Ticks;
 
 use super::NONE;
+use super::directions::{self, Direction, Shifts};
 
 /// Something that happened to a fact or fluent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,15 +20,19 @@ pub(super) enum Access {
     NeededTrue(FactId),
     /// An action ended that needed the fact false throughout.
     NeededFalse(FactId),
-    Shifted(FluentId),
+    Raised(FluentId),
+    Lowered(FluentId),
     Assigned(FluentId),
     ReadValue(FluentId),
-    /// An action ended that needed something of the fluent throughout.
-    NeededValue(FluentId),
+    /// An action ended that needed the fluent not to fall too low throughout.
+    NeededHigh(FluentId),
+    /// An action ended that needed the fluent not to rise too high throughout.
+    NeededLow(FluentId),
 }
 
 use Access::{
-    Added, Assigned, Deleted, NeededFalse, NeededTrue, NeededValue, Read, ReadValue, Shifted,
+    Added, Assigned, Deleted, Lowered, NeededFalse, NeededHigh, NeededLow, NeededTrue, Raised,
+    Read, ReadValue,
 };
 
 /// The distances a happening must keep, and the accesses it makes.
@@ -40,15 +45,27 @@ pub(super) struct Wishes {
 
 /// Facts and fluents that over-all conditions read together, so that the order in which they
 /// change matters even where no rule of PDDL keeps the changes apart.
+///
+/// What can spoil such a condition comes after what could have mended it before, so that whoever
+/// saw the condition true sees it true in time as well.
 #[derive(Debug, Default)]
 pub(super) struct Links {
-    facts: Map<FactId, Vec<Access>>,
-    fluents: Map<FluentId, Vec<Access>>,
+    /// For each access, those that it must not overtake.
+    overtaken: Map<Access, Vec<Access>>,
+    /// Whether the direction of a change tells whether it can spoil a condition. Where numbers
+    /// depend on times, each change must stay in its place.
+    has_directions: bool,
 }
 
 impl Wishes {
-    /// The distances and accesses of a happening that reads and writes this.
-    pub(super) fn of(footprint: &Footprint, epsilon: Ticks, links: &Links) -> Self {
+    /// The distances and accesses of a happening that reads and writes this, and shifts fluents
+    /// in these directions.
+    pub(super) fn of(
+        footprint: &Footprint,
+        shifts: &Shifts,
+        epsilon: Ticks,
+        links: &Links,
+    ) -> Self {
         let mut wishes = Self::default();
         for &fact in &footprint.reads {
             wishes.after([Added(fact), Deleted(fact)], epsilon);
@@ -65,30 +82,31 @@ impl Wishes {
             wishes.makes.push(Deleted(fact));
         }
         for &fluent in &footprint.reads_fluents {
-            wishes.after([Shifted(fluent), Assigned(fluent)], epsilon);
+            wishes.after([Raised(fluent), Lowered(fluent), Assigned(fluent)], epsilon);
             wishes.makes.push(ReadValue(fluent));
         }
         for &fluent in &footprint.shifts {
             wishes.after([Assigned(fluent), ReadValue(fluent)], epsilon);
-            wishes.after([NeededValue(fluent)], 0);
-            wishes.makes.push(Shifted(fluent));
-        }
-        for &fluent in &footprint.assigns {
-            wishes.after(
-                [Assigned(fluent), Shifted(fluent), ReadValue(fluent)],
-                epsilon,
-            );
-            wishes.after([NeededValue(fluent)], 0);
-            wishes.makes.push(Assigned(fluent));
-        }
-        for fact in footprint.adds.iter().chain(&footprint.deletes) {
-            if let Some(linked) = links.facts.get(fact) {
-                wishes.after(linked.iter().copied(), 0);
+            let direction = links.direction(shifts.of_fluent(fluent));
+            if direction.up {
+                wishes.after([NeededLow(fluent)], 0);
+                wishes.makes.push(Raised(fluent));
+            }
+            if direction.down {
+                wishes.after([NeededHigh(fluent)], 0);
+                wishes.makes.push(Lowered(fluent));
             }
         }
-        for fluent in footprint.shifts.iter().chain(&footprint.assigns) {
-            if let Some(linked) = links.fluents.get(fluent) {
-                wishes.after(linked.iter().copied(), 0);
+        for &fluent in &footprint.assigns {
+            let changes = [Assigned(fluent), Raised(fluent), Lowered(fluent)];
+            wishes.after(changes, epsilon);
+            wishes.after([ReadValue(fluent)], epsilon);
+            wishes.after([NeededHigh(fluent), NeededLow(fluent)], 0);
+            wishes.makes.push(Assigned(fluent));
+        }
+        for made in wishes.makes.clone() {
+            if let Some(overtaken) = links.overtaken.get(&made) {
+                wishes.after(overtaken.iter().copied(), 0);
             }
         }
         wishes
@@ -101,17 +119,26 @@ impl Wishes {
 
     /// Adds what the start of an action needs for its over-all condition: what it reads was
     /// brought about by then.
-    pub(super) fn need_from_now_on(&mut self, footprint: &Footprint) {
-        for &fact in &footprint.reads {
-            self.after([Added(fact), Deleted(fact)], 0);
-        }
-        for &fluent in &footprint.reads_fluents {
-            self.after([Shifted(fluent), Assigned(fluent)], 0);
+    pub(super) fn need_from_now_on(&mut self, task: &Task, condition: &Condition, links: &Links) {
+        for conjunct in condition.conjuncts() {
+            for fact in Footprint::of_condition(task, conjunct).reads {
+                self.after([Added(fact), Deleted(fact)], 0);
+            }
+            for (fluent, wanted) in directions::wanted(conjunct) {
+                self.after([Assigned(fluent)], 0);
+                let wanted = links.direction(wanted);
+                if wanted.up {
+                    self.after([Raised(fluent)], 0);
+                }
+                if wanted.down {
+                    self.after([Lowered(fluent)], 0);
+                }
+            }
         }
     }
 
     /// Adds what the end of an action tells those who come later about its over-all condition.
-    pub(super) fn needed_until_now(&mut self, task: &Task, condition: &Condition) {
+    pub(super) fn needed_until_now(&mut self, task: &Task, condition: &Condition, links: &Links) {
         for conjunct in condition.conjuncts() {
             match conjunct {
                 Condition::Fact(fact) if !task.is_derived(*fact) => {
@@ -122,12 +149,17 @@ impl Wishes {
                     part.visit_facts(&mut |fact| self.makes.push(NeededFalse(fact)));
                 }
                 other => {
-                    let footprint = Footprint::of_condition(task, other);
-                    for fact in footprint.reads {
+                    for fact in Footprint::of_condition(task, other).reads {
                         self.makes.extend([NeededTrue(fact), NeededFalse(fact)]);
                     }
-                    for fluent in footprint.reads_fluents {
-                        self.makes.push(NeededValue(fluent));
+                    for (fluent, wanted) in directions::wanted(other) {
+                        let wanted = links.direction(wanted);
+                        if wanted.up {
+                            self.makes.push(NeededHigh(fluent));
+                        }
+                        if wanted.down {
+                            self.makes.push(NeededLow(fluent));
+                        }
                     }
                 }
             }
@@ -136,6 +168,22 @@ impl Wishes {
 }
 
 impl Links {
+    /// No conditions so far.
+    pub(super) fn new(has_directions: bool) -> Self {
+        Self {
+            overtaken: Map::default(),
+            has_directions,
+        }
+    }
+
+    fn direction(&self, direction: Direction) -> Direction {
+        if self.has_directions {
+            direction
+        } else {
+            Direction::BOTH
+        }
+    }
+
     /// Notes an over-all condition.
     pub(super) fn note(&mut self, task: &Task, condition: &Condition) {
         for conjunct in condition.conjuncts() {
@@ -149,32 +197,32 @@ impl Links {
             if is_literal {
                 continue;
             }
-            let footprint = Footprint::of_condition(task, conjunct);
-            let accesses: Vec<Access> = footprint
-                .reads
-                .iter()
-                .flat_map(|&fact| [Added(fact), Deleted(fact)])
-                .chain(
-                    footprint
-                        .reads_fluents
-                        .iter()
-                        .flat_map(|&fluent| [Shifted(fluent), Assigned(fluent)]),
-                )
-                .collect();
-            for &fact in &footprint.reads {
-                merge(self.facts.entry(fact).or_default(), &accesses);
+            let (mut mending, mut spoiling) = (Vec::new(), Vec::new());
+            for fact in Footprint::of_condition(task, conjunct).reads {
+                mending.extend([Added(fact), Deleted(fact)]);
+                spoiling.extend([Added(fact), Deleted(fact)]);
             }
-            for &fluent in &footprint.reads_fluents {
-                merge(self.fluents.entry(fluent).or_default(), &accesses);
+            for (fluent, wanted) in directions::wanted(conjunct) {
+                mending.push(Assigned(fluent));
+                spoiling.push(Assigned(fluent));
+                let wanted = self.direction(wanted);
+                if wanted.up {
+                    mending.push(Raised(fluent));
+                    spoiling.push(Lowered(fluent));
+                }
+                if wanted.down {
+                    mending.push(Lowered(fluent));
+                    spoiling.push(Raised(fluent));
+                }
             }
-        }
-    }
-}
-
-fn merge(list: &mut Vec<Access>, new: &[Access]) {
-    for access in new {
-        if !list.contains(access) {
-            list.push(*access);
+            for access in spoiling {
+                let overtaken = self.overtaken.entry(access).or_default();
+                for &mended in &mending {
+                    if !overtaken.contains(&mended) {
+                        overtaken.push(mended);
+                    }
+                }
+            }
         }
     }
 }

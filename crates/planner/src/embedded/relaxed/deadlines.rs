@@ -160,7 +160,7 @@ impl Deadlines {
 
 /// The earliest time, not before `begin`, at which the operator can begin as far as the literals
 /// that change at fixed times go.
-fn in_windows(graph: &Graph, operator: &Operator, mut begin: Ticks) -> Ticks {
+pub(crate) fn in_windows(graph: &Graph, operator: &Operator, mut begin: Ticks) -> Ticks {
     let windows = &graph.windows[operator.windows.clone()];
     loop {
         let before = begin;

@@ -69,6 +69,8 @@ pub(crate) struct Graph {
     pub(crate) goal: Vec<u32>,
     /// For each action its end's operator.
     pub(crate) end_of: Vec<u32>,
+    /// For each action the operator of its start, or of the whole.
+    start_of: Vec<u32>,
     /// Tests that the relaxation takes for granted: they read `?duration`.
     pub(crate) is_free_test: Vec<bool>,
     needing_ends: Vec<u32>,
@@ -102,6 +104,7 @@ impl Graph {
         let mut graph = Self {
             proposition_count: first_running as usize + compiled.actions.len(),
             end_of: vec![NONE; compiled.actions.len()],
+            start_of: vec![NONE; compiled.actions.len()],
             is_free_test,
             first_test,
             first_running,
@@ -127,6 +130,22 @@ impl Graph {
     /// The proposition that an instance of the action is under way.
     pub(crate) fn running(&self, action: u32) -> u32 {
         self.first_running + action
+    }
+
+    /// Whether the literal changes at fixed times only.
+    pub(crate) fn has_timetable(&self, literal: Literal) -> bool {
+        self.timetable_of[literal.index()] != NONE
+    }
+
+    /// The operators of an action's start and end; [`NONE`] if there is none.
+    pub(crate) fn operators_of(&self, action: u32) -> (u32, u32) {
+        let end = self.end_of[action as usize];
+        (self.start_of[action as usize], end)
+    }
+
+    /// Takes the literal of a timetable to be true at all times; returns when it was.
+    pub(crate) fn forget_timetable(&mut self, number: usize) -> Vec<(Ticks, Ticks)> {
+        std::mem::replace(&mut self.timetable[number], vec![(-NEVER, NEVER)])
     }
 
     /// The literal of a timetable.
@@ -208,7 +227,7 @@ impl Graph {
         if action.end == NONE {
             let snap = compiled.snap(action.start);
             let needs = self.propositions(&snap.condition);
-            self.add_snaps(
+            self.start_of[number as usize] = self.add_snaps(
                 compiled,
                 &Draft {
                     kind: Kind::Start(number),
@@ -246,7 +265,7 @@ impl Graph {
             } else {
                 (vec![start], Kind::Start(number))
             };
-            self.add_snaps(
+            self.start_of[number as usize] = self.add_snaps(
                 compiled,
                 &Draft {
                     kind,

@@ -1,0 +1,498 @@
+//! When things can be true together at the earliest: a bound that proves that it is too late.
+//!
+//! `h²` of temporal planning (Haslum & Geffner, "Heuristic planning with time and resources", ECP
+//! 2001; the table is that of TGP, Smith & Weld, IJCAI 1999), over starts and ends: for each pair
+//! of atoms a time before which no sequence of choices has both. A robot that must carry something
+//! from here to there has not got it there before it has driven, which no bound on single facts
+//! sees.
+//!
+//! The time of a pair is that of the later of the two happenings that brought the atoms about. A
+//! sequence of choices need not be in the order of time (see [`State`](super::state::State)), so a
+//! duration counts from when two atoms held together only if whatever brought them about must come
+//! before the start: if they interfere.
+
+mod model;
+#[cfg(test)]
+mod tests;
+
+use super::compile::{Compiled, NONE};
+use super::formula::Literal;
+use super::network::SETTLED;
+use super::relaxed::{Graph, Missing, in_windows, last_end};
+use super::state::{Open, State};
+use super::time::{NEVER, Ticks};
+use model::{Kind, Model};
+
+/// How many actions under way are told to end before what they do not allow.
+const MOST_ENDED: usize = 16;
+
+/// Bounds of one problem; keeps its tables from one state to the next.
+#[derive(Debug)]
+pub(crate) struct Pairs<'a> {
+    compiled: &'a Compiled,
+    graph: Graph,
+    model: Model,
+    /// Nothing may happen later.
+    pub(crate) horizon: Ticks,
+    /// The atoms of the model, and then one for each action under way in the state: that it has
+    /// ended.
+    count: usize,
+    /// For each pair the earliest time, by row.
+    time: Vec<Ticks>,
+    /// When an atom of the state was brought about; [`NEVER`] if it does not hold.
+    since: Vec<Ticks>,
+    /// For each action and atom, when both are: the action under way since a start that came later
+    /// in the order of choices than the atom, or together with it.
+    started: Vec<Ticks>,
+    /// The same for what was brought about after the start.
+    meanwhile: Vec<Ticks>,
+    /// What each operator needs in this state.
+    needs: Vec<Vec<usize>>,
+    /// The earliest time of each operator.
+    begin: Vec<Ticks>,
+    /// In which round a row, or what is known of an action, was last lowered.
+    row_round: Vec<u32>,
+    action_round: Vec<u32>,
+    operator_round: Vec<u32>,
+    round: u32,
+}
+
+impl<'a> Pairs<'a> {
+    /// `None` if the problem is too large.
+    pub(crate) fn of(compiled: &'a Compiled) -> Option<Self> {
+        let graph = Graph::of(compiled, None);
+        let model = Model::of(compiled, &graph)?;
+        let most = model.atom_count + MOST_ENDED;
+        let (actions, operators) = (compiled.actions.len(), model.operators.len());
+        Some(Self {
+            compiled,
+            horizon: NEVER,
+            count: model.atom_count,
+            time: vec![NEVER; most * most],
+            since: vec![NEVER; most],
+            started: vec![NEVER; actions * most],
+            meanwhile: vec![NEVER; actions * most],
+            needs: vec![Vec::new(); operators],
+            begin: vec![NEVER; operators],
+            row_round: vec![0; most],
+            action_round: vec![0; actions],
+            operator_round: vec![0; operators],
+            round: 0,
+            graph,
+            model,
+        })
+    }
+
+    /// How many timetables there are: literals that change at fixed times only.
+    pub(crate) fn timetable_count(&self) -> usize {
+        self.graph.timetable.len()
+    }
+
+    /// Takes the literal of a timetable to be true at all times, and returns when it is.
+    pub(crate) fn ignore_timetable(&mut self, number: usize) -> Vec<(Ticks, Ticks)> {
+        self.graph.forget_timetable(number)
+    }
+
+    /// Takes that back.
+    pub(crate) fn restore_timetable(&mut self, number: usize, spans: Vec<(Ticks, Ticks)>) {
+        self.graph.timetable[number] = spans;
+    }
+
+    /// The literal of a timetable, and when it last becomes false.
+    pub(crate) fn deadline(
+        &self,
+        number: usize,
+        spans: &[(Ticks, Ticks)],
+    ) -> Option<(Literal, Ticks)> {
+        let end = last_end(spans)?;
+        Some((self.graph.timetable_literal(number)?, end))
+    }
+
+    /// The parts of the goal that come too late by themselves, or, if there are none, those that
+    /// come too late together with another; after a question that was answered with yes.
+    pub(crate) fn missing_goals(&self) -> Vec<Missing> {
+        let goal = &self.model.goal;
+        let is_late = |one: usize, other: usize| self.time[one * self.count + other] >= NEVER;
+        let alone: Vec<usize> = goal
+            .iter()
+            .copied()
+            .filter(|&atom| is_late(atom, atom))
+            .collect();
+        let late = if alone.is_empty() {
+            let with_another = |&atom: &usize| {
+                (0..self.count).any(|other| {
+                    let counts = goal.contains(&other) || other >= self.model.atom_count;
+                    counts && is_late(atom, other)
+                })
+            };
+            goal.iter().copied().filter(with_another).collect()
+        } else {
+            alone
+        };
+        let literals = late.iter().map(|&atom| self.model.literals[atom]);
+        literals.map(Missing::Literal).collect()
+    }
+
+    /// Whether no plan can begin like this: the goal, with all that is under way over, comes too
+    /// late, or never.
+    pub(crate) fn is_hopeless(&mut self, state: &State) -> bool {
+        let ended = self.prepare(state);
+        loop {
+            self.round += 1;
+            let before = self.round;
+            let mut changed = false;
+            for number in 0..self.model.operators.len() {
+                if self.is_due(number) {
+                    self.operator_round[number] = before;
+                    changed |= self.fire(state, &ended, number);
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        let runs_for_ever = |open: &Open| {
+            let end = self.model.end_of[open.action as usize];
+            self.begin[end as usize] >= NEVER
+        };
+        if state.open.iter().any(runs_for_ever) {
+            return true;
+        }
+        let mut goal = self.model.goal.clone();
+        goal.extend(ended.iter().map(|&(_, atom)| atom));
+        let is_late = |one: usize, other: usize| {
+            self.time[one * self.count + other] > self.latest(one).max(self.latest(other))
+        };
+        let mut pairs = goal
+            .iter()
+            .flat_map(|&one| goal.iter().map(move |&other| (one, other)));
+        pairs.any(|(one, other)| is_late(one, other))
+    }
+
+    /// Puts the state into the tables. Returns the actions under way with the atoms that they have
+    /// ended.
+    fn prepare(&mut self, state: &State) -> Vec<(u32, usize)> {
+        let mut ended: Vec<(u32, usize)> = Vec::new();
+        for open in &state.open {
+            let has_twin = state
+                .open
+                .iter()
+                .filter(|other| other.action == open.action)
+                .count()
+                > 1;
+            if !has_twin && ended.len() < MOST_ENDED {
+                ended.push((open.action, self.model.atom_count + ended.len()));
+            }
+        }
+        self.count = self.model.atom_count + ended.len();
+        for (needs, operator) in self.needs.iter_mut().zip(&self.model.operators) {
+            needs.clone_from(&operator.needs);
+        }
+        for &(action, atom) in &ended {
+            for &breaker in &self.model.breakers[action as usize] {
+                self.needs[breaker as usize].push(atom);
+            }
+        }
+        let count = self.count;
+        self.time[..count * count].fill(NEVER);
+        self.since.fill(NEVER);
+        self.started.fill(NEVER);
+        self.meanwhile.fill(NEVER);
+        self.begin.fill(NEVER);
+        self.row_round.fill(0);
+        self.action_round.fill(0);
+        self.operator_round.fill(0);
+        self.round = 0;
+        let compiled = self.compiled;
+        for (atom, literal) in self.model.literals.iter().enumerate() {
+            if !literal.holds(&state.facts) {
+                continue;
+            }
+            let stamp =
+                compiled.fact_stamps[literal.fact() as usize][usize::from(!literal.truth())];
+            let mut time = compiled.now;
+            if stamp != NONE {
+                time = time.max(state.stamps[stamp as usize]);
+                for &(marked, node) in &state.network.marks {
+                    if marked == stamp {
+                        time = time.max(state.network.earliest(node));
+                    }
+                }
+            }
+            self.since[atom] = time;
+        }
+        for open in &state.open {
+            let atom = self.model.running[open.action as usize];
+            let start = start_of(state, open).max(compiled.now);
+            self.since[atom] = self.since[atom].min(start);
+        }
+        for one in 0..count {
+            for other in 0..count {
+                let time = self.since[one].max(self.since[other]);
+                self.time[one * count + other] = time;
+            }
+        }
+        ended
+    }
+
+    /// Whether something has changed of what an operator reads.
+    fn is_due(&self, number: usize) -> bool {
+        let last = self.operator_round[number];
+        let needs = &self.needs[number];
+        let keeps = &self.model.operators[number].keeps;
+        let action_changed = match self.model.operators[number].kind {
+            Kind::End(action) => self.action_round[action as usize] >= last,
+            _ => false,
+        };
+        last == 0
+            || needs.is_empty()
+            || action_changed
+            || needs
+                .iter()
+                .chain(keeps)
+                .any(|&need| self.row_round[need] >= last)
+    }
+
+    /// The earliest time at which all of these can hold.
+    fn together(&self, atoms: &[usize]) -> Ticks {
+        let mut time = self.compiled.now;
+        for (place, &one) in atoms.iter().enumerate() {
+            let row = &self.time[one * self.count..(one + 1) * self.count];
+            for &other in &atoms[place..] {
+                time = time.max(row[other]);
+            }
+        }
+        time
+    }
+
+    /// What the operator brings about, together with all that may last. Whether anything changed.
+    fn fire(&mut self, state: &State, ended: &[(u32, usize)], number: usize) -> bool {
+        let Some(begin) = self.earliest(state, number) else {
+            return false;
+        };
+        self.begin[number] = begin;
+        let kind = self.model.operators[number].kind;
+        let mut adds = self.model.operators[number].adds.clone();
+        if let Kind::End(action) = kind {
+            adds.extend(ended.iter().filter(|entry| entry.0 == action).map(|e| e.1));
+        }
+        let mut changed = false;
+        for (place, &one) in adds.iter().enumerate() {
+            for &other in &adds[place..] {
+                changed |= self.lower(one, other, begin);
+            }
+            if let Kind::Start(action) = kind
+                && one != self.model.running[action as usize]
+            {
+                changed |= self.note_started(action, one, begin);
+            }
+        }
+        for atom in 0..self.count {
+            let Some(time) = self.with(state, number, atom, begin) else {
+                continue;
+            };
+            for &one in &adds {
+                changed |= self.lower(one, atom, time);
+            }
+            if let Kind::Start(action) = kind {
+                changed |= self.note_started(action, atom, time);
+            }
+            let is_running = atom >= self.model.literals.len() && atom < self.model.atom_count;
+            if is_running {
+                let action = self.model.action_of(atom);
+                for &one in &adds {
+                    changed |= self.note_meanwhile(action, one, time);
+                }
+            }
+        }
+        changed
+    }
+
+    /// The earliest time of an operator; `None` if it cannot happen.
+    fn earliest(&self, state: &State, number: usize) -> Option<Ticks> {
+        let operator = &self.model.operators[number];
+        let mut begin = self.together(&self.needs[number]);
+        if !self.allows(number, &operator.keeps) {
+            return None;
+        }
+        match operator.kind {
+            Kind::Timed(timed) => {
+                // What it would break must have ended by then.
+                let time = self.compiled.timed[timed as usize].time;
+                return (timed >= state.timed && begin <= time).then_some(time);
+            }
+            Kind::Start(action) => {
+                begin = self.in_windows(operator.relaxed, begin);
+                if begin > self.horizon - self.model.least[action as usize] {
+                    return None;
+                }
+            }
+            Kind::End(action) => {
+                begin = begin.max(self.earliest_end(state, action));
+                begin = self.in_windows(operator.relaxed, begin);
+                if begin > self.horizon {
+                    return None;
+                }
+                let is_late = |open: &Open| {
+                    open.action != action || open.most < NEVER && begin > open.start + open.most
+                };
+                if self.compiled.action(action).start == NONE && state.open.iter().all(is_late) {
+                    return None;
+                }
+            }
+        }
+        (begin < NEVER).then_some(begin)
+    }
+
+    /// Whether what an operator keeps can hold together with these, and what it needs.
+    fn allows(&self, number: usize, atoms: &[usize]) -> bool {
+        let keeps = &self.model.operators[number].keeps;
+        keeps.iter().all(|&kept| {
+            let row = &self.time[kept * self.count..(kept + 1) * self.count];
+            atoms
+                .iter()
+                .chain(&self.needs[number])
+                .all(|&other| row[other] < NEVER)
+        })
+    }
+
+    fn in_windows(&self, relaxed: u32, begin: Ticks) -> Ticks {
+        if begin >= NEVER {
+            return NEVER;
+        }
+        in_windows(&self.graph, &self.graph.operators[relaxed as usize], begin)
+    }
+
+    /// The earliest time at which some instance of the action can end, as far as durations go.
+    fn earliest_end(&self, state: &State, action: u32) -> Ticks {
+        let start = self.model.start_of[action as usize];
+        let mut end = NEVER;
+        if start != NONE && self.begin[start as usize] < NEVER {
+            end = self.begin[start as usize] + self.model.least[action as usize];
+        }
+        for open in state.open.iter().filter(|open| open.action == action) {
+            end = end.min(start_of(state, open) + open.least);
+        }
+        end
+    }
+
+    /// The earliest time at which an operator has happened and an atom holds that held before;
+    /// `None` if that cannot be.
+    fn with(&self, state: &State, number: usize, atom: usize, begin: Ticks) -> Option<Ticks> {
+        let operator = &self.model.operators[number];
+        if operator.ends.get(atom).copied().unwrap_or(false) {
+            return None;
+        }
+        let row = &self.time[atom * self.count..(atom + 1) * self.count];
+        let mut time = begin.max(row[atom]);
+        for &need in &self.needs[number] {
+            time = time.max(row[need]);
+        }
+        if time >= NEVER || !operator.keeps.iter().all(|&kept| row[kept] < NEVER) {
+            return None;
+        }
+        match operator.kind {
+            Kind::Start(_) => {
+                if self.is_before(number, atom) {
+                    time = self.in_windows(operator.relaxed, time);
+                }
+            }
+            Kind::End(action) => time = time.max(self.end_with(state, action, atom)),
+            Kind::Timed(_) => return Some(time),
+        }
+        (time <= self.latest(atom)).then_some(time)
+    }
+
+    /// The latest time that counts for an atom. Timed initials need not come before the end of the
+    /// plan.
+    fn latest(&self, atom: usize) -> Ticks {
+        let is_timed = self.model.is_timed.get(atom).copied().unwrap_or(false);
+        if is_timed {
+            NEVER - 1
+        } else {
+            self.horizon.min(NEVER - 1)
+        }
+    }
+
+    /// Whether an atom that was brought about before an operator, in the order of choices, was
+    /// so in time too.
+    fn is_before(&self, number: usize, atom: usize) -> bool {
+        let since = self.since[atom];
+        let comes_after = &self.model.operators[number].comes_after;
+        (since >= NEVER || since <= self.begin[number])
+            && comes_after.get(atom).copied().unwrap_or(false)
+    }
+
+    /// The earliest time of the end of an action and of an atom that holds when it ends: the atom
+    /// has held since before the start, or was brought about meanwhile.
+    fn end_with(&self, state: &State, action: u32, atom: usize) -> Ticks {
+        let most = self.model.atom_count + MOST_ENDED;
+        let place = action as usize * most + atom;
+        let mut best = NEVER;
+        if self.started[place] < NEVER {
+            let start = self.model.start_of[action as usize] as usize;
+            let least = self.model.least[action as usize];
+            best = if self.is_before(start, atom) {
+                self.started[place] + least
+            } else {
+                self.started[place].max(self.begin[start] + least)
+            };
+        }
+        let under_way = || state.open.iter().filter(|open| open.action == action);
+        // If the atom is that the action is under way, another instance must be.
+        let is_other = atom != self.model.running[action as usize] || under_way().count() > 1;
+        if self.since[atom] < NEVER && is_other {
+            for open in under_way() {
+                best = best.min(self.since[atom].max(start_of(state, open) + open.least));
+            }
+        }
+        if self.meanwhile[place] < NEVER {
+            best = best.min(self.meanwhile[place].max(self.earliest_end(state, action)));
+        }
+        best
+    }
+
+    fn lower(&mut self, one: usize, other: usize, time: Ticks) -> bool {
+        let atoms = self.model.atom_count;
+        if one < atoms && other < atoms && self.model.excludes[one * atoms + other] {
+            return false;
+        }
+        if time >= self.time[one * self.count + other] {
+            return false;
+        }
+        self.time[one * self.count + other] = time;
+        self.time[other * self.count + one] = time;
+        self.row_round[one] = self.round;
+        self.row_round[other] = self.round;
+        true
+    }
+
+    fn note_started(&mut self, action: u32, atom: usize, time: Ticks) -> bool {
+        let place = action as usize * (self.model.atom_count + MOST_ENDED) + atom;
+        let is_lower = time < self.started[place];
+        if is_lower {
+            self.started[place] = time;
+            self.action_round[action as usize] = self.round;
+        }
+        is_lower
+    }
+
+    fn note_meanwhile(&mut self, action: u32, atom: usize, time: Ticks) -> bool {
+        let place = action as usize * (self.model.atom_count + MOST_ENDED) + atom;
+        let is_lower = time < self.meanwhile[place];
+        if is_lower {
+            self.meanwhile[place] = time;
+            self.action_round[action as usize] = self.round;
+        }
+        is_lower
+    }
+}
+
+/// When an action under way has started, at the earliest.
+fn start_of(state: &State, open: &Open) -> Ticks {
+    if open.node == SETTLED {
+        open.start
+    } else {
+        state.network.earliest(open.node)
+    }
+}

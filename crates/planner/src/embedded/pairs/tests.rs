@@ -1,0 +1,196 @@
+//! No state that a plan goes through is hopeless, not even if the plan must end as early as it can.
+
+use std::fmt::Write;
+
+use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::{Situation, Task};
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_problem};
+use proptest::prelude::*;
+
+use super::Pairs;
+use crate::embedded::apply::{Step, Stepper};
+use crate::embedded::compile::{Compiled, compile};
+use crate::embedded::state::State;
+use crate::embedded::time::{NEVER, Ticks};
+
+/// How many choices the slow search makes at most.
+const MOST: usize = 6;
+
+/// Conditions at start, over all and at end, effects at start and at end: a fact and its truth.
+#[derive(Clone, Debug)]
+struct DraftAction {
+    duration: u8,
+    needs: Vec<(u8, bool)>,
+    lasting: Option<(u8, bool)>,
+    at_end: Option<(u8, bool)>,
+    start: Vec<(u8, bool)>,
+    end: Vec<(u8, bool)>,
+    is_conditional: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Draft {
+    actions: Vec<DraftAction>,
+    initial: u8,
+    goal: Vec<(u8, bool)>,
+    timed: Vec<(u8, u8, bool)>,
+}
+
+fn drafts() -> impl Strategy<Value = Draft> {
+    let literal = || (0..5_u8, prop::bool::weighted(0.7));
+    let few = |most| prop::collection::vec(literal(), 0..most);
+    let action = (
+        1..4_u8,
+        few(3),
+        prop::option::of(literal()),
+        prop::option::weighted(0.2, literal()),
+        few(3),
+        few(3),
+        prop::bool::weighted(0.1),
+    );
+    let action = action.prop_map(
+        |(duration, needs, lasting, at_end, start, end, is_conditional)| DraftAction {
+            duration,
+            needs,
+            lasting,
+            at_end,
+            start,
+            end,
+            is_conditional,
+        },
+    );
+    (
+        prop::collection::vec(action, 2..5),
+        0..32_u8,
+        prop::collection::vec(literal(), 1..4),
+        prop::collection::vec((1..6_u8, 0..5_u8, any::<bool>()), 0..3),
+    )
+        .prop_map(|(actions, initial, goal, timed)| Draft {
+            actions,
+            initial,
+            goal,
+            timed,
+        })
+}
+
+fn written(literals: &[(u8, bool)], when: &str) -> String {
+    let mut text = String::new();
+    let mut seen = Vec::new();
+    for &(fact, truth) in literals {
+        if seen.contains(&fact) {
+            continue;
+        }
+        seen.push(fact);
+        let literal = if truth {
+            format!("(f{fact})")
+        } else {
+            format!("(not (f{fact}))")
+        };
+        write!(text, " ({when} {literal})").expect("strings take all");
+    }
+    text
+}
+
+impl Draft {
+    fn task(&self) -> Task {
+        let mut domain = "(define (domain d) (:requirements :durative-actions :adl
+            :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3) (f4))"
+            .to_owned();
+        for (number, action) in self.actions.iter().enumerate() {
+            let mut needs = written(&action.needs, "at start");
+            needs += &written(action.lasting.as_slice(), "over all");
+            needs += &written(action.at_end.as_slice(), "at end");
+            let mut effects = written(&action.start, "at start");
+            let end = written(&action.end, "at end");
+            if action.is_conditional && !end.is_empty() {
+                write!(effects, "(when (at end (f0)) (and {end}))").expect("strings take all");
+            } else {
+                effects += &end;
+            }
+            write!(
+                domain,
+                "(:durative-action a{number} :parameters () :duration (= ?duration {})
+                  :condition (and{needs}) :effect (and{effects}))",
+                action.duration
+            )
+            .expect("strings take all");
+        }
+        let mut problem = "(define (problem p) (:domain d) (:init".to_owned();
+        for fact in (0..5).filter(|fact| self.initial >> fact & 1 == 1) {
+            write!(problem, " (f{fact})").expect("strings take all");
+        }
+        for &(time, fact, truth) in &self.timed {
+            problem += &written(&[(fact, truth)], &format!("at {time}"));
+        }
+        let goal = written(&self.goal, "and");
+        write!(problem, ") (:goal (and {goal})))").expect("strings take all");
+        let sources = (
+            Source::new("domain.pddl", domain + ")"),
+            Source::new("problem.pddl", problem),
+        );
+        match read_problem(&sources.0, &sources.1) {
+            Ok((problem, _)) => Task::new(problem),
+            Err(diagnostics) => panic!("{}", diagnostics.render(false)),
+        }
+    }
+}
+
+/// The earliest end of all plans that go on from a state, by trying all choices; on the way back,
+/// no state on the way to a plan may be hopeless. Returns [`NEVER`] if there is no plan so short.
+fn earliest_end(
+    compiled: &Compiled,
+    pairs: &mut Pairs<'_>,
+    state: &State,
+    left: usize,
+    budget: &mut u32,
+) -> Ticks {
+    let mut best = NEVER;
+    let goal = |state: &State| compiled.goal.holds(&state.facts, &mut |_| true);
+    if state.open.is_empty() && goal(state) {
+        // A plan without happenings ends before it begins.
+        best = state.earliest_end().max(compiled.now);
+    }
+    *budget = budget.saturating_sub(1);
+    if left > 0 && *budget > 0 {
+        let actions = u32::try_from(compiled.actions.len()).expect("few");
+        let starts = (0..actions).map(Step::Start);
+        let starts = starts.filter(|_| state.open.len() < left);
+        let open = u32::try_from(state.open.len()).expect("few");
+        let steps = starts.chain((0..open).map(Step::End)).chain([Step::Timed]);
+        for step in steps {
+            let mut stepper = Stepper::new(compiled);
+            if let Some(next) = stepper.apply(state, step) {
+                let end = earliest_end(compiled, pairs, &next, left - 1, budget);
+                best = best.min(end);
+            }
+        }
+    }
+    if best < NEVER {
+        pairs.horizon = best;
+        assert!(
+            !pairs.is_hopeless(state),
+            "a plan that ends at {best}: {state:?}"
+        );
+    }
+    best
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_state_on_the_way_to_a_plan_is_hopeless(draft in drafts()) {
+        let mut task = draft.task();
+        let situation = Situation::initial(&task);
+        let limits = reachability::Settings::default();
+        let Answer::Complete(grounding) = reachability::ground(&mut task, &limits) else {
+            panic!("a small task");
+        };
+        let epsilon = Rational::new(1, 1000);
+        let compiled = compile(&mut task, &grounding, &situation, &epsilon).expect("plain");
+        let mut pairs = Pairs::of(&compiled).expect("small");
+        let mut budget = 3_000;
+        earliest_end(&compiled, &mut pairs, &compiled.initial, MOST, &mut budget);
+    }
+}
