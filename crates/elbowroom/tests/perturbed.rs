@@ -97,7 +97,7 @@ fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_t
 
 #[test]
 fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
-    let experiment = experiment("olisipo_af3.toml");
+    let experiment = experiment("olisipo_sf3.toml");
     let run = |part| perturbed::run(&experiment, part, &|| true).unwrap();
     let whole = run(part(21, 1));
     assert_eq!(whole, run(part(21, 3)));
@@ -114,6 +114,6 @@ fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
     assert!(PerturbedResults::merged(&twice).is_err());
     assert!(PerturbedResults::merged(&[parts[0].clone(), run(part(20, 1))]).is_err());
     for (name, plot) in perturbed::plots(&whole) {
-        assert!(plot.svg().unwrap().contains("AF3 p8"), "{name}");
+        assert!(plot.svg().unwrap().contains("SF3 p10"), "{name}");
     }
 }

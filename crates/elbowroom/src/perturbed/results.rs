@@ -176,7 +176,8 @@ impl Row {
             succeeded: Work::default(),
             failed: Work::default(),
             published,
-            optimum,
+            // So many digits are read back as they were written.
+            optimum: optimum.map(|optimum| (optimum * 1e12).round() / 1e12),
         }
     }
 
