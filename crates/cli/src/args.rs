@@ -288,7 +288,7 @@ pub(crate) struct CompareArgs {
     /// Make no trials, but put the results of parts together
     #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
     pub(crate) merge: Vec<PathBuf>,
-    /// Write results.json, table.md and table.csv there
+    /// Write results.json, table.md, table.csv and, where there are plots, these there
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Print the results as one JSON document

@@ -1,5 +1,6 @@
 //! Whole runs: executors, worlds, planner and envelopes together.
 
+mod adaptable;
 mod bad_worlds;
 mod campaigns;
 mod guarantee;

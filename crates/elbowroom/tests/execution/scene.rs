@@ -12,6 +12,7 @@ use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::planner::embedded;
+use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
 /// The executors that there are, one of each.
@@ -24,6 +25,7 @@ pub(crate) struct Scene {
     pub(crate) flow: flow::Settings,
     pub(crate) settings: RunSettings,
     pub(crate) states: u64,
+    pub(crate) likelihoods: Arc<Likelihoods>,
 }
 
 impl Scene {
@@ -60,6 +62,7 @@ impl Scene {
             },
             task: Arc::new(task.clone()),
             states: 400,
+            likelihoods: Arc::new(Likelihoods::certain()),
         };
         scene.plan = if let Some(text) = plan {
             let read = pddl::read_plan(&source(text), &mut task);
@@ -105,6 +108,14 @@ impl Scene {
         report
     }
 
+    /// The same, with these sections of a likelihood file.
+    pub(crate) fn with_likelihoods(mut self, sections: &str) -> Self {
+        let text = format!("format = \"elbowroom-likelihoods\"\nversion = 1\n{sections}");
+        let read = likelihoods::read(text.as_bytes(), &self.task);
+        self.likelihoods = Arc::new(read.expect("a correct test"));
+        self
+    }
+
     fn planner(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
@@ -132,10 +143,13 @@ impl Scene {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
-        let region = Box::new(WholeRegion {
-            epsilon: self.settings.epsilon.clone(),
+        let mut decider = spec.build(Means {
+            region: Box::new(WholeRegion {
+                epsilon: self.settings.epsilon.clone(),
+            }),
+            likelihoods: Arc::clone(&self.likelihoods),
+            odds: None,
         });
-        let mut decider = spec.build(region);
         run::run(
             Arc::clone(&self.task),
             Some(&self.plan),

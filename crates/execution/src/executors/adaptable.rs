@@ -60,6 +60,8 @@ struct Rest {
     dispatch: LayerDispatch,
     /// What was told to start and has not ended, and when it has started, on the plan's clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
+    /// Starts and ends that have been observed lately, on the plan's clock.
+    recent: Vec<(NodeId, Rational)>,
     /// How often each instance has failed in a row.
     failures: BTreeMap<InstanceId, i32>,
     /// The number of the next order.
@@ -70,7 +72,6 @@ impl Executor for Adaptable {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let settings = deorder::Settings {
             epsilon: mission.epsilon.clone(),
-            ..deorder::Settings::default()
         };
         let plan = partial_order(&mission.task, &mission.time_triggered, &settings);
         let task = Arc::clone(&mission.task);
@@ -96,6 +97,7 @@ impl Executor for Adaptable {
             steps,
             dispatch: LayerDispatch::new(search, Reconsider::WhenNoLayerFits),
             mission: mission.clone(),
+            recent: Vec::new(),
             failures: BTreeMap::new(),
         });
         Ok(())
@@ -135,15 +137,20 @@ impl Rest {
                 let local = time - &self.mission.origin;
                 let (instance, start) = self.under_way.get_mut(step)?;
                 let instance = *instance;
-                *start = Some(local);
+                *start = Some(local.clone());
+                self.recent.push((self.node(instance, false), local));
                 if self.steps[instance.index()].duration.is_none() {
                     self.under_way.remove(step);
                     self.failures.remove(&instance);
                 }
                 None
             }
-            News::Ended { step, ending, .. } => {
+            News::Ended {
+                step, ending, time, ..
+            } => {
                 let (instance, _) = self.under_way.remove(step)?;
+                let local = time - &self.mission.origin;
+                self.recent.push((self.node(instance, true), local));
                 if *ending == Ending::Succeeded {
                     self.failures.remove(&instance);
                     return None;
@@ -181,6 +188,35 @@ impl Rest {
         Some(Reason::new(Cause::Failed).of(&action.name).about(about))
     }
 
+    /// An instance's start or end.
+    fn node(&self, instance: InstanceId, is_end: bool) -> NodeId {
+        let model = self.dispatch.search().model();
+        if is_end {
+            model.end(instance)
+        } else {
+            model.start(instance)
+        }
+    }
+
+    /// What has happened so lately that what interferes with it has to wait.
+    fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
+        let epsilon = &self.mission.epsilon;
+        self.recent.retain(|(_, time)| time + epsilon > *now);
+        let model = self.dispatch.search().model();
+        let nodes = model.plan().nodes.iter().enumerate();
+        let timed = nodes.filter_map(|(at, node)| match node {
+            Node::Timed(index) => {
+                Some((NodeId::from(at), model.task().timed()[*index].time.clone()))
+            }
+            _ => None,
+        });
+        let is_recent = |(_, time): &(NodeId, Rational)| time <= now && time + epsilon > *now;
+        let mut lately: Vec<_> = timed.filter(is_recent).collect();
+        lately.extend(self.recent.iter().cloned());
+        lately.sort_by(|a, b| a.1.cmp(&b.1));
+        lately
+    }
+
     /// What to do now.
     fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if self.under_way.values().any(|(_, start)| start.is_none()) {
@@ -198,6 +234,7 @@ impl Rest {
             .collect();
         running.sort_by(|a, b| (&a.start, a.instance).cmp(&(&b.start, b.instance)));
         circumstances.running = running;
+        circumstances.recent = self.lately(&now);
         let length = self.dispatch.search().model().plan().nodes.len();
         let mut most = |progress: &Progress| {
             if progress.sequences * length > MOST_HAPPENINGS {
