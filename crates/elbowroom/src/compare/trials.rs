@@ -308,7 +308,7 @@ fn another<'a>(
         problem,
         settings: external::Settings {
             epsilon: epsilon.clone(),
-            time_limit: Some(seconds.unwrap_or(Duration::from_mins(1))),
+            time_limit: Some(seconds.unwrap_or(Duration::from_secs(60))),
             ..external::Settings::default()
         },
         takes_first: seconds.is_none(),
