@@ -3,6 +3,7 @@
 
 mod shared;
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use elbowroom::compare::Experiment;
@@ -40,7 +41,7 @@ struct Script {
 impl Script {
     fn then(mut self, action: &str, duration: i64) -> Self {
         let start = &self.end + number("0.001");
-        self.text += &format!("{}: {action} [{duration}]\n", start.to_decimal(3));
+        let _ = writeln!(self.text, "{}: {action} [{duration}]", start.to_decimal(3));
         self.end = start + Rational::from(duration);
         self
     }
@@ -52,8 +53,8 @@ impl Script {
             let number = i64::try_from(index).expect("few steps") + 1;
             let start = &begun + Rational::new(number, 1000);
             let start_text = start.to_decimal(3);
-            self.text +=
-                &format!("{start_text}: (produce_base_{number} r0 bs0 {order}) [{duration}]\n");
+            let action = format!("(produce_base_{number} r0 bs0 {order})");
+            let _ = writeln!(self.text, "{start_text}: {action} [{duration}]");
             end = end.max(start + Rational::from(duration));
         }
         self.end = end;
@@ -66,7 +67,7 @@ impl Script {
             .base(order, steps)
     }
 
-    fn from_the_base(self, order: &str, window: &str, rings: i64) -> Self {
+    fn after_the_base(self, order: &str, window: &str, rings: i64) -> Self {
         self.then("(goto_waypoint r0 bs0 rs0)", 20)
             .then(&format!("(stack_ring r0 rs0 {order})"), rings)
             .then(&format!("(goto_waypoint r0 rs0 {window})"), 20)
@@ -87,8 +88,8 @@ impl Script {
 /// Plans that exercise every action, condition and deadline. `ring` is how long a ring takes.
 fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
     let new = Script::default;
-    let simple = |script: Script| script.from_the_base("o0", "ow0", ring);
-    let fancy = |script: Script| script.from_the_base("o1", "ow1", 3 * ring);
+    let simple = |script: Script| script.after_the_base("o0", "ow0", ring);
+    let fancy = |script: Script| script.after_the_base("o1", "ow1", 3 * ring);
     let half: Vec<i64> = steps[..steps.len() / 2].to_vec();
     let mut scripts = vec![
         simple(new().until_the_base("o0", steps)),
@@ -105,10 +106,10 @@ fn scripts(steps: &[i64], ring: i64) -> Vec<Script> {
         // Another order's window, and another order's rings.
         new()
             .until_the_base("o0", steps)
-            .from_the_base("o0", "ow1", ring),
+            .after_the_base("o0", "ow1", ring),
         new()
             .until_the_base("o0", steps)
-            .from_the_base("o0", "ow0", 3 * ring),
+            .after_the_base("o0", "ow0", 3 * ring),
         // A second order while the first is held.
         new()
             .until_the_base("o0", steps)
@@ -255,7 +256,7 @@ fn an_order_that_was_thrown_away_can_be_made_again_only_in_our_table_2() {
             .until_the_base("o1", &steps[..1])
             .thrown_away("o1")
             .until_the_base("o1", steps)
-            .from_the_base("o1", "ow1", 360)
+            .after_the_base("o1", "ow1", 360)
     };
     let domain = folder.join("domain_rcll_simple_resource_2_param.pddl");
     let theirs = their_problems(&folder.join("problems"));

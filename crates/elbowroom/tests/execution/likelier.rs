@@ -41,6 +41,7 @@ fn an_order_that_will_hardly_be_in_time_is_dropped_for_one_that_will() {
         let why = report.reasons.first().expect("the first plan is given up");
         assert_eq!(why.cause, Cause::Likelier, "{report:#?}");
     }
+    println!("{prudent} against {patient} of {count}");
     // Without looking at the odds, an order is dropped when it is late, and then it is too late for
     // the other one.
     assert!(

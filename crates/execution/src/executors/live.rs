@@ -135,7 +135,7 @@ impl Rest {
         }
         let compared = odds.compare(&Remainder {
             mission: &self.mission,
-            happened: happened.map(|time| time.cloned()).collect(),
+            happened: happened.map(Option::<&Rational>::cloned).collect(),
             now: moment.now,
             belief: moment.belief,
         })?;

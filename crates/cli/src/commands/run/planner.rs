@@ -17,7 +17,7 @@ use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 
 /// How long another planner has for its first plan.
-const PATIENCE: Duration = Duration::from_mins(1);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Who makes the plans of a run.
 pub(super) enum Who {
