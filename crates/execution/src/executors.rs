@@ -18,6 +18,7 @@ use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
 
 use crate::executor::{Decided, Decision, Executor};
+use crate::odds::Odds;
 use crate::preparation::{Need, Region};
 use crate::reason::{Cause, Reason};
 
@@ -37,6 +38,8 @@ pub struct Registered {
     pub name: &'static str,
     /// What the number after its name and a colon means, if it takes one.
     pub argument: Option<&'static str>,
+    /// Whether that number can be left out.
+    pub is_optional: bool,
     /// What it does, in one sentence.
     pub summary: &'static str,
     /// Where it comes from.
@@ -44,7 +47,7 @@ pub struct Registered {
     /// What it needs to know of a plan.
     pub need: Need,
     /// Makes one.
-    make: fn(&Rational, Means) -> Box<dyn Executor>,
+    make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
 }
 
 /// What an executor may ask while it executes.
@@ -53,14 +56,26 @@ pub struct Means {
     pub region: Box<dyn Region>,
     /// How likely everything is.
     pub likelihoods: Arc<Likelihoods>,
+    /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
+    /// look.
+    pub odds: Option<Box<dyn Odds>>,
+}
+
+impl Means {
+    /// With these odds.
+    #[must_use]
+    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
+        Self { odds, ..self }
+    }
 }
 
 impl<R: Region + 'static> From<Box<R>> for Means {
-    /// Everything is certain.
+    /// Everything is certain, and no plan likelier than another.
     fn from(region: Box<R>) -> Self {
         Self {
             region,
             likelihoods: Arc::new(Likelihoods::certain()),
+            odds: None,
         }
     }
 }
@@ -98,8 +113,12 @@ pub enum UnknownExecutor {
 impl ExecutorSpec {
     /// Makes the executor, from the envelope alone, or from all [`Means`].
     pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
-        let zero = Rational::ZERO;
-        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), means.into())
+        (self.registered.make)(self.argument.clone(), means.into())
+    }
+
+    /// Whether the executor looks for plans that are likelier to succeed.
+    pub fn asks_odds(&self) -> bool {
+        self.registered.is_optional && self.argument.is_some()
     }
 }
 
@@ -144,6 +163,7 @@ impl FromStr for ExecutorSpec {
         let argument = match (registered.argument, argument) {
             (None, None) => None,
             (None, Some(_)) => return Err(wrong(format!("`{name}` takes no number"))),
+            (Some(_), None) if registered.is_optional => None,
             (Some(meaning), None) => {
                 return Err(wrong(format!(
                     "say which {meaning}, as in `{}`",
@@ -167,9 +187,10 @@ impl FromStr for ExecutorSpec {
 }
 
 impl Registered {
-    /// How one asks for it: `guarded`, `fixed:X`.
+    /// How one asks for it: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
+            Some(_) if self.is_optional => format!("{}[:X]", self.name),
             Some(_) => format!("{}:X", self.name),
             None => self.name.to_owned(),
         }
@@ -197,6 +218,7 @@ mod tests {
             "stn",
             "guarded",
             "live",
+            "live:5",
             "adaptable",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();

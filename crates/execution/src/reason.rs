@@ -53,6 +53,8 @@ pub enum Cause {
     GuaranteeLost,
     /// No order of the plan's actions leads to the goal.
     NoOrder,
+    /// Another plan is likelier to succeed.
+    Likelier,
     /// The plan came too late to be started.
     Late,
     /// The plan is done, but the goal is not reached.
@@ -78,6 +80,7 @@ impl Cause {
         (Self::Silence, "silence"),
         (Self::GuaranteeLost, "guarantee-lost"),
         (Self::NoOrder, "no-order"),
+        (Self::Likelier, "likelier"),
         (Self::Late, "late"),
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
@@ -178,6 +181,7 @@ impl Reason {
                 Some(why) => format!("no order of the plan's actions can be chosen: {why}"),
                 None => "no order of the plan's actions leads to the goal from here".to_owned(),
             },
+            Cause::Likelier => format!("there is a likelier plan: {about}"),
             Cause::Late => format!("the plan came too late: {about}"),
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),

@@ -14,7 +14,7 @@ use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
 };
-use elbowroom::execution::{Planner, Recorder, World};
+use elbowroom::execution::{Odds, Planner, Recorder, World};
 use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -53,6 +53,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     };
     let likelihoods = likelihoods_text(arguments)?;
     let choices = Choices::of(arguments, likelihoods.as_ref(), &task)?;
+    who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
     let header = header(arguments, &texts, world.as_deref(), likelihoods.as_ref());
@@ -72,7 +73,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
             Some(command) => {
                 let within = &arguments.answer_within;
                 let mut world = process::ProcessWorld::start(command, &job.task, within)?;
-                let report = job.run(&mut world, &mut writer);
+                let report = job.run(&mut world, None, &mut writer);
                 world.stop();
                 report
             }
@@ -99,13 +100,18 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run(&self, world: &mut dyn World, recorder: &mut dyn Recorder) -> Report {
+    /// A run in a world; `model` is what is known of it.
+    fn run(
+        &self,
+        world: &mut dyn World,
+        model: Option<&WorldModel>,
+        recorder: &mut dyn Recorder,
+    ) -> Report {
         let (choices, first) = (&self.choices, self.first.as_ref());
-        let epsilon = &choices.settings.epsilon;
+        let run =
+            |planning: Planning<'_>| choices.run_with(&self.task, first, world, planning, recorder);
         self.who
-            .with(self.arguments, &self.texts, epsilon, &mut |planner| {
-                choices.run_with(&self.task, first, world, planner, recorder)
-            })
+            .with(self.arguments, &self.texts, choices, model, run)
     }
 
     fn simulated(
@@ -139,8 +145,8 @@ impl Job<'_> {
             &mut unreliable
         };
         Ok(match &arguments.realtime {
-            None => self.run(world, recorder),
-            Some(factor) => self.run(&mut Realtime::new(world, factor), recorder),
+            None => self.run(world, Some(&model), recorder),
+            Some(factor) => self.run(&mut Realtime::new(world, factor), Some(&model), recorder),
         })
     }
 }
@@ -156,6 +162,12 @@ impl Texts {
         let read = elbowroom::pddl::read_problem(&self.domain, &self.problem);
         Ok(Task::new(Arc::new(input::with_warnings(read)?)))
     }
+}
+
+/// Who makes plans, and who knows of likelier ones.
+pub(super) struct Planning<'a> {
+    pub(super) planner: &'a mut dyn Planner,
+    pub(super) odds: Option<Box<dyn Odds>>,
 }
 
 /// How to run, from the command line.
@@ -239,7 +251,7 @@ impl Choices {
         task: &Arc<Task>,
         first: Option<&TimeTriggeredPlan>,
         world: &mut dyn World,
-        planner: &mut dyn Planner,
+        planning: Planning<'_>,
         recorder: &mut dyn Recorder,
     ) -> Report {
         let mut analyst = Analyst::new(self.flow.clone());
@@ -248,10 +260,11 @@ impl Choices {
                 epsilon: self.settings.epsilon.clone(),
             }),
             likelihoods: Arc::clone(&self.likelihoods),
+            odds: planning.odds,
         });
         let ports = Ports {
             world,
-            planner,
+            planner: planning.planner,
             preparer: &mut analyst,
             executor: executor.as_mut(),
             need: self.executor.registered.need,
@@ -316,6 +329,8 @@ fn header(
         "has_plan": arguments.plan.is_some(),
         "executor": arguments.executor,
         "seed": arguments.seed,
+        "planner_states": arguments.planner_states,
+        "improve_states": arguments.improve_states,
         "vary": arguments.vary,
         "precision": arguments.precision.to_string(),
         "running": format!("{:?}", arguments.running).to_lowercase(),

@@ -2,18 +2,20 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{self, Ports, Report, Verdict};
+use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::run::{self, PlanningTime, Ports, Report, Verdict};
 use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
-#[cfg(feature = "external")]
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
 use elbowroom_sim::{SimWorld, Unreliable, WorldModel};
 
 use super::{Column, Experiment, ExperimentError, Part, Planning, Results, clairvoyant};
-use crate::execute::{Analyst, Embedded, RememberingPlanner, RememberingPreparer, WholeRegion};
+use crate::execute::{
+    Analyst, Embedded, Likeliest, RememberingPlanner, RememberingPreparer, SharedLikeliest,
+    WholeRegion,
+};
 use crate::flow;
 
 /// How many plans are remembered for one problem: some megabytes.
@@ -44,6 +46,9 @@ struct Common<'a> {
 struct Place {
     world: WorldModel,
     preparer: RememberingPreparer<Analyst>,
+    /// For executors that look for likelier plans: who makes them, and the same with a memory.
+    odds: SharedLikeliest,
+    likeliest: RememberingPlanner<SharedLikeliest>,
 }
 
 impl Setting<'_> {
@@ -114,7 +119,18 @@ impl Setting<'_> {
                 .prepare(task, first, spec.registered.need)
                 .map_err(|why| self.wrong(&why))?;
         }
-        Ok(Place { world, preparer })
+        let planning_time = match &self.experiment.settings.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        };
+        let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
+        let odds = SharedLikeliest::new(odds);
+        Ok(Place {
+            world,
+            preparer,
+            likeliest: RememberingPlanner::new(odds.clone(), PLANS),
+            odds,
+        })
     }
 
     /// Every executor in the same world.
@@ -159,7 +175,12 @@ impl Setting<'_> {
         common: &mut Common<'_>,
     ) -> Report {
         let settings = &self.experiment.settings;
-        let Place { world, preparer } = &mut common.columns[column];
+        let Place {
+            world,
+            preparer,
+            odds,
+            likeliest,
+        } = &mut common.columns[column];
         let sim = SimWorld::new(Arc::clone(&common.task), world, seed);
         let (mut plain, mut unreliable);
         let world: &mut dyn World = if world.reports.is_perfect() {
@@ -170,12 +191,19 @@ impl Setting<'_> {
             unreliable = Unreliable::new(sim, reports, seed, world.resolution.clone());
             &mut unreliable
         };
-        let mut executor = spec.build(Box::new(WholeRegion {
+        let region = Box::new(WholeRegion {
             epsilon: settings.epsilon.clone(),
-        }));
+        });
+        let asks_odds = spec.asks_odds();
+        let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
+        let mut executor = spec.build(Means::from(region).with_odds(odds));
         let ports = Ports {
             world,
-            planner: &mut common.planner,
+            planner: if asks_odds {
+                likeliest
+            } else {
+                &mut common.planner
+            },
             preparer,
             executor: executor.as_mut(),
             need: spec.registered.need,

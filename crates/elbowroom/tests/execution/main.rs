@@ -4,6 +4,7 @@ mod adaptable;
 mod bad_worlds;
 mod campaigns;
 mod guarantee;
+mod likelier;
 mod reasons;
 mod reports;
 mod scene;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, Embedded, WholeRegion};
+use elbowroom::execute::{Analyst, Embedded, Likeliest, SharedLikeliest, WholeRegion};
 use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
@@ -86,6 +86,36 @@ impl Scene {
         self
     }
 
+    /// Runs with an executor that looks for plans that are likelier to succeed in that world.
+    pub(crate) fn run_likeliest(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
+        let spec: ExecutorSpec = executor.parse().expect("a correct test");
+        let PlanningTime::Seconds(time) = self.settings.planning_time.clone() else {
+            panic!("a correct test");
+        };
+        let likeliest = Likeliest::new(model.clone(), self.planner(), time);
+        let mut likeliest = SharedLikeliest::new(likeliest);
+        let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
+        let region = Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        });
+        let mut decider =
+            spec.build(Means::from(region).with_odds(Some(Box::new(likeliest.clone()))));
+        let ports = Ports {
+            world: &mut world,
+            planner: &mut likeliest,
+            preparer: &mut Analyst::new(self.flow.clone()),
+            executor: decider.as_mut(),
+            need: spec.registered.need,
+            recorder: &mut NoRecord,
+        };
+        let task = Arc::clone(&self.task);
+        let report = run::run(task, Some(&self.plan), &self.settings, ports);
+        if report.verdict == Verdict::GoalReached {
+            assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
+        }
+        report
+    }
+
     fn planner(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
@@ -113,11 +143,12 @@ impl Scene {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
+        let region = Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        });
         let mut decider = spec.build(Means {
-            region: Box::new(WholeRegion {
-                epsilon: self.settings.epsilon.clone(),
-            }),
             likelihoods: Arc::clone(&self.likelihoods),
+            ..Means::from(region)
         });
         run::run(
             Arc::clone(&self.task),
