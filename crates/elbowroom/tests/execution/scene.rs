@@ -78,6 +78,14 @@ impl Scene {
         scene
     }
 
+    /// The same, with these sections of a likelihood file.
+    pub(crate) fn with_likelihoods(mut self, sections: &str) -> Self {
+        let text = format!("format = \"elbowroom-likelihoods\"\nversion = 1\n{sections}");
+        let read = likelihoods::read(text.as_bytes(), &self.task);
+        self.likelihoods = Arc::new(read.expect("a correct test"));
+        self
+    }
+
     /// Runs with an executor that looks for plans that are likelier to succeed in that world.
     pub(crate) fn run_likeliest(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
@@ -108,14 +116,6 @@ impl Scene {
         report
     }
 
-    /// The same, with these sections of a likelihood file.
-    pub(crate) fn with_likelihoods(mut self, sections: &str) -> Self {
-        let text = format!("format = \"elbowroom-likelihoods\"\nversion = 1\n{sections}");
-        let read = likelihoods::read(text.as_bytes(), &self.task);
-        self.likelihoods = Arc::new(read.expect("a correct test"));
-        self
-    }
-
     fn planner(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
@@ -143,12 +143,12 @@ impl Scene {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
+        let region = Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        });
         let mut decider = spec.build(Means {
-            region: Box::new(WholeRegion {
-                epsilon: self.settings.epsilon.clone(),
-            }),
             likelihoods: Arc::clone(&self.likelihoods),
-            odds: None,
+            ..Means::from(region)
         });
         run::run(
             Arc::clone(&self.task),

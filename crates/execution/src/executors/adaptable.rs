@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_model::Step;
+use elbowroom_model::ground::Expression;
+use elbowroom_model::{Step, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
 use elbowroom_plan::partial_order::partial_order;
@@ -73,7 +74,11 @@ impl Executor for Adaptable {
         let settings = deorder::Settings {
             epsilon: mission.epsilon.clone(),
         };
-        let plan = partial_order(&mission.task, &mission.time_triggered, &settings);
+        // Numbers that depend on how long something takes are followed as if all went as planned.
+        let as_timed = TimeTriggeredPlan {
+            steps: mission.time_triggered.steps.iter().map(timed).collect(),
+        };
+        let plan = partial_order(&mission.task, &as_timed, &settings);
         let task = Arc::clone(&mission.task);
         let model = Model::new(task, plan, &self.likelihoods, Semantics::Paper)
             .map_err(|missing| Box::new(Reason::new(Cause::NoOrder).about(missing.to_string())))?;
@@ -329,6 +334,19 @@ impl Rest {
             decision: Decision::Start(vec![order]),
             reason,
         }
+    }
+}
+
+/// The step with its planned duration in place of `?duration`.
+fn timed(step: &Step) -> Step {
+    let duration = step.duration.clone();
+    let mut planned = |leaf: &Expression| match leaf {
+        Expression::Duration => duration.clone().map(Expression::Constant),
+        _ => None,
+    };
+    Step {
+        action: step.action.map_leaves(&mut planned),
+        ..step.clone()
     }
 }
 
