@@ -1,4 +1,4 @@
-//! Ctrl-C ends a search with the best result so far.
+//! Ctrl-C, or a request to terminate, ends a search with the best result so far.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// From now on, the first Ctrl-C asks to stop, and the second ends the program.
+    /// From now on, the first Ctrl-C (SIGINT, SIGTERM or SIGHUP) asks to stop, and the second ends the program.
     pub(crate) fn listen() -> Self {
         let interrupt = Self::default();
         let flag = interrupt.clone();

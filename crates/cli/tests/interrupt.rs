@@ -45,23 +45,23 @@ impl Long {
     }
 }
 
-/// Waits until a process catches SIGINT.
-fn wait_until_it_listens(child: &Child) {
+/// Waits until a process catches the signal with this number.
+fn wait_until_it_listens(child: &Child, signal: u32) {
     let status = format!("/proc/{}/status", child.id());
     loop {
         let text = std::fs::read_to_string(&status).expect("the process is alive");
         let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
         let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-        if caught.is_some_and(|mask| mask & 0b10 != 0) {
+        if caught.is_some_and(|mask| mask >> (signal - 1) & 1 == 1) {
             return;
         }
         sleep(Duration::from_millis(5));
     }
 }
 
-fn interrupt(child: &Child) {
+fn send(child: &Child, signal: u32) {
     let killed = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
+        .args([format!("-{signal}"), child.id().to_string()])
         .status()
         .expect("every Unix has `kill`");
     assert!(killed.success());
@@ -69,17 +69,27 @@ fn interrupt(child: &Child) {
 
 #[test]
 fn ctrl_c_ends_the_search_with_the_best_box_so_far() {
+    ends_the_search_with_the_best_box_so_far("interrupt", 2);
+}
+
+/// As services and batch systems do it.
+#[test]
+fn a_request_to_terminate_does_so_too() {
+    ends_the_search_with_the_best_box_so_far("terminate", 15);
+}
+
+fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
     let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
-        .args(Long::new("interrupt").arguments())
+        .args(Long::new(name).arguments())
         .arg("--json")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the command");
-    wait_until_it_listens(&child);
-    // Time for a box; however much it is, the answer is one of the two that Ctrl-C can have.
+    wait_until_it_listens(&child, signal);
+    // Time for a box; however much it is, the answer is one of the two that there can be.
     sleep(Duration::from_secs(1));
-    interrupt(&child);
+    send(&child, signal);
     let output = child.wait_with_output().expect("its output");
     let document: serde_json::Value =
         serde_json::from_slice(&output.stdout).expect("one JSON document");
