@@ -105,6 +105,9 @@ pub(crate) struct PlanArgs {
     pub(crate) json: bool,
 }
 
+/// Nobody plans.
+pub(crate) const NOBODY: &str = "none";
+
 /// The planner that is always there.
 pub(crate) const EMBEDDED: &str = "embedded";
 
@@ -200,9 +203,14 @@ pub(crate) struct RunArgs {
     /// The plan to begin with; without it, a plan is made
     #[arg(long, value_name = "FILE")]
     pub(crate) plan: Option<PathBuf>,
-    /// Who makes plans
-    #[arg(long, value_enum, default_value_t = PlannerChoice::Embedded)]
-    pub(crate) planner: PlannerChoice,
+    /// Who makes plans: `embedded`, another planner as in `elbowroom plan`, or `none`: when the plan
+    /// no longer works, the run is over
+    #[arg(long, value_name = "NAME|CMD", default_value = EMBEDDED)]
+    pub(crate) planner: String,
+    /// Let another planner go on to better plans for so many seconds; otherwise its first plan is
+    /// taken, and it has a minute for that
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(crate) planner_time: Option<Rational>,
     /// How many states the embedded planner may look at for one plan
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     pub(crate) planner_states: u64,
@@ -221,6 +229,10 @@ pub(crate) struct RunArgs {
     /// Who decides
     #[arg(long, value_name = "NAME", default_value = "guarded")]
     pub(crate) executor: String,
+    /// How likely actions and effects are to succeed, and facts to change by themselves, for
+    /// executors that go by that; without it, everything is certain
+    #[arg(long, value_name = "FILE")]
+    pub(crate) likelihoods: Option<PathBuf>,
     /// Which of the possible trajectories of the world to take
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
@@ -276,7 +288,7 @@ pub(crate) struct CompareArgs {
     /// Make no trials, but put the results of parts together
     #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
     pub(crate) merge: Vec<PathBuf>,
-    /// Write results.json, table.md and table.csv there
+    /// Write results.json, table.md, table.csv and, where there are plots, these there
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     /// Print the results as one JSON document
@@ -291,15 +303,6 @@ fn shard(text: &str) -> Result<(u64, u64), String> {
         Some((shard, shards)) if shard < shards => Ok((shard, shards)),
         _ => Err("write I/N with 0 <= I < N, as in 0/4".to_owned()),
     }
-}
-
-/// Who makes plans.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PlannerChoice {
-    /// The planner that is built in
-    Embedded,
-    /// Nobody: when the plan no longer works, the run is over
-    None,
 }
 
 /// What becomes of running actions when a new plan is made.

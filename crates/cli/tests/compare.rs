@@ -4,12 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const EXPERIMENT: &str = "crates/cli/tests/files/late-drives.toml";
-
-fn compare(arguments: &[&str]) -> String {
+fn compare(experiment: &[&str], arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
-        .args(["compare", EXPERIMENT, "--json"])
+        .args(["compare", "--json"])
+        .args(experiment)
         .args(arguments)
         .output()
         .expect("the command can be started");
@@ -21,15 +20,17 @@ fn temporary(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("elbowroom-{}-{name}", std::process::id()))
 }
 
-#[test]
-fn parts_made_by_other_processes_add_up_to_the_whole() {
-    let whole = compare(&["--jobs", "2"]);
+/// `whole` are the options that a merge does not take.
+fn parts_add_up(experiment: &str, whole: &[&str]) {
+    let make = |arguments: &[&str]| compare(&[experiment], &[whole, arguments].concat());
+    let all = make(&["--jobs", "2"]);
     let files: Vec<PathBuf> = ["0/2", "1/2"]
         .iter()
         .enumerate()
         .map(|(number, shard)| {
-            let file = temporary(&format!("part-{number}.json"));
-            fs::write(&file, compare(&["--jobs", "1", "--shard", shard])).expect("written");
+            let name = experiment.replace('/', "-");
+            let file = temporary(&format!("{name}-part-{number}.json"));
+            fs::write(&file, make(&["--jobs", "1", "--shard", shard])).expect("written");
             file
         })
         .collect();
@@ -37,9 +38,51 @@ fn parts_made_by_other_processes_add_up_to_the_whole() {
         .iter()
         .map(|file| file.display().to_string())
         .collect();
-    let merged = compare(&["--merge", &names[0], &names[1]]);
-    assert_eq!(merged, whole);
+    let merged = compare(&[experiment], &["--merge", &names[0], &names[1]]);
+    assert_eq!(merged, all);
     for file in files {
         fs::remove_file(file).expect("it is there");
     }
+}
+
+#[test]
+fn parts_made_by_other_processes_add_up_to_the_whole() {
+    parts_add_up("crates/cli/tests/files/late-drives.toml", &[]);
+}
+
+#[test]
+fn so_do_those_of_experiments_in_perturbed_worlds() {
+    parts_add_up("experiments/olisipo_sf3.toml", &["--trials", "15"]);
+}
+
+#[test]
+fn an_experiment_in_perturbed_worlds_leaves_tables_and_plots() {
+    let folder = temporary("perturbed");
+    let path = folder.display().to_string();
+    let experiment = ["experiments/olisipo.toml"];
+    compare(&experiment, &["--trials", "5", "--output", &path]);
+    let mut names: Vec<String> = fs::read_dir(&folder)
+        .expect("the folder")
+        .map(|entry| entry.expect("a file").file_name().display().to_string())
+        .collect();
+    names.sort();
+    let expected = [
+        "as-published-actions-failure.svg",
+        "as-published-actions-success.svg",
+        "as-published-replans.svg",
+        "as-published-success.svg",
+        "results.json",
+        "sound-actions-failure.svg",
+        "sound-actions-success.svg",
+        "sound-replans.svg",
+        "sound-success.svg",
+        "table.csv",
+        "table.md",
+    ];
+    assert_eq!(names, expected);
+    let table = fs::read_to_string(folder.join("table.md")).expect("the table");
+    for case in ["SF3 p10", "AF3 p8"] {
+        assert!(table.contains(case), "{table}");
+    }
+    fs::remove_dir_all(folder).expect("it is there");
 }

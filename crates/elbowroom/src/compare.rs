@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-pub use experiment::{Column, Experiment, ExperimentError, Published, Together};
+pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
 pub use results::{Cell, Pair, Results, ResultsError};
 
 use trials::Setting;
@@ -81,10 +81,11 @@ pub fn run(
         .collect();
     let done = AtomicU64::new(0);
     let told = || observe(done.fetch_add(1, Ordering::Relaxed) + 1);
+    let goes_on = || observe(done.load(Ordering::Relaxed));
     let parts: Vec<Result<Results, ExperimentError>> = pool.install(|| {
         settings
             .par_iter()
-            .map(|setting| setting.run(part, &told))
+            .map(|setting| setting.run(part, &told, &goes_on))
             .collect()
     });
     // In the order of the settings, whichever was ready first.

@@ -2,10 +2,17 @@
 //! behind them.
 
 mod analyst;
+#[cfg(feature = "external")]
+mod external;
 mod facts_only;
+mod likeliest;
 mod memory;
 mod planners;
+pub(crate) mod rewrite;
 
 pub use analyst::{Analyst, WholeRegion};
+#[cfg(feature = "external")]
+pub use external::External;
+pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};

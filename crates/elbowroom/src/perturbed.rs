@@ -6,12 +6,14 @@
 //! trials run at once.
 
 mod experiment;
+mod planner;
 mod results;
+mod table;
 
 use std::sync::{Arc, OnceLock};
 
 use elbowroom_execution::untimed::{
-    ActionName, Adaptable, AsPublished, Esterel, Foresighted, Game, Limits, Shortest,
+    ActionName, Adaptable, AsPublished, Esterel, Foresighted, Game, Limits, Plans, Shortest,
     UntimedExecutor, UntimedWorld, all_actions, trial,
 };
 use elbowroom_model::ground::Action;
@@ -23,9 +25,13 @@ use elbowroom_sim::perturbed::{Chances, PerturbedFacts, PublishedWorld, SoundWor
 use rayon::prelude::*;
 
 pub use experiment::{
-    Case, ExecutorKind, PerturbedError, PerturbedExperiment, Published, WorldKind,
+    Case, ExecutorKind, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
-pub use results::{Row, table};
+pub use results::{PerturbedResults, Row, Work};
+pub use table::{plots, table};
+
+use crate::compare::Part;
+use planner::EmbeddedPlans;
 
 /// One case, ready to be run.
 struct Setting<'e> {
@@ -41,18 +47,16 @@ struct Setting<'e> {
     foresight: OnceLock<Result<Foresighted, PerturbedError>>,
 }
 
-/// Makes `trials` trials of each case, in each world, with each executor; on `jobs` threads, 0: as
-/// many as there are processors. `observe` is told of each row that is done, and says whether to go
-/// on.
+/// Makes the trials of each case, in each world, with each executor. `observe` is asked after each
+/// row whether to go on.
 ///
 /// # Errors
 /// When the problem or likelihoods cannot be read, or are of a kind that there is no world for.
 pub fn run(
     experiment: &PerturbedExperiment,
-    trials: u64,
-    jobs: usize,
+    part: Part,
     observe: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Row>, PerturbedError> {
+) -> Result<PerturbedResults, PerturbedError> {
     let cases = (0..).zip(&experiment.cases);
     let settings: Vec<Setting<'_>> = cases
         .map(|(number, case)| Setting::new(experiment, case, number))
@@ -68,14 +72,15 @@ pub fn run(
         })
         .collect();
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
+        .num_threads(part.jobs)
         .build()
         .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
-    pool.install(|| {
+    let rows: Result<Vec<Row>, _> = pool.install(|| {
         rows.par_iter()
-            .map(|(setting, world, executor)| setting.row(*world, *executor, trials, observe))
+            .map(|(setting, world, executor)| setting.row(*world, *executor, part, observe))
             .collect()
-    })
+    });
+    Ok(PerturbedResults::new(experiment, part, rows?))
 }
 
 impl<'e> Setting<'e> {
@@ -84,8 +89,8 @@ impl<'e> Setting<'e> {
         case: &'e Case,
         number: u64,
     ) -> Result<Self, PerturbedError> {
-        let domain = Source::new("domain", experiment.domain.as_str());
-        let problem = Source::new("problem", experiment.problem.as_str());
+        let domain = Source::new("domain", case.domain.as_str());
+        let problem = Source::new("problem", case.problem.as_str());
         let (problem, _) = read_problem(&domain, &problem)
             .map_err(|diagnostics| PerturbedError::other(diagnostics.render(false)))?;
         let mut task = Task::new(problem);
@@ -120,7 +125,7 @@ impl<'e> Setting<'e> {
             // The first plan takes a round; each step that ends in a dead end takes another.
             let patience = self.experiment.rounds.saturating_sub(1).max(1);
             let settings = optimum::Settings {
-                most_running: self.experiment.most_running,
+                most_running: self.case.most_running,
                 dead_ends: DeadEnds::Patience(patience),
                 ..optimum::Settings::default()
             };
@@ -143,11 +148,25 @@ impl<'e> Setting<'e> {
         })
     }
 
+    fn plans(&self) -> Box<Plans<'static>> {
+        let task = Arc::clone(&self.task);
+        match self.experiment.planner {
+            PlannerKind::Shortest => {
+                let mut planner = Shortest::new(task, self.actions.clone());
+                Box::new(move |state| planner.plan(state))
+            }
+            PlannerKind::Embedded => {
+                let mut planner = EmbeddedPlans::new(task);
+                Box::new(move |state| planner.plan(state))
+            }
+        }
+    }
+
     fn row(
         &self,
         world: WorldKind,
         kind: ExecutorKind,
-        trials: u64,
+        part: Part,
         observe: &(dyn Fn() -> bool + Sync),
     ) -> Result<Row, PerturbedError> {
         let mut executor = self.executor(kind)?;
@@ -159,10 +178,10 @@ impl<'e> Setting<'e> {
         let is_dead_end = foresight.map(|foresight| {
             move |state: &State, running: &[ActionName]| foresight.is_dead_end(state, running)
         });
-        let mut planner = Shortest::new(Arc::clone(&self.task), self.actions.clone());
+        let mut plans = self.plans();
         let mut game = Game {
             task: &self.task,
-            plans: &mut |state| planner.plan(state),
+            plans: &mut *plans,
             dead_ends: is_dead_end.as_ref().map(|watch| watch as _),
             limits: Limits {
                 rounds: self.experiment.rounds,
@@ -172,7 +191,7 @@ impl<'e> Setting<'e> {
         let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
         let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
             .wrapping_add(self.number.wrapping_mul(1_000_000_007));
-        for number in 0..trials {
+        for number in part.numbers() {
             let seed = first_seed.wrapping_add(number);
             let mut sound;
             let mut published;

@@ -4,7 +4,10 @@
 use std::fs;
 use std::path::Path;
 
-use elbowroom::perturbed::{self, ExecutorKind, PerturbedExperiment, Row, WorldKind};
+use elbowroom::compare::Part;
+use elbowroom::perturbed::{
+    self, ExecutorKind, PerturbedExperiment, PerturbedResults, Row, WorldKind,
+};
 
 fn experiment(name: &str) -> PerturbedExperiment {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
@@ -12,10 +15,21 @@ fn experiment(name: &str) -> PerturbedExperiment {
     PerturbedExperiment::read(&file(name).unwrap(), &file).unwrap()
 }
 
+fn part(trials: u64, jobs: usize) -> Part {
+    Part {
+        trials,
+        shard: 0,
+        shards: 1,
+        jobs,
+    }
+}
+
 fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
     let mut experiment = experiment(name);
     experiment.worlds = vec![world];
-    perturbed::run(&experiment, trials, 0, &|| true).unwrap()
+    perturbed::run(&experiment, part(trials, 0), &|| true)
+        .unwrap()
+        .rows
 }
 
 fn share(rows: &[Row], case: &str, executor: ExecutorKind) -> f64 {
@@ -82,11 +96,24 @@ fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_t
 }
 
 #[test]
-fn results_do_not_depend_on_how_many_run_at_once() {
-    let experiment = experiment("olisipo_af3.toml");
-    let run = |jobs| {
-        let rows = perturbed::run(&experiment, 20, jobs, &|| true).unwrap();
-        perturbed::table(&experiment, &rows)
+fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
+    let experiment = experiment("olisipo_sf3.toml");
+    let run = |part| perturbed::run(&experiment, part, &|| true).unwrap();
+    let whole = run(part(21, 1));
+    assert_eq!(whole, run(part(21, 3)));
+    let shard = |shard| Part {
+        shard,
+        shards: 2,
+        ..part(21, 2)
     };
-    assert_eq!(run(1), run(3));
+    let parts = [run(shard(1)), run(shard(0))]
+        .map(|part| PerturbedResults::read(&part.json().to_string()).unwrap());
+    assert_ne!(parts[0], whole);
+    assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
+    let twice = [parts[0].clone(), parts[0].clone()];
+    assert!(PerturbedResults::merged(&twice).is_err());
+    assert!(PerturbedResults::merged(&[parts[0].clone(), run(part(20, 1))]).is_err());
+    for (name, plot) in perturbed::plots(&whole) {
+        assert!(plot.svg().unwrap().contains("SF3 p10"), "{name}");
+    }
 }

@@ -4,6 +4,7 @@
 //! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
 //! made from that list.
 
+mod adaptable;
 mod fixed;
 mod guarded;
 mod live;
@@ -11,10 +12,13 @@ mod stn;
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use elbowroom_num::Rational;
+use elbowroom_probability::Likelihoods;
 
 use crate::executor::{Decided, Decision, Executor};
+use crate::odds::Odds;
 use crate::preparation::{Need, Region};
 use crate::reason::{Cause, Reason};
 
@@ -24,6 +28,7 @@ pub const EXECUTORS: &[Registered] = &[
     stn::REGISTERED,
     guarded::REGISTERED,
     live::REGISTERED,
+    adaptable::REGISTERED,
 ];
 
 /// What there is to know of an executor before there is one.
@@ -33,6 +38,8 @@ pub struct Registered {
     pub name: &'static str,
     /// What the number after its name and a colon means, if it takes one.
     pub argument: Option<&'static str>,
+    /// Whether that number can be left out.
+    pub is_optional: bool,
     /// What it does, in one sentence.
     pub summary: &'static str,
     /// Where it comes from.
@@ -40,7 +47,37 @@ pub struct Registered {
     /// What it needs to know of a plan.
     pub need: Need,
     /// Makes one.
-    make: fn(&Rational, Box<dyn Region>) -> Box<dyn Executor>,
+    make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
+}
+
+/// What an executor may ask while it executes.
+pub struct Means {
+    /// The whole envelope.
+    pub region: Box<dyn Region>,
+    /// How likely everything is.
+    pub likelihoods: Arc<Likelihoods>,
+    /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
+    /// look.
+    pub odds: Option<Box<dyn Odds>>,
+}
+
+impl Means {
+    /// With these odds.
+    #[must_use]
+    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
+        Self { odds, ..self }
+    }
+}
+
+impl<R: Region + 'static> From<Box<R>> for Means {
+    /// Everything is certain, and no plan likelier than another.
+    fn from(region: Box<R>) -> Self {
+        Self {
+            region,
+            likelihoods: Arc::new(Likelihoods::certain()),
+            odds: None,
+        }
+    }
 }
 
 /// An executor as one asks for it: `guarded`, `fixed:30`.
@@ -74,10 +111,14 @@ pub enum UnknownExecutor {
 }
 
 impl ExecutorSpec {
-    /// Makes the executor. `region` is asked by those that look at the whole envelope.
-    pub fn build(&self, region: Box<dyn Region>) -> Box<dyn Executor> {
-        let zero = Rational::ZERO;
-        (self.registered.make)(self.argument.as_ref().unwrap_or(&zero), region)
+    /// Makes the executor, from the envelope alone, or from all [`Means`].
+    pub fn build(&self, means: impl Into<Means>) -> Box<dyn Executor> {
+        (self.registered.make)(self.argument.clone(), means.into())
+    }
+
+    /// Whether the executor looks for plans that are likelier to succeed.
+    pub fn asks_odds(&self) -> bool {
+        self.registered.is_optional && self.argument.is_some()
     }
 }
 
@@ -122,6 +163,7 @@ impl FromStr for ExecutorSpec {
         let argument = match (registered.argument, argument) {
             (None, None) => None,
             (None, Some(_)) => return Err(wrong(format!("`{name}` takes no number"))),
+            (Some(_), None) if registered.is_optional => None,
             (Some(meaning), None) => {
                 return Err(wrong(format!(
                     "say which {meaning}, as in `{}`",
@@ -145,9 +187,10 @@ impl FromStr for ExecutorSpec {
 }
 
 impl Registered {
-    /// How one asks for it: `guarded`, `fixed:X`.
+    /// How one asks for it: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
+            Some(_) if self.is_optional => format!("{}[:X]", self.name),
             Some(_) => format!("{}:X", self.name),
             None => self.name.to_owned(),
         }
@@ -168,7 +211,16 @@ mod tests {
 
     #[test]
     fn names_are_read_as_they_are_written() {
-        for text in ["fixed:0", "fixed:30", "fixed:5/2", "stn", "guarded", "live"] {
+        for text in [
+            "fixed:0",
+            "fixed:30",
+            "fixed:5/2",
+            "stn",
+            "guarded",
+            "live",
+            "live:5",
+            "adaptable",
+        ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);
         }

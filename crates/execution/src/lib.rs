@@ -12,8 +12,8 @@
 //! - [`untimed`]: the same where there is no time, as in the experiments of paper 2.
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
-//! [`Planner`], [`Preparer`] and [`Region`] (what a plan survives). It does not know who stands
-//! behind them; in particular it knows no solver.
+//! [`Planner`], [`Preparer`], [`Region`] (what a plan survives) and [`Odds`] (how likely it is to
+//! succeed). It does not know who stands behind them; in particular it knows no solver.
 //!
 //! ```
 //! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};
@@ -31,6 +31,7 @@ mod event;
 mod executor;
 pub mod executors;
 mod horizon;
+mod odds;
 mod planning;
 mod preparation;
 mod progression;
@@ -44,6 +45,7 @@ mod world;
 
 pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
 pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+pub use odds::{Compared, Odds, Remainder};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};

@@ -51,6 +51,10 @@ pub enum Cause {
     Silence,
     /// What is left of the plan is no longer guaranteed to work.
     GuaranteeLost,
+    /// No order of the plan's actions leads to the goal.
+    NoOrder,
+    /// Another plan is likelier to succeed.
+    Likelier,
     /// The plan came too late to be started.
     Late,
     /// The plan is done, but the goal is not reached.
@@ -75,6 +79,8 @@ impl Cause {
         (Self::Surprise, "surprise"),
         (Self::Silence, "silence"),
         (Self::GuaranteeLost, "guarantee-lost"),
+        (Self::NoOrder, "no-order"),
+        (Self::Likelier, "likelier"),
         (Self::Late, "late"),
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
@@ -171,6 +177,11 @@ impl Reason {
             Cause::GuaranteeLost => {
                 format!("the rest of the plan is no longer guaranteed: {about}")
             }
+            Cause::NoOrder => match self.about.as_deref() {
+                Some(why) => format!("no order of the plan's actions can be chosen: {why}"),
+                None => "no order of the plan's actions leads to the goal from here".to_owned(),
+            },
+            Cause::Likelier => format!("there is a likelier plan: {about}"),
             Cause::Late => format!("the plan came too late: {about}"),
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),

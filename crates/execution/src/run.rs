@@ -13,7 +13,7 @@
 //! | a success after a cancel | the success counts: the action was faster |
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
-//! | no report at all | when the action should have ended [`Patience`] ago, it is given up: it is cancelled and counts as failed |
+//! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
 //!
 //! The goal is not taken as reached while anything is under way or in doubt, and not before the
@@ -214,7 +214,7 @@ impl<'a> Run<'a> {
 
     /// Waits until the executor wants to be asked again, or somebody's patience ends.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
-        let silence = self.account.next_silence(&self.settings.patience);
+        let silence = self.next_silence();
         let until = until.into_iter().chain(silence).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.

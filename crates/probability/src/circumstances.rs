@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom_model::ground::FluentId;
 use elbowroom_model::{State, Task};
 use elbowroom_num::Rational;
-use elbowroom_plan::InstanceId;
+use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::belief::Belief;
 
@@ -21,6 +21,9 @@ pub struct Circumstances {
     pub values: BTreeMap<FluentId, Rational>,
     /// The plan's actions that have started and not ended, in order of their start.
     pub running: Vec<Running>,
+    /// Happenings of the plan less than ε ago, in order of time: what interferes with one of them
+    /// has to wait.
+    pub recent: Vec<(NodeId, Rational)>,
 }
 
 /// An action of a plan under way.
@@ -45,6 +48,7 @@ impl Circumstances {
             belief: Belief::certain(state),
             values: state.values.clone(),
             running: Vec::new(),
+            recent: Vec::new(),
         }
     }
 

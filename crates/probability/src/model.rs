@@ -147,12 +147,12 @@ impl Model {
     }
 
     /// The start node of an instance, or its only node.
-    pub(crate) fn start(&self, id: InstanceId) -> NodeId {
+    pub fn start(&self, id: InstanceId) -> NodeId {
         self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))
     }
 
     /// The end node of an instance, or its only node.
-    pub(crate) fn end(&self, id: InstanceId) -> NodeId {
+    pub fn end(&self, id: InstanceId) -> NodeId {
         self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
     }
 

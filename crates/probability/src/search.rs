@@ -108,6 +108,8 @@ pub struct OrderSearch {
     separations: Separations,
     bounds: Bounds,
     cache: Cache,
+    /// Looked at before all others.
+    first: Vec<NodeId>,
 }
 
 impl OrderSearch {
@@ -122,7 +124,18 @@ impl OrderSearch {
             separations,
             bounds,
             cache: Cache::default(),
+            first: Vec::new(),
         }
+    }
+
+    /// Begins every search with this sequence, as far as it can be done: that of the plan as it is
+    /// timed, say. Of a long plan, a search that is cut short may find nothing else.
+    ///
+    /// Starts of what is under way and timed initials that have passed are left out.
+    #[must_use]
+    pub fn beginning_with(mut self, sequence: Vec<NodeId>) -> Self {
+        self.first = sequence;
+        self
     }
 
     /// The model.
@@ -184,6 +197,7 @@ impl OrderSearch {
             return Ok(nothing(0));
         }
         let mut run = Run::new(self, circumstances, nominal, timing, watch)?;
+        run.try_first(&self.first)?;
         let stop = match run.explore()? {
             ControlFlow::Continue(()) => SearchStop::Complete,
             ControlFlow::Break(()) => SearchStop::Interrupted,

@@ -4,15 +4,26 @@
 mod shared;
 mod twin;
 
+use std::ops::ControlFlow;
+
+use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::patient;
 use elbowroom_probability::{
     Candidates, Circumstances, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
+    TotalOrderPlan,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use twin::random::{Case, Taste, case};
 
-fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> bool {
+struct Compared {
+    /// The best order has more than one happening.
+    is_long: bool,
+    /// An order was found though the search was cut short at once.
+    is_hasty: bool,
+}
+
+fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compared {
     let model = Model::new(
         case.task.clone(),
         case.plan.clone(),
@@ -47,12 +58,32 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> bool 
         }
         (found, best) => panic!("{found:?} is not {best:?}: {words}"),
     }
+    // A sequence to begin with changes nothing, but where the search is cut short at once.
+    let plain = OrderSearch::new(search.model().clone(), search.settings().clone());
+    let nodes = 0..search.model().plan().nodes.len();
+    let first: Vec<NodeId> = nodes.map(NodeId::from).collect();
+    let mut begun = plain.beginning_with(first.clone());
+    let hasty = begun.best_order(&case.circumstances, &mut |_| ControlFlow::Break(()));
+    let hasty = hasty.unwrap().order;
+    let patiently = begun.best_order(&case.circumstances, &mut patient).unwrap();
+    let probability =
+        |order: &Option<TotalOrderPlan>| order.as_ref().map_or(0.0, |o| o.probability);
+    let (hasty, patiently) = (probability(&hasty), probability(&patiently.order));
+    let best_known = probability(&found.order);
+    assert!(
+        (patiently - best_known).abs() <= 1e-9 * best_known,
+        "{words}"
+    );
+    assert!(hasty <= best_known * (1.0 + 1e-9), "{words}");
     // Asked again, it knows.
     let again = search
         .best_order(&case.circumstances, &mut patient)
         .unwrap();
     assert_eq!((again.order, again.sequences), (found.order.clone(), 0));
-    found.order.is_some_and(|order| order.sequence.len() > 1)
+    Compared {
+        is_long: found.order.is_some_and(|order| order.sequence.len() > 1),
+        is_hasty: hasty > 0.0,
+    }
 }
 
 const EASY: Taste = Taste {
@@ -68,7 +99,7 @@ const EASY: Taste = Taste {
 #[test]
 fn no_order_is_more_likely_to_succeed_than_the_one_found() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut long = 0;
+    let (mut long, mut hasty) = (0, 0);
     for round in 0..700 {
         let taste = Taste {
             couples: round % 4 == 0,
@@ -85,13 +116,19 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
             ..SearchSettings::default()
         };
         let semantics = [Semantics::Paper, Semantics::World][round % 2];
-        long += usize::from(compare(&case, semantics, settings.clone()));
+        let mut compare = |case: &Case, settings| {
+            let compared = compare(case, semantics, settings);
+            long += usize::from(compared.is_long);
+            hasty += usize::from(compared.is_hasty);
+        };
+        compare(&case, settings.clone());
         settings.candidates = Candidates::Working;
         // The twin knows what is nominal only of what is certain.
         let running = std::mem::take(&mut case.circumstances.running);
         case.circumstances = Circumstances::initial(&case.task);
         case.circumstances.running = running;
-        long += usize::from(compare(&case, semantics, settings));
+        compare(&case, settings);
     }
     assert!(long > 250, "{long} orders had more than one happening");
+    assert!(hasty > 100, "{hasty} orders were there from the beginning");
 }

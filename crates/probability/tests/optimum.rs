@@ -7,7 +7,7 @@ mod twin;
 use std::sync::Arc;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Body, Change, Condition, FactId, SnapAction};
+use elbowroom_model::ground::{Body, Change, Condition, SnapAction};
 use elbowroom_plan::{InstanceId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
 use elbowroom_probability::optimum::{DeadEnds, Horizon, Move, Perturbed, Settings};
@@ -76,9 +76,8 @@ fn the_optimum_is_that_of_a_plain_recursion() {
             Semantics::World,
         );
         let model = model.unwrap();
-        let state: Vec<bool> = (0..case.task.fact_count())
-            .map(|at| case.circumstances.belief.probability(fact(at)) > 0.5)
-            .collect();
+        let is_true = |fact| case.circumstances.belief.probability(fact) > 0.5;
+        let state: Vec<bool> = case.facts().map(is_true).collect();
         for count in 0..4 {
             let mut values = Vec::new();
             for patience in [None, Some(1), Some(2)] {
@@ -157,10 +156,6 @@ fn without(running: &[InstanceId], id: InstanceId) -> Vec<InstanceId> {
     others.collect()
 }
 
-fn fact(index: usize) -> FactId {
-    FactId(u32::try_from(index).unwrap())
-}
-
 /// The best chance of success with so much left.
 fn best(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     if running.is_empty() && holds(case.task.goal(), state) {
@@ -221,8 +216,8 @@ fn steps_from<'c>(
 /// The value after every fact has had its chance to change.
 fn perturbed(case: &Case, state: &[bool], running: &[InstanceId], left: Left) -> f64 {
     let mut worlds = vec![(Vec::new(), 1.0)];
-    for (at, &is_true) in state.iter().enumerate() {
-        let flip = case.likelihoods.flip(&case.task, fact(at)).unwrap();
+    for (fact, &is_true) in case.facts().zip(state) {
+        let flip = case.likelihoods.flip(&case.task, fact).unwrap();
         let p = flip.after(f64::from(u8::from(is_true)));
         worlds = worlds
             .into_iter()
@@ -261,20 +256,11 @@ fn effects(
     let mut outcomes = vec![(state.to_vec(), 1.0)];
     let mut done = Vec::new();
     for wanted in [false, true] {
-        for effect in &snap.effects {
-            let (fact, makes_true) = match effect.change {
-                Change::Add(fact) => (fact, true),
-                Change::Delete(fact) => (fact, false),
-                Change::Update { .. } => continue,
-            };
+        for (fact, makes_true, p) in case.fact_effects(action, snap) {
             if makes_true != wanted || done.contains(&(fact, makes_true)) {
                 continue;
             }
             done.push((fact, makes_true));
-            let chance = case
-                .likelihoods
-                .effect(&case.task, action, fact, makes_true);
-            let p = chance.unwrap();
             outcomes = outcomes
                 .into_iter()
                 .flat_map(|(state, weight)| {

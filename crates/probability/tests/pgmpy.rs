@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use elbowroom_model::ground::{Body, Change, Condition, FactId};
+use elbowroom_model::ground::{Body, Condition, FactId};
 use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::{Model, PrunedNetwork, Semantics};
 use rand::SeedableRng;
@@ -183,9 +183,7 @@ fn exact_inference_of_the_whole_network_gives_the_same() {
 
 /// The network as the script reads it; `None` for what the script does not know.
 fn described(case: &Case, order: &[NodeId]) -> Option<String> {
-    let facts: Vec<FactId> = (0..case.task.fact_count())
-        .map(|at| FactId(u32::try_from(at).unwrap()))
-        .collect();
+    let facts: Vec<FactId> = case.facts().collect();
     let joined = |parts: Vec<String>| format!("[{}]", parts.join(","));
     let belief = facts
         .iter()
@@ -219,20 +217,15 @@ fn described(case: &Case, order: &[NodeId]) -> Option<String> {
             }
         };
         literals(&snap.condition, at, &mut needs)?;
+        let fact_effects = case.fact_effects(action, snap);
+        if fact_effects.len() < snap.effects.len() {
+            return None;
+        }
         let mut effects: Vec<(FactId, f64)> = Vec::new();
-        for effect in &snap.effects {
-            let (fact, makes_true) = match effect.change {
-                Change::Add(fact) => (fact, true),
-                Change::Delete(fact) => (fact, false),
-                Change::Update { .. } => return None,
-            };
+        for (fact, makes_true, p) in fact_effects {
             if effects.iter().any(|(other, _)| *other == fact) {
                 return None;
             }
-            let p = case
-                .likelihoods
-                .effect(&case.task, action, fact, makes_true)
-                .unwrap();
             effects.push((fact, if makes_true { p } else { 1.0 - p }));
         }
         let success = if is_end {

@@ -1,7 +1,10 @@
 //! Proportions and means of many runs.
 
+use serde::{Deserialize, Serialize};
+
 /// So many of so many.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Proportion {
     /// How many succeeded.
     pub successes: u64,
@@ -47,7 +50,8 @@ impl Proportion {
 }
 
 /// A mean of whole numbers, kept exactly, so that parts add up to the whole in any order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Mean {
     /// The sum.
     pub sum: u64,

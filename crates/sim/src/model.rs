@@ -171,6 +171,12 @@ impl WorldModel {
             .map(|amount| &amount.rule)
     }
 
+    /// Whether an action fails.
+    pub fn fails(&self, action: &str, rng: &mut impl Rng) -> bool {
+        let failing = self.failing(action);
+        failing.is_some_and(|failing| rng.random::<f64>() < failing.probability)
+    }
+
     /// How often an action fails.
     pub fn failing(&self, action: &str) -> Option<&Failing> {
         let mut rules = self.failures.iter().rev();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use elbowroom::compare::{self, Experiment, Part, Results};
-use elbowroom::perturbed::{self, PerturbedExperiment};
+use elbowroom::perturbed::{self, PerturbedExperiment, PerturbedResults};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::CompareArgs;
@@ -55,26 +55,59 @@ fn perturbed(
     text: &str,
     file: &dyn Fn(&str) -> Result<String, String>,
 ) -> Answer {
-    if arguments.json || arguments.shard.is_some() || !arguments.merge.is_empty() {
-        return Err(Failure::new(
-            "experiments in perturbed worlds are not split, and are written as tables only",
-            "leave out --json, --shard and --merge; with -o they are written as CSV, too",
-        ));
-    }
     let wrong = |error| Failure::new(format!("{name}: {error}"), "");
     let experiment = PerturbedExperiment::read(text, file).map_err(wrong)?;
-    let interrupt = Interrupt::listen();
-    let go_on = || !interrupt.is_requested();
-    let trials = arguments.trials.unwrap_or(experiment.trials);
-    let rows = perturbed::run(&experiment, trials, arguments.jobs, &go_on).map_err(wrong)?;
-    let table = perturbed::table(&experiment, &rows);
+    let results = if arguments.merge.is_empty() {
+        let (shard, shards) = arguments.shard.unwrap_or((0, 1));
+        let part = Part {
+            trials: arguments.trials.unwrap_or(experiment.trials),
+            shard,
+            shards,
+            jobs: arguments.jobs,
+        };
+        let interrupt = Interrupt::listen();
+        perturbed::run(&experiment, part, &|| !interrupt.is_requested()).map_err(wrong)?
+    } else {
+        merged_perturbed(&arguments.merge, &experiment)?
+    };
+    let table = perturbed::table(&results);
     if let Some(folder) = &arguments.output {
         make_folder(folder)?;
-        output::write_file(&folder.join("table.md"), &table.markdown())?;
-        output::write_file(&folder.join("table.csv"), &table.csv())?;
+        let write = |name: &str, text: &str| output::write_file(&folder.join(name), text);
+        write("results.json", &format!("{:#}\n", results.json()))?;
+        write("table.md", &table.markdown())?;
+        write("table.csv", &table.csv())?;
+        for (name, plot) in perturbed::plots(&results) {
+            let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
+            write(&format!("{name}.svg"), &svg)?;
+        }
     }
-    output::print(&table.plain())?;
+    if arguments.json {
+        output::print_json(&results.json())?;
+    } else {
+        output::print(&table.plain())?;
+    }
     Ok(Exit::Yes)
+}
+
+fn merged_perturbed(
+    paths: &[PathBuf],
+    experiment: &PerturbedExperiment,
+) -> Result<PerturbedResults, Failure> {
+    let mut parts = Vec::new();
+    for path in paths {
+        let text = input::source(path, "results")?;
+        let wrong = |error| Failure::new(format!("{}: {error}", path.display()), "");
+        let part = PerturbedResults::read(text.text()).map_err(wrong)?;
+        if !part.are_of(experiment) {
+            return Err(Failure::new(
+                format!("{} is not of this experiment", path.display()),
+                "give the results of its parts, made from the same files",
+            ));
+        }
+        parts.push(part);
+    }
+    PerturbedResults::merged(&parts).map_err(|error| Failure::new(error, ""))
 }
 
 fn make(arguments: &CompareArgs, experiment: &Experiment) -> Result<Results, Failure> {

@@ -1,5 +1,6 @@
 //! `elbowroom run`: execute a plan in a world.
 
+mod planner;
 mod process;
 mod realtime;
 mod replay;
@@ -8,26 +9,26 @@ mod trace_file;
 
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, Embedded, WholeRegion};
-use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execute::{Analyst, WholeRegion};
+use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
 };
-use elbowroom::execution::{NoPlanner, Planner, World};
+use elbowroom::execution::{Odds, Planner, Recorder, World};
 use elbowroom::flow;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::Source;
-use elbowroom::planner::embedded;
+use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::report::trace;
 use elbowroom::sim::{SimWorld, Unreliable, WorldModel};
 use serde_json::{Value, json};
 
-use crate::args::{PlannerChoice, RunArgs, RunningChoice};
-use crate::clock::Clock;
+use crate::args::{RunArgs, RunningChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::{self, AnyPlan};
 use crate::output;
+use planner::Who;
 use realtime::Realtime;
 use trace_file::TraceFile;
 
@@ -39,6 +40,8 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new("DOMAIN and PROBLEM are missing", ""));
     };
+    // A misspelt planner is told before files are read.
+    let who = Who::named(arguments)?;
     let texts = Texts {
         domain: input::source(domain, "domain")?,
         problem: input::source(problem, "problem")?,
@@ -48,31 +51,33 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         Some(path) => Some(time_triggered(&mut task, path)?),
         None => None,
     };
-    let choices = Choices::of(arguments)?;
+    let likelihoods = likelihoods_text(arguments)?;
+    let choices = Choices::of(arguments, likelihoods.as_ref(), &task)?;
+    who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
-    let task = Arc::new(task);
-    let header = header(arguments, &texts, world.as_deref());
+    let header = header(arguments, &texts, world.as_deref(), likelihoods.as_ref());
+    let job = Job {
+        arguments,
+        texts,
+        choices,
+        who,
+        task: Arc::new(task),
+        first,
+    };
     let report = {
         let mut sink = |line: &str| file.write(line);
-        let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
+        let mut writer = trace::TraceWriter::new(Arc::clone(&job.task), &mut sink);
         writer.header(header);
         match &arguments.world_process {
             Some(command) => {
-                let mut world =
-                    process::ProcessWorld::start(command, &task, &arguments.answer_within)?;
-                let report = choices.run(arguments, &task, first.as_ref(), &mut world, &mut writer);
+                let within = &arguments.answer_within;
+                let mut world = process::ProcessWorld::start(command, &job.task, within)?;
+                let report = job.run(&mut world, None, &mut writer);
                 world.stop();
                 report
             }
-            None => simulated(
-                arguments,
-                &choices,
-                &task,
-                first.as_ref(),
-                world.as_deref(),
-                &mut writer,
-            )?,
+            None => job.simulated(world.as_deref(), &mut writer)?,
         }
     };
     file.close()?;
@@ -82,6 +87,68 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         output::print(&text::human(&report))?;
     }
     exit(&report.verdict)
+}
+
+/// Everything that a run needs but the world.
+struct Job<'a> {
+    arguments: &'a RunArgs,
+    texts: Texts,
+    choices: Choices,
+    who: Who,
+    task: Arc<Task>,
+    first: Option<TimeTriggeredPlan>,
+}
+
+impl Job<'_> {
+    /// A run in a world; `model` is what is known of it.
+    fn run(
+        &self,
+        world: &mut dyn World,
+        model: Option<&WorldModel>,
+        recorder: &mut dyn Recorder,
+    ) -> Report {
+        let (choices, first) = (&self.choices, self.first.as_ref());
+        let run =
+            |planning: Planning<'_>| choices.run_with(&self.task, first, world, planning, recorder);
+        self.who
+            .with(self.arguments, &self.texts, choices, model, run)
+    }
+
+    fn simulated(
+        &self,
+        world: Option<&str>,
+        recorder: &mut dyn Recorder,
+    ) -> Result<Report, Failure> {
+        let arguments = self.arguments;
+        let model = match world {
+            Some(text) => WorldModel::read(text, self.task.problem()).map_err(|error| {
+                let path = arguments
+                    .world
+                    .as_deref()
+                    .unwrap_or(std::path::Path::new("-"));
+                Failure::new(
+                    format!("{}, {error}", path.display()),
+                    "docs/formats/world.md describes world files",
+                )
+            })?,
+            None => WorldModel::as_planned(),
+        };
+        let sim = SimWorld::new(Arc::clone(&self.task), &model, arguments.seed);
+        let (reports, resolution) = (model.reports.clone(), model.resolution.clone());
+        let mut plain;
+        let mut unreliable;
+        let world: &mut dyn World = if reports.is_perfect() {
+            plain = sim;
+            &mut plain
+        } else {
+            unreliable = Unreliable::new(sim, reports, arguments.seed, resolution);
+            &mut unreliable
+        };
+        Ok(match &arguments.realtime {
+            None => self.run(world, Some(&model), recorder),
+            Some(factor) => self.run(&mut Realtime::new(world, factor), Some(&model), recorder),
+        })
+    }
 }
 
 /// Domain and problem as they stand in their files.
@@ -97,16 +164,24 @@ impl Texts {
     }
 }
 
+/// Who makes plans, and who knows of likelier ones.
+pub(super) struct Planning<'a> {
+    pub(super) planner: &'a mut dyn Planner,
+    pub(super) odds: Option<Box<dyn Odds>>,
+}
+
 /// How to run, from the command line.
 pub(super) struct Choices {
     pub(super) executor: ExecutorSpec,
     pub(super) settings: RunSettings,
     pub(super) flow: flow::Settings,
+    /// Certain, unless there is a file.
+    pub(super) likelihoods: Arc<Likelihoods>,
 }
 
 impl Choices {
-    fn of(arguments: &RunArgs) -> Result<Self, Failure> {
-        Self::new(
+    fn of(arguments: &RunArgs, likelihoods: Option<&Source>, task: &Task) -> Result<Self, Failure> {
+        let choices = Self::new(
             &arguments.executor,
             &arguments.vary,
             &arguments.precision,
@@ -122,7 +197,26 @@ impl Choices {
                 time_limit: arguments.time_limit.clone(),
                 ..RunSettings::default()
             },
-        )
+        )?;
+        match likelihoods {
+            Some(text) => choices.with_likelihoods(text, task),
+            None => Ok(choices),
+        }
+    }
+
+    /// Goes by these likelihoods.
+    pub(super) fn with_likelihoods(self, text: &Source, task: &Task) -> Result<Self, Failure> {
+        let read = likelihoods::read(text.text().as_bytes(), task);
+        let likelihoods = read.map_err(|error| {
+            Failure::new(
+                format!("{}, {error}", text.name()),
+                "docs/formats/likelihoods.md describes likelihood files",
+            )
+        })?;
+        Ok(Self {
+            likelihoods: Arc::new(likelihoods),
+            ..self
+        })
     }
 
     pub(super) fn new(
@@ -148,34 +242,8 @@ impl Choices {
             executor,
             settings,
             flow,
+            likelihoods: Arc::new(Likelihoods::certain()),
         })
-    }
-
-    fn run(
-        &self,
-        arguments: &RunArgs,
-        task: &Arc<Task>,
-        first: Option<&TimeTriggeredPlan>,
-        world: &mut dyn World,
-        recorder: &mut dyn elbowroom::execution::Recorder,
-    ) -> Report {
-        let clock = Clock::start();
-        let seconds = || clock.seconds();
-        let mut none = NoPlanner;
-        let mut embedded = Embedded {
-            settings: embedded::Settings {
-                epsilon: self.settings.epsilon.clone(),
-                ..embedded::Settings::default()
-            },
-            most_states: arguments.planner_states,
-            improve_states: arguments.improve_states,
-            clock: Some(&seconds),
-        };
-        let planner: &mut dyn Planner = match arguments.planner {
-            PlannerChoice::Embedded => &mut embedded,
-            PlannerChoice::None => &mut none,
-        };
-        self.run_with(task, first, world, planner, recorder)
     }
 
     pub(super) fn run_with(
@@ -183,16 +251,20 @@ impl Choices {
         task: &Arc<Task>,
         first: Option<&TimeTriggeredPlan>,
         world: &mut dyn World,
-        planner: &mut dyn Planner,
-        recorder: &mut dyn elbowroom::execution::Recorder,
+        planning: Planning<'_>,
+        recorder: &mut dyn Recorder,
     ) -> Report {
         let mut analyst = Analyst::new(self.flow.clone());
-        let mut executor = self.executor.build(Box::new(WholeRegion {
-            epsilon: self.settings.epsilon.clone(),
-        }));
+        let mut executor = self.executor.build(Means {
+            region: Box::new(WholeRegion {
+                epsilon: self.settings.epsilon.clone(),
+            }),
+            likelihoods: Arc::clone(&self.likelihoods),
+            odds: planning.odds,
+        });
         let ports = Ports {
             world,
-            planner,
+            planner: planning.planner,
             preparer: &mut analyst,
             executor: executor.as_mut(),
             need: self.executor.registered.need,
@@ -200,47 +272,6 @@ impl Choices {
         };
         run::run(Arc::clone(task), first, &self.settings, ports)
     }
-}
-
-fn simulated(
-    arguments: &RunArgs,
-    choices: &Choices,
-    task: &Arc<Task>,
-    first: Option<&TimeTriggeredPlan>,
-    world: Option<&str>,
-    recorder: &mut dyn elbowroom::execution::Recorder,
-) -> Result<Report, Failure> {
-    let model = match world {
-        Some(text) => WorldModel::read(text, task.problem()).map_err(|error| {
-            let path = arguments
-                .world
-                .as_deref()
-                .unwrap_or(std::path::Path::new("-"));
-            Failure::new(
-                format!("{}, {error}", path.display()),
-                "docs/formats/world.md describes world files",
-            )
-        })?,
-        None => WorldModel::as_planned(),
-    };
-    let sim = SimWorld::new(Arc::clone(task), &model, arguments.seed);
-    let (reports, resolution) = (model.reports.clone(), model.resolution.clone());
-    let mut plain;
-    let mut unreliable;
-    let world: &mut dyn World = if reports.is_perfect() {
-        plain = sim;
-        &mut plain
-    } else {
-        unreliable = Unreliable::new(sim, reports, arguments.seed, resolution);
-        &mut unreliable
-    };
-    Ok(match &arguments.realtime {
-        None => choices.run(arguments, task, first, world, recorder),
-        Some(factor) => {
-            let mut world = Realtime::new(world, factor);
-            choices.run(arguments, task, first, &mut world, recorder)
-        }
-    })
 }
 
 fn time_triggered(task: &mut Task, path: &std::path::Path) -> Result<TimeTriggeredPlan, Failure> {
@@ -261,6 +292,12 @@ fn world_text(arguments: &RunArgs) -> Result<Option<String>, Failure> {
     Ok(Some(source.text().to_owned()))
 }
 
+fn likelihoods_text(arguments: &RunArgs) -> Result<Option<Source>, Failure> {
+    let path = arguments.likelihoods.as_deref();
+    path.map(|path| input::source(path, "likelihoods"))
+        .transpose()
+}
+
 fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
     if text == "measured" {
         return Ok(PlanningTime::Measured);
@@ -275,16 +312,25 @@ fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
 }
 
 /// Everything that the run depends on, so that it can be played back.
-fn header(arguments: &RunArgs, texts: &Texts, world: Option<&str>) -> Value {
+fn header(
+    arguments: &RunArgs,
+    texts: &Texts,
+    world: Option<&str>,
+    likelihoods: Option<&Source>,
+) -> Value {
     let source = |source: &Source| json!({ "name": source.name(), "text": source.text() });
     json!({
         "domain": source(&texts.domain),
         "problem": source(&texts.problem),
         "world": world,
         "world_process": arguments.world_process,
+        "planner": arguments.planner,
+        "likelihoods": likelihoods.map(source),
         "has_plan": arguments.plan.is_some(),
         "executor": arguments.executor,
         "seed": arguments.seed,
+        "planner_states": arguments.planner_states,
+        "improve_states": arguments.improve_states,
         "vary": arguments.vary,
         "precision": arguments.precision.to_string(),
         "running": format!("{:?}", arguments.running).to_lowercase(),

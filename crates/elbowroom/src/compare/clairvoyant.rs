@@ -6,13 +6,13 @@
 
 use elbowroom_execution::{PlanAnswer, Planner};
 use elbowroom_model::problem::{
-    Body, Change, Comparison, DurationConstraint, Expression, Fluent, Function, FunctionId,
-    ObjectId, Problem, Schema, SchemaId, Term,
+    Body, Change, Expression, ObjectId, Problem, Schema, SchemaId, Term,
 };
 use elbowroom_model::{Situation, Task};
-use elbowroom_num::Rational;
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, WorldModel};
+
+use crate::execute::rewrite::{add_function_of, set_durations};
 
 /// Whether a plan reaches the goal when the world of that seed is known in advance.
 pub(super) fn can_reach(
@@ -34,42 +34,13 @@ fn with_foreknowledge(task: &Task, world: &WorldModel, seed: u64) -> Problem {
     let mut problem = task.problem().clone();
     for index in 0..problem.schemas.len() {
         let schema = SchemaId::from(index);
-        know_duration(task, world, seed, schema, &mut problem);
+        set_durations(task, schema, &mut problem, &|name, planned| {
+            let mut rng = keyed(seed, name, 0, Purpose::Duration);
+            world.duration(name, planned, &mut rng)
+        });
         know_amounts(task, world, seed, schema, &mut problem);
     }
     problem
-}
-
-fn know_duration(
-    task: &Task,
-    world: &WorldModel,
-    seed: u64,
-    schema: SchemaId,
-    problem: &mut Problem,
-) {
-    let Body::Durative { duration, .. } = &problem.schemas[schema.index()].body else {
-        return;
-    };
-    // Where the plan has a say in the duration, it keeps it.
-    let [
-        DurationConstraint {
-            comparison: Comparison::Equal,
-            bound: Expression::Constant(planned),
-            ..
-        },
-    ] = duration.as_slice()
-    else {
-        return;
-    };
-    let planned = planned.clone();
-    let value = |name: &str| {
-        let mut rng = keyed(seed, name, 0, Purpose::Duration);
-        Some(world.duration(name, &planned, &mut rng))
-    };
-    let known = add_function(task, schema, "duration", problem, &value);
-    if let Body::Durative { duration, .. } = &mut problem.schemas[schema.index()].body {
-        duration[0].bound = known;
-    }
 }
 
 fn know_amounts(
@@ -132,60 +103,4 @@ fn effects(schema: &mut Schema, place: u64) -> Option<&mut Vec<elbowroom_model::
         (Body::Durative { end_effects, .. }, 1) => Some(end_effects),
         _ => None,
     }
-}
-
-fn add_function(
-    task: &Task,
-    schema: SchemaId,
-    what: &str,
-    problem: &mut Problem,
-    value: &dyn Fn(&str) -> Option<Rational>,
-) -> Expression {
-    add_function_of(task, schema, what, problem, &|name, _| value(name))
-}
-
-/// A function of the schema's parameters, with a value for each of its instances.
-fn add_function_of(
-    task: &Task,
-    schema: SchemaId,
-    what: &str,
-    problem: &mut Problem,
-    value: &dyn Fn(&str, &[ObjectId]) -> Option<Rational>,
-) -> Expression {
-    let lifted = problem.schemas[schema.index()].clone();
-    let function = FunctionId::from(problem.functions.len());
-    problem.functions.push(Function {
-        // No PDDL name has a space, so none is the same.
-        name: format!("{} {what}", lifted.name),
-        parameters: lifted.parameters.clone(),
-    });
-    for arguments in instances(&lifted, problem) {
-        let name = task.action_name(schema, &arguments);
-        if let Some(value) = value(&name, &arguments) {
-            problem.initial_values.push((function, arguments, value));
-        }
-    }
-    Expression::Fluent(Fluent {
-        function,
-        arguments: (0..lifted.parameters.len()).map(Term::Variable).collect(),
-    })
-}
-
-/// All arguments of fitting types.
-fn instances(schema: &Schema, problem: &Problem) -> Vec<Vec<ObjectId>> {
-    let mut instances: Vec<Vec<ObjectId>> = vec![Vec::new()];
-    for parameter in &schema.parameters {
-        let objects: Vec<ObjectId> = problem.objects_of(&parameter.types).collect();
-        instances = instances
-            .iter()
-            .flat_map(|instance| {
-                objects.iter().map(move |object| {
-                    let mut longer = instance.clone();
-                    longer.push(*object);
-                    longer
-                })
-            })
-            .collect();
-    }
-    instances
 }

@@ -35,12 +35,30 @@ pub struct Experiment {
     pub settings: RunSettings,
     /// How close to its limit each end of an envelope should come.
     pub precision: Rational,
+    /// Who makes plans.
+    pub planner: Planning,
     /// How many states the planner looks at for one plan.
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
     /// Figures to stand beside ours.
     pub published: Vec<Published>,
+}
+
+/// Who makes plans.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Planning {
+    /// The embedded planner.
+    #[default]
+    Embedded,
+    /// Another program, as in `elbowroom plan --planner`. What it answers may depend on how fast
+    /// the machine is.
+    Another {
+        /// Its name, or its command line.
+        name: String,
+        /// How long it may go on to better plans; if nothing is said, its first plan is taken.
+        seconds: Option<Rational>,
+    },
 }
 
 /// A column of the table.
@@ -123,6 +141,8 @@ struct File {
     planning_time: Option<Spanned<toml::Value>>,
     max_replans: Option<usize>,
     precision: Option<Spanned<f64>>,
+    planner: Option<Spanned<String>>,
+    planner_time: Option<Spanned<f64>>,
     planner_states: Option<u64>,
     improve_states: Option<u64>,
     #[serde(default)]
@@ -209,6 +229,9 @@ impl Experiment {
         let settings = read
             .settings()
             .map_err(|(at, message)| wrong(at, message))?;
+        let planner = read
+            .planning()
+            .map_err(|(at, message)| wrong(at, message))?;
         let precision = match &read.precision {
             None => Rational::ONE,
             Some(given) => exact(*given.get_ref())
@@ -232,6 +255,7 @@ impl Experiment {
             seed: read.seed,
             settings,
             precision,
+            planner,
             planner_states: read.planner_states.unwrap_or(20_000),
             improve_states: read.improve_states.unwrap_or(20_000),
             published: read
@@ -281,6 +305,27 @@ impl Experiment {
 pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
 
 impl File {
+    fn planning(&self) -> Result<Planning, (usize, String)> {
+        let seconds = match &self.planner_time {
+            None => None,
+            Some(given) => {
+                let seconds = exact(*given.get_ref()).filter(Rational::is_positive);
+                let wrong = || (given.span().start, "it must be positive".to_owned());
+                Some(seconds.ok_or_else(wrong)?)
+            }
+        };
+        match &self.planner {
+            Some(name) if name.get_ref() != EMBEDDED => {
+                known(name.get_ref()).map_err(|message| (name.span().start, message))?;
+                Ok(Planning::Another {
+                    name: name.get_ref().clone(),
+                    seconds,
+                })
+            }
+            _ => Ok(Planning::Embedded),
+        }
+    }
+
     fn settings(&self) -> Result<RunSettings, (usize, String)> {
         let mut settings = RunSettings::default();
         if let Some(running) = &self.running {
@@ -308,6 +353,22 @@ impl File {
         }
         Ok(settings)
     }
+}
+
+/// The planner that is always there.
+const EMBEDDED: &str = "embedded";
+
+/// Whether there is such a planner; if not, which there are.
+#[cfg(feature = "external")]
+fn known(name: &str) -> Result<(), String> {
+    let found = elbowroom_planner::external::Planner::named(name);
+    found.map(|_| ()).map_err(|error| error.to_string())
+}
+
+/// Whether there is such a planner; if not, which there are.
+#[cfg(not(feature = "external"))]
+fn known(_name: &str) -> Result<(), String> {
+    Err("this program has no planner but `embedded`".to_owned())
 }
 
 /// The value of that name; or where the name stands, and what it may be.

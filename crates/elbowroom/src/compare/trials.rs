@@ -2,16 +2,20 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{self, Ports, Report, Verdict};
+use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::run::{self, PlanningTime, Ports, Report, Verdict};
 use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
 use elbowroom_sim::{SimWorld, Unreliable, WorldModel};
 
-use super::{Column, Experiment, ExperimentError, Part, Results, clairvoyant};
-use crate::execute::{Analyst, Embedded, RememberingPlanner, RememberingPreparer, WholeRegion};
+use super::{Column, Experiment, ExperimentError, Part, Planning, Results, clairvoyant};
+use crate::execute::{
+    Analyst, Embedded, Likeliest, RememberingPlanner, RememberingPreparer, SharedLikeliest,
+    WholeRegion,
+};
 use crate::flow;
 
 /// How many plans are remembered for one problem: some megabytes.
@@ -31,10 +35,10 @@ pub(super) struct Setting<'a> {
 }
 
 /// What all trials of a problem have in common.
-struct Common {
+struct Common<'a> {
     task: Arc<Task>,
     first: TimeTriggeredPlan,
-    planner: RememberingPlanner<Embedded<'static>>,
+    planner: RememberingPlanner<Box<dyn Planner + 'a>>,
     columns: Vec<Place>,
 }
 
@@ -42,18 +46,23 @@ struct Common {
 struct Place {
     world: WorldModel,
     preparer: RememberingPreparer<Analyst>,
+    /// For executors that look for likelier plans: who makes them, and the same with a memory.
+    odds: SharedLikeliest,
+    likeliest: RememberingPlanner<SharedLikeliest>,
 }
 
 impl Setting<'_> {
-    /// Makes the trials of a part. `tell` is called after each, and says whether to go on.
+    /// Makes the trials of a part. `tell` is called after each, and says whether to go on;
+    /// `goes_on` says so in between.
     pub(super) fn run(
         &self,
         part: Part,
         tell: &(dyn Fn() -> bool + Sync),
+        goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Results, ExperimentError> {
         let experiment = self.experiment;
         let mut results = Results::empty(experiment, part);
-        let mut common = self.common()?;
+        let mut common = self.common(goes_on)?;
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
                 self.trial(trial, column, &mut common, &mut results);
@@ -66,10 +75,18 @@ impl Setting<'_> {
     }
 
     /// Reads the problem, makes the first plan, and makes it ready for all executors.
-    fn common(&self) -> Result<Common, ExperimentError> {
-        let mut task = self.task()?;
+    fn common<'a>(
+        &self,
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Common<'a>, ExperimentError> {
+        let (domain, problem) = self.texts()?;
+        let mut task = match elbowroom_pddl::read_problem(&domain, &problem) {
+            Ok((problem, _)) => Task::new(problem),
+            Err(diagnostics) => return Err(ExperimentError::other(diagnostics.render(false))),
+        };
         let situation = Situation::initial(&task);
-        let first = match self.planner().plan(&mut task, &situation).answer {
+        let mut planner = self.planner(domain, problem, goes_on)?;
+        let first = match planner.plan(&mut task, &situation).answer {
             PlanAnswer::Plan(plan) => plan,
             PlanAnswer::Unsolvable => {
                 return Err(self.wrong("no plan exists, so there is nothing to execute"));
@@ -81,7 +98,7 @@ impl Setting<'_> {
         let columns = columns.map(|column| self.place(column, &task, &first));
         Ok(Common {
             columns: columns.collect::<Result<_, _>>()?,
-            planner: RememberingPlanner::new(self.planner(), PLANS),
+            planner: RememberingPlanner::new(planner, PLANS),
             task,
             first,
         })
@@ -102,11 +119,22 @@ impl Setting<'_> {
                 .prepare(task, first, spec.registered.need)
                 .map_err(|why| self.wrong(&why))?;
         }
-        Ok(Place { world, preparer })
+        let planning_time = match &self.experiment.settings.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        };
+        let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
+        let odds = SharedLikeliest::new(odds);
+        Ok(Place {
+            world,
+            preparer,
+            likeliest: RememberingPlanner::new(odds.clone(), PLANS),
+            odds,
+        })
     }
 
     /// Every executor in the same world.
-    fn trial(&self, trial: u64, column: usize, common: &mut Common, results: &mut Results) {
+    fn trial(&self, trial: u64, column: usize, common: &mut Common<'_>, results: &mut Results) {
         // The same seed in all columns: their worlds differ only where the columns do.
         let seed = self
             .experiment
@@ -126,7 +154,7 @@ impl Setting<'_> {
             let world = &common.columns[column].world;
             // What somebody reached without knowing can be reached knowing.
             let is_possible = reached.contains(&true)
-                || clairvoyant::can_reach(&common.task, world, seed, &mut self.planner());
+                || clairvoyant::can_reach(&common.task, world, seed, &mut self.embedded());
             let cell = &mut results.cells[reached.len()][column];
             cell.runs += 1;
             cell.successes += u64::from(is_possible);
@@ -144,10 +172,15 @@ impl Setting<'_> {
         seed: u64,
         spec: &ExecutorSpec,
         column: usize,
-        common: &mut Common,
+        common: &mut Common<'_>,
     ) -> Report {
         let settings = &self.experiment.settings;
-        let Place { world, preparer } = &mut common.columns[column];
+        let Place {
+            world,
+            preparer,
+            odds,
+            likeliest,
+        } = &mut common.columns[column];
         let sim = SimWorld::new(Arc::clone(&common.task), world, seed);
         let (mut plain, mut unreliable);
         let world: &mut dyn World = if world.reports.is_perfect() {
@@ -158,12 +191,19 @@ impl Setting<'_> {
             unreliable = Unreliable::new(sim, reports, seed, world.resolution.clone());
             &mut unreliable
         };
-        let mut executor = spec.build(Box::new(WholeRegion {
+        let region = Box::new(WholeRegion {
             epsilon: settings.epsilon.clone(),
-        }));
+        });
+        let asks_odds = spec.asks_odds();
+        let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
+        let mut executor = spec.build(Means::from(region).with_odds(odds));
         let ports = Ports {
             world,
-            planner: &mut common.planner,
+            planner: if asks_odds {
+                likeliest
+            } else {
+                &mut common.planner
+            },
             preparer,
             executor: executor.as_mut(),
             need: spec.registered.need,
@@ -177,7 +217,28 @@ impl Setting<'_> {
         )
     }
 
-    fn planner(&self) -> Embedded<'static> {
+    fn planner<'a>(
+        &self,
+        domain: Source,
+        problem: Source,
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
+        match &self.experiment.planner {
+            Planning::Embedded => Ok(Box::new(self.embedded())),
+            #[cfg(not(feature = "external"))]
+            Planning::Another { name, .. } => {
+                let _ = (domain, problem, goes_on);
+                Err(self.wrong(&format!("this program cannot start `{name}`")))
+            }
+            #[cfg(feature = "external")]
+            Planning::Another { name, seconds } => {
+                let epsilon = &self.experiment.settings.epsilon;
+                another(name, seconds.as_ref(), epsilon, domain, problem, goes_on)
+            }
+        }
+    }
+
+    fn embedded(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings {
                 epsilon: self.experiment.settings.epsilon.clone(),
@@ -199,8 +260,8 @@ impl Setting<'_> {
         flow
     }
 
-    /// The problem with its blanks filled in.
-    fn task(&self) -> Result<Task, ExperimentError> {
+    /// The domain, and the problem with its blanks filled in.
+    fn texts(&self) -> Result<(Source, Source), ExperimentError> {
         let mut text = self.experiment.problem.clone();
         for (name, value) in self.filling {
             let blank = format!("{{{name}}}");
@@ -210,11 +271,7 @@ impl Setting<'_> {
             text = text.replace(&blank, value);
         }
         let domain = Source::new("domain", self.experiment.domain.as_str());
-        let problem = Source::new("problem", text.as_str());
-        match elbowroom_pddl::read_problem(&domain, &problem) {
-            Ok((problem, _)) => Ok(Task::new(problem)),
-            Err(diagnostics) => Err(ExperimentError::other(diagnostics.render(false))),
-        }
+        Ok((domain, Source::new("problem", text.as_str())))
     }
 
     fn wrong(&self, message: &str) -> ExperimentError {
@@ -227,4 +284,34 @@ impl Setting<'_> {
             filling.join(", ")
         ))
     }
+}
+
+/// Another program.
+#[cfg(feature = "external")]
+fn another<'a>(
+    name: &str,
+    seconds: Option<&Rational>,
+    epsilon: &Rational,
+    domain: Source,
+    problem: Source,
+    goes_on: &'a (dyn Fn() -> bool + Sync),
+) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
+    use std::time::Duration;
+
+    use elbowroom_planner::external;
+
+    let planner = external::Planner::named(name);
+    let seconds = seconds.map(|seconds| Duration::from_secs_f64(seconds.to_f64().min(1e9)));
+    Ok(Box::new(crate::execute::External {
+        planner: planner.map_err(|error| ExperimentError::other(error.to_string()))?,
+        domain,
+        problem,
+        settings: external::Settings {
+            epsilon: epsilon.clone(),
+            time_limit: Some(seconds.unwrap_or(Duration::from_secs(60))),
+            ..external::Settings::default()
+        },
+        takes_first: seconds.is_none(),
+        goes_on,
+    }))
 }

@@ -132,9 +132,9 @@ impl<P: Preparer> Preparer for RememberingPreparer<P> {
         if *self.table.get_or_insert(table) != table {
             return self.preparer.prepare(task, plan, need);
         }
-        let times: Vec<&Rational> = plan.steps.iter().map(|step| &step.start).collect();
+        let starts: Vec<&Rational> = plan.steps.iter().map(|step| &step.start).collect();
         let timed: Vec<&Rational> = task.timed().iter().map(|timed| &timed.time).collect();
-        let hash = hash(&(need as u8, parts(task.initial()), times, timed));
+        let hash = hash(&(need as u8, parts(task.initial()), starts, timed));
         let known = self.memory.recall(hash, |known| {
             known.need == need
                 && known.plan == *plan

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use elbowroom_model::Task;
 use elbowroom_model::problem::PredicateId;
 use elbowroom_sim::perturbed::Perturbation;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The `format` of such files.
 const FORMAT: &str = "elbowroom-perturbed-experiment";
@@ -15,10 +15,6 @@ const FORMAT: &str = "elbowroom-perturbed-experiment";
 pub struct PerturbedExperiment {
     /// What it shows.
     pub title: String,
-    /// The domain, in PDDL.
-    pub domain: String,
-    /// The problem, in PDDL.
-    pub problem: String,
     /// Trials of each case, world and executor.
     pub trials: u64,
     /// Where the dice begin.
@@ -31,8 +27,8 @@ pub struct PerturbedExperiment {
     pub executors: Vec<ExecutorKind>,
     /// What changes by itself in the world as published.
     pub perturbation: Option<PerturbationNames>,
-    /// For the optimum: how many actions are under way at once at most.
-    pub most_running: usize,
+    /// Who plans.
+    pub planner: PlannerKind,
     /// The cases.
     pub cases: Vec<Case>,
 }
@@ -42,6 +38,12 @@ pub struct PerturbedExperiment {
 pub struct Case {
     /// What it is called.
     pub name: String,
+    /// The domain, in PDDL.
+    pub domain: String,
+    /// The problem, in PDDL.
+    pub problem: String,
+    /// For the optimum: how many actions are under way at once at most.
+    pub most_running: usize,
     /// A likelihood file (`docs/formats/likelihoods.md`).
     pub likelihoods: String,
     /// What others have measured in the world as published.
@@ -59,7 +61,7 @@ pub struct Published {
 }
 
 /// A model of a perturbed world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WorldKind {
     /// All draws are independent.
@@ -69,7 +71,7 @@ pub enum WorldKind {
 }
 
 /// An executor for worlds without time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExecutorKind {
     /// The baseline.
@@ -80,6 +82,18 @@ pub enum ExecutorKind {
     AsPublished,
     /// Whatever is best in the sound world.
     Lookahead,
+}
+
+/// Who plans, at the beginning and after a plan was given up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlannerKind {
+    /// As few actions as possible, one after the other; of several such plans the one whose
+    /// actions come first by schema and objects.
+    #[default]
+    Shortest,
+    /// The temporal planner that is built in.
+    Embedded,
 }
 
 impl WorldKind {
@@ -159,8 +173,8 @@ struct File {
     _format: String,
     version: u64,
     title: String,
-    domain: String,
-    problem: String,
+    domain: Option<String>,
+    problem: Option<String>,
     trials: u64,
     seed: u64,
     #[serde(default = "ten")]
@@ -169,6 +183,11 @@ struct File {
     executors: Vec<ExecutorKind>,
     perturbation: Option<PerturbationNames>,
     optimum: Option<OptimumFile>,
+    #[serde(default)]
+    planner: PlannerKind,
+    #[serde(default)]
+    include: Vec<String>,
+    #[serde(default)]
     case: Vec<CaseFile>,
 }
 
@@ -222,17 +241,18 @@ impl PerturbedExperiment {
                 "the world as published needs [perturbation], with `achieved` and `needed`",
             ));
         }
-        let file = |name: &str| file(name).map_err(PerturbedError::other);
-        let case = |case: CaseFile| {
-            Ok(Case {
-                likelihoods: file(&case.likelihoods)?,
-                name: case.name,
-                published: case.published,
-            })
-        };
+        let mut cases = Vec::new();
+        for name in &read.include {
+            let text = file(name).map_err(PerturbedError::other)?;
+            cases.extend(Self::included(name, &text, file)?);
+        }
+        cases.extend(own_cases(&read, file)?);
+        if cases.is_empty() {
+            return Err(PerturbedError::other(
+                "there are no cases; write [[case]], or `include` files that have some",
+            ));
+        }
         Ok(Self {
-            domain: file(&read.domain)?,
-            problem: file(&read.problem)?,
             title: read.title,
             trials: read.trials,
             seed: read.seed,
@@ -240,10 +260,56 @@ impl PerturbedExperiment {
             worlds: read.worlds,
             executors: read.executors,
             perturbation: read.perturbation,
-            most_running: read
-                .optimum
-                .map_or(usize::MAX, |optimum| optimum.most_running),
-            cases: read.case.into_iter().map(case).collect::<Result<_, _>>()?,
+            planner: read.planner,
+            cases,
         })
     }
+
+    /// The cases of another experiment.
+    fn included(
+        name: &str,
+        text: &str,
+        file: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Vec<Case>, PerturbedError> {
+        let wrong =
+            |error: &dyn std::fmt::Display| PerturbedError::other(format!("{name}: {error}"));
+        let read: File = toml::from_str(text).map_err(|error| wrong(&error))?;
+        if !read.include.is_empty() {
+            return Err(wrong(&"a file that is included cannot include others"));
+        }
+        own_cases(&read, file).map_err(|error| wrong(&error))
+    }
+}
+
+/// The cases that a file has itself, with the files that it names.
+fn own_cases(
+    read: &File,
+    file: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<Vec<Case>, PerturbedError> {
+    let file = |name: &str| file(name).map_err(PerturbedError::other);
+    let named = |name: &Option<String>, what: &str| match name {
+        Some(name) => file(name),
+        None => Err(PerturbedError::other(format!(
+            "there are cases, but no `{what}` that they are about"
+        ))),
+    };
+    if read.case.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (domain, problem) = (
+        named(&read.domain, "domain")?,
+        named(&read.problem, "problem")?,
+    );
+    let most_running = read.optimum.as_ref().map(|optimum| optimum.most_running);
+    let case = |case: &CaseFile| {
+        Ok(Case {
+            name: case.name.clone(),
+            domain: domain.clone(),
+            problem: problem.clone(),
+            most_running: most_running.unwrap_or(usize::MAX),
+            likelihoods: file(&case.likelihoods)?,
+            published: case.published.clone(),
+        })
+    };
+    read.case.iter().map(case).collect()
 }

@@ -1,15 +1,124 @@
 //! What trials in perturbed worlds came to.
 
-use std::fmt::Write as _;
-
 use elbowroom_execution::untimed::Trial;
 use elbowroom_report::statistics::{Mean, Proportion};
-use elbowroom_report::table::Table;
+use serde::{Deserialize, Serialize};
 
-use super::{Case, ExecutorKind, PerturbedExperiment, WorldKind};
+use super::{Case, ExecutorKind, PerturbedError, PerturbedExperiment, WorldKind};
+use crate::compare::Part;
+
+/// Counts by case, world and executor. Everything is a sum, so parts add up exactly, in any order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PerturbedResults {
+    format: String,
+    version: u64,
+    /// What the experiment shows.
+    pub title: String,
+    /// Distinguishes experiments, so that no apples are added to pears.
+    pub fingerprint: String,
+    /// How many trials of each row the whole has.
+    pub trials: u64,
+    /// Into how many parts it was split.
+    pub shards: u64,
+    /// Which parts are in here.
+    pub parts: Vec<u64>,
+    /// The rows: case by case, world by world.
+    pub rows: Vec<Row>,
+}
+
+const FORMAT: &str = "elbowroom-perturbed-results";
+
+impl PerturbedResults {
+    pub(super) fn new(experiment: &PerturbedExperiment, part: Part, rows: Vec<Row>) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            version: 1,
+            title: experiment.title.clone(),
+            fingerprint: fingerprint(experiment, part.trials),
+            trials: part.trials,
+            shards: part.shards,
+            parts: vec![part.shard],
+            rows,
+        }
+    }
+
+    /// Reads results as JSON.
+    ///
+    /// # Errors
+    /// When they are none.
+    pub fn read(text: &str) -> Result<Self, PerturbedError> {
+        let results: Self = serde_json::from_str(text)
+            .map_err(|error| PerturbedError::other(format!("no results: {error}")))?;
+        if results.format != FORMAT || results.version != 1 {
+            return Err(PerturbedError::other(format!(
+                "this program reads {FORMAT}, version 1"
+            )));
+        }
+        Ok(results)
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Whether these are results of that experiment, with any number of trials.
+    pub fn are_of(&self, experiment: &PerturbedExperiment) -> bool {
+        self.fingerprint == fingerprint(experiment, self.trials)
+    }
+
+    /// Puts parts of one experiment together.
+    ///
+    /// # Errors
+    /// When they are parts of different ones, or the same part comes twice.
+    pub fn merged(parts: &[Self]) -> Result<Self, PerturbedError> {
+        let Some((first, rest)) = parts.split_first() else {
+            return Err(PerturbedError::other("there is nothing to put together"));
+        };
+        let mut whole = first.clone();
+        for part in rest {
+            let rows = part.rows.iter().zip(&whole.rows);
+            let is_same = (&part.fingerprint, part.shards) == (&whole.fingerprint, whole.shards)
+                && part.rows.len() == whole.rows.len()
+                && rows.into_iter().all(|(a, b)| a.name() == b.name());
+            if !is_same {
+                return Err(PerturbedError::other(
+                    "these are parts of different experiments",
+                ));
+            }
+            if let Some(twice) = part.parts.iter().find(|shard| whole.parts.contains(shard)) {
+                return Err(PerturbedError::other(format!(
+                    "part {twice} is there twice"
+                )));
+            }
+            for (mine, theirs) in whole.rows.iter_mut().zip(&part.rows) {
+                mine.merge(theirs);
+            }
+            whole.parts.extend(&part.parts);
+        }
+        whole.parts.sort_unstable();
+        if (0..whole.shards).eq(whole.parts.iter().copied()) {
+            (whole.shards, whole.parts) = (1, vec![0]);
+        }
+        Ok(whole)
+    }
+}
+
+/// FNV-1a of everything that the results depend on.
+fn fingerprint(experiment: &PerturbedExperiment, trials: u64) -> String {
+    let everything = format!("{trials} {experiment:?}");
+    let hash = everything
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    format!("{hash:016x}")
+}
 
 /// The trials of one case in one world with one executor.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Row {
     /// The case.
     pub case: String,
@@ -32,7 +141,8 @@ pub struct Row {
 }
 
 /// Means of what was done.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Work {
     /// Starts and ends.
     pub messages: Mean,
@@ -66,7 +176,8 @@ impl Row {
             succeeded: Work::default(),
             failed: Work::default(),
             published,
-            optimum,
+            // So many digits are read back as they were written.
+            optimum: optimum.map(|optimum| (optimum * 1e12).round() / 1e12),
         }
     }
 
@@ -83,12 +194,32 @@ impl Row {
         work.actions.add(trial.tally.starts);
     }
 
-    /// How far the published share is from ours, in standard deviations of the difference.
+    fn name(&self) -> (&str, WorldKind, ExecutorKind) {
+        (&self.case, self.world, self.executor)
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.success.merge(other.success);
+        self.replans.merge(other.replans);
+        for (mine, theirs) in [
+            (&mut self.succeeded, &other.succeeded),
+            (&mut self.failed, &other.failed),
+        ] {
+            mine.messages.merge(theirs.messages);
+            mine.failed_starts.merge(theirs.failed_starts);
+            mine.actions.merge(theirs.actions);
+        }
+    }
+
+    /// How far the published share is from ours, in standard deviations of the difference: both
+    /// are samples, and if they are of the same probability, all trials together say which.
     pub fn distance(&self) -> Option<f64> {
         let published = self.published?;
-        let (ours, theirs) = (self.success.share()?, published.share()?);
-        let variance = |share: f64, of: Proportion| share * (1.0 - share) / float(of.count);
-        let deviation = (variance(ours, self.success) + variance(theirs, published)).sqrt();
+        let mut both = self.success;
+        both.merge(published);
+        let (ours, theirs, share) = (self.success.share()?, published.share()?, both.share()?);
+        let parts = 1.0 / float(self.success.count) + 1.0 / float(published.count);
+        let deviation = (share * (1.0 - share) * parts).sqrt();
         Some((ours - theirs) / deviation.max(f64::MIN_POSITIVE))
     }
 
@@ -111,69 +242,4 @@ impl Row {
 )]
 fn float(count: u64) -> f64 {
     count as f64
-}
-
-/// The rows as a table.
-pub fn table(experiment: &PerturbedExperiment, rows: &[Row]) -> Table {
-    let headings = [
-        "case",
-        "world",
-        "executor",
-        "success %",
-        "95 % interval",
-        "published %",
-        "z",
-        "optimum %",
-        "replans",
-        "messages (success)",
-        "failed starts (success)",
-        "actions (success)",
-        "messages (failure)",
-        "failed starts (failure)",
-        "actions (failure)",
-    ];
-    let percent =
-        |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
-    let mean = |mean: Mean| mean.value().map_or_else(String::new, |m| format!("{m:.2}"));
-    let row = |row: &Row| {
-        let interval = row.success.wilson();
-        let interval =
-            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
-        let z = row.distance().map(|z| format!("{z:+.1}"));
-        vec![
-            row.case.clone(),
-            row.world.name().to_owned(),
-            row.executor.name().to_owned(),
-            percent(row.success.share()),
-            interval.unwrap_or_default(),
-            percent(row.published.and_then(Proportion::share)),
-            z.unwrap_or_default(),
-            percent(row.optimum),
-            mean(row.replans),
-            mean(row.succeeded.messages),
-            mean(row.succeeded.failed_starts),
-            mean(row.succeeded.actions),
-            mean(row.failed.messages),
-            mean(row.failed.failed_starts),
-            mean(row.failed.actions),
-        ]
-    };
-    let mut caption = experiment.title.clone();
-    let compared: Vec<bool> = rows.iter().filter_map(Row::agrees).collect();
-    if !compared.is_empty() {
-        let agreeing = compared.iter().filter(|&&agrees| agrees).count();
-        let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
-        let _ = write!(
-            caption,
-            "\nOf {} published success rates, {agreeing} do not differ from ours at the 5 % level; \
-             {} of ours lie in the 95 % interval of what was published.",
-            compared.len(),
-            inside.count()
-        );
-    }
-    Table {
-        caption,
-        headings: headings.map(str::to_owned).to_vec(),
-        rows: rows.iter().map(row).collect(),
-    }
 }

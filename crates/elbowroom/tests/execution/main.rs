@@ -1,8 +1,13 @@
 //! Whole runs: executors, worlds, planner and envelopes together.
 
+mod adaptable;
 mod bad_worlds;
 mod campaigns;
 mod guarantee;
+mod likelier;
 mod reasons;
+mod reports;
 mod scene;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod traces;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, Embedded, WholeRegion};
-use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execute::{Analyst, Embedded, Likeliest, SharedLikeliest, WholeRegion};
+use elbowroom::execution::executors::{ExecutorSpec, Means};
 use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
 use elbowroom::flow;
@@ -12,10 +12,11 @@ use elbowroom::model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::planner::embedded;
+use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
 /// The executors that there are, one of each.
-pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live"];
+pub(crate) const EXECUTORS: &[&str] = &["fixed:30", "stn", "guarded", "live", "adaptable"];
 
 /// A problem with a plan.
 pub(crate) struct Scene {
@@ -24,6 +25,7 @@ pub(crate) struct Scene {
     pub(crate) flow: flow::Settings,
     pub(crate) settings: RunSettings,
     pub(crate) states: u64,
+    pub(crate) likelihoods: Arc<Likelihoods>,
 }
 
 impl Scene {
@@ -60,6 +62,7 @@ impl Scene {
             },
             task: Arc::new(task.clone()),
             states: 400,
+            likelihoods: Arc::new(Likelihoods::certain()),
         };
         scene.plan = if let Some(text) = plan {
             let read = pddl::read_plan(&source(text), &mut task);
@@ -73,6 +76,44 @@ impl Scene {
         };
         scene.task = Arc::new(task);
         scene
+    }
+
+    /// The same, with these sections of a likelihood file.
+    pub(crate) fn with_likelihoods(mut self, sections: &str) -> Self {
+        let text = format!("format = \"elbowroom-likelihoods\"\nversion = 1\n{sections}");
+        let read = likelihoods::read(text.as_bytes(), &self.task);
+        self.likelihoods = Arc::new(read.expect("a correct test"));
+        self
+    }
+
+    /// Runs with an executor that looks for plans that are likelier to succeed in that world.
+    pub(crate) fn run_likeliest(&self, executor: &str, model: &WorldModel, seed: u64) -> Report {
+        let spec: ExecutorSpec = executor.parse().expect("a correct test");
+        let PlanningTime::Seconds(time) = self.settings.planning_time.clone() else {
+            panic!("a correct test");
+        };
+        let likeliest = Likeliest::new(model.clone(), self.planner(), time);
+        let mut likeliest = SharedLikeliest::new(likeliest);
+        let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
+        let region = Box::new(WholeRegion {
+            epsilon: self.settings.epsilon.clone(),
+        });
+        let mut decider =
+            spec.build(Means::from(region).with_odds(Some(Box::new(likeliest.clone()))));
+        let ports = Ports {
+            world: &mut world,
+            planner: &mut likeliest,
+            preparer: &mut Analyst::new(self.flow.clone()),
+            executor: decider.as_mut(),
+            need: spec.registered.need,
+            recorder: &mut NoRecord,
+        };
+        let task = Arc::clone(&self.task);
+        let report = run::run(task, Some(&self.plan), &self.settings, ports);
+        if report.verdict == Verdict::GoalReached {
+            assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
+        }
+        report
     }
 
     fn planner(&self) -> Embedded<'static> {
@@ -102,9 +143,13 @@ impl Scene {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let spec: ExecutorSpec = executor.parse().expect("a correct test");
-        let mut decider = spec.build(Box::new(WholeRegion {
+        let region = Box::new(WholeRegion {
             epsilon: self.settings.epsilon.clone(),
-        }));
+        });
+        let mut decider = spec.build(Means {
+            likelihoods: Arc::clone(&self.likelihoods),
+            ..Means::from(region)
+        });
         run::run(
             Arc::clone(&self.task),
             Some(&self.plan),

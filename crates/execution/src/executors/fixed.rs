@@ -13,12 +13,13 @@ use crate::reason::{Cause, Reason};
 pub(super) const REGISTERED: Registered = Registered {
     name: "fixed",
     argument: Some("percentage of the planned value"),
+    is_optional: false,
     summary: "Dispatches the plan and replans when a duration or an amount leaves the planned \
               value by more than X %. It looks no further than the constraints at each time \
               point, and notices a missed deadline only there.",
     paper: "BLEX(X) in Cashmore et al. (2020), section 5",
     need: Need::Orderings,
-    make: |percentage, _| Box::new(Fixed::new(percentage)),
+    make: |argument, _| Box::new(Fixed::new(&argument.unwrap_or_default())),
 };
 
 /// See [`REGISTERED`].

@@ -13,6 +13,7 @@ use crate::reason::{Cause, Reason};
 pub(super) const REGISTERED: Registered = Registered {
     name: "guarded",
     argument: None,
+    is_optional: false,
     summary: "Dispatches within the windows that follow from the plan's envelope, and replans as \
               soon as an observed quantity leaves its interval, a running action outlives its \
               upper end, or too little time is left.",

@@ -8,21 +8,27 @@ use elbowroom_plan::{
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
 use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
+use crate::odds::{Odds, Remainder};
 use crate::preparation::{Need, Region};
 use crate::quantities::{amounts, duration_parameters};
 use crate::reason::{Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "live",
-    argument: None,
+    argument: Some("number of percentage points"),
+    is_optional: true,
     summary: "Holds the rest of the plan against its whole envelope after every observation, with \
               the observed values fixed, and replans only when the rest is no longer guaranteed \
-              even if nothing deviates any more.",
+              even if nothing deviates any more. With a number, also when nothing is under way and \
+              another plan is at least so many percentage points likelier to succeed in the world \
+              that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
-    make: |_, region| {
+    make: |argument, means| {
+        let advantage = argument.map(|points| points / Rational::from(100));
         Box::new(Live {
-            region,
+            region: means.region,
+            odds: means.odds.zip(advantage),
             state: None,
         })
     },
@@ -31,6 +37,8 @@ pub(super) const REGISTERED: Registered = Registered {
 /// See [`REGISTERED`].
 struct Live {
     region: Box<dyn Region>,
+    /// Who knows of likelier plans, and by how much one must be likelier.
+    odds: Option<(Box<dyn Odds>, Rational)>,
     state: Option<Rest>,
 }
 
@@ -66,6 +74,11 @@ impl Executor for Live {
         {
             return replan(*reason);
         }
+        if let Some((odds, advantage)) = &mut self.odds
+            && let Some(reason) = rest.likelier(moment, odds.as_mut(), advantage)
+        {
+            return replan(reason);
+        }
         rest.dispatch.next(moment)
     }
 
@@ -96,6 +109,48 @@ impl Rest {
         let why = region.objection(&self.mission.task, &plan, &values)?;
         let reason = Reason::new(Cause::GuaranteeLost).about(why);
         Some(Box::new(reason.since(moment.now.clone())))
+    }
+
+    /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
+    /// way: a new plan costs nothing then that had been begun.
+    fn likelier(
+        &self,
+        moment: &Moment<'_>,
+        odds: &mut dyn Odds,
+        advantage: &Rational,
+    ) -> Option<Reason> {
+        let is_end = |news: &News| matches!(news, News::Ended { .. });
+        if !moment.news.iter().any(is_end) || !self.dispatch.running().is_empty() {
+            return None;
+        }
+        let plan = self.dispatch.plan();
+        let happened = plan.nodes().map(|(node, _)| self.dispatch.happened(node));
+        let is_over = |step: &InstanceId| {
+            let [_, end] = self.dispatch.nodes_of(*step);
+            self.dispatch.happened(end).is_some()
+        };
+        let mut steps = (0..plan.instances.len()).map(InstanceId::from);
+        if steps.all(|step| is_over(&step)) {
+            return None;
+        }
+        let compared = odds.compare(&Remainder {
+            mission: &self.mission,
+            happened: happened.map(Option::<&Rational>::cloned).collect(),
+            now: moment.now,
+            belief: moment.belief,
+        })?;
+        let gain = &compared.other - &compared.present;
+        if !gain.is_positive() || gain < *advantage {
+            return None;
+        }
+        let percent = |share: &Rational| (share * Rational::from(100)).to_decimal(1);
+        let about = format!(
+            "another plan succeeds with a probability of {} %, the rest of this one of {} %",
+            percent(&compared.other),
+            percent(&compared.present)
+        );
+        let reason = Reason::new(Cause::Likelier).about(about);
+        Some(reason.since(moment.now.clone()))
     }
 
     /// Goes by the present values: what runs may take as long as it likes, what is to come takes

@@ -10,6 +10,7 @@ use crate::reason::Reason;
 pub(super) const REGISTERED: Registered = Registered {
     name: "stn",
     argument: None,
+    is_optional: false,
     summary: "Dispatches within the windows that follow from the whole network, with the \
               durations that the domain allows, and replans when one is missed.",
     paper: "Dechter, Meiri & Pearl (1991); Muscettola, Morris & Tsamardinos (1998)",

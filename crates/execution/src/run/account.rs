@@ -127,31 +127,22 @@ impl Account {
         self.entries[index(ticket)].cancelled = Some(time.clone());
     }
 
-    /// Since when an action is overdue at `now` beyond what patience allows.
-    pub(super) fn silent(&self, patience: &Patience, now: &Rational) -> Vec<(Ticket, Rational)> {
-        let open = self
-            .open
-            .iter()
-            .map(|ticket| (*ticket, self.limit(*ticket, patience)));
-        open.filter(|(_, limit)| limit <= now).collect()
-    }
-
-    pub(super) fn next_silence(&self, patience: &Patience) -> Option<Rational> {
-        self.open
-            .iter()
-            .map(|ticket| self.limit(*ticket, patience))
-            .min()
-    }
-
-    /// Until when to wait for a word of an action.
-    fn limit(&self, ticket: Ticket, patience: &Patience) -> Rational {
+    /// Until when to wait for a word of an action. `allowed` is until when the present plan allows
+    /// it to run, if that has an end: so long, silence says nothing.
+    pub(super) fn limit(
+        &self,
+        ticket: Ticket,
+        patience: &Patience,
+        allowed: Option<Rational>,
+    ) -> Rational {
         let entry = &self.entries[index(ticket)];
+        if let Some(cancelled) = &entry.cancelled {
+            return cancelled + &patience.at_least;
+        }
         let planned = entry.planned.clone().unwrap_or_default();
         let wait = (planned * &patience.factor).max(patience.at_least.clone());
-        match &entry.cancelled {
-            Some(cancelled) => cancelled + &patience.at_least,
-            None => entry.started.as_ref().unwrap_or(&entry.ordered) + wait,
-        }
+        let limit = entry.started.as_ref().unwrap_or(&entry.ordered) + wait;
+        allowed.map_or(limit.clone(), |allowed| limit.max(allowed))
     }
 
     /// All that was started and did start, as steps for the judge.

@@ -25,7 +25,7 @@ impl Run<'_> {
             }
         }
         // Each wait ends by then: what stays silent is given up.
-        while let Some(until) = self.account.next_silence(&self.settings.patience) {
+        while let Some(until) = self.next_silence() {
             self.pass(&until.max(self.now.clone()))?;
             self.give_up_the_silent()?;
         }

@@ -207,9 +207,27 @@ impl Run<'_> {
         }
     }
 
+    /// Until when to wait for a word of each action that has not ended.
+    fn limits(&self) -> impl Iterator<Item = (Ticket, Rational)> + '_ {
+        self.account.open_tickets().map(|ticket| {
+            let step = self.account.get(ticket).and_then(|entry| entry.step);
+            let window = step.and_then(|step| self.ports.executor.window(step, true));
+            let allowed = window.and_then(|window| window.latest);
+            let limit = self.account.limit(ticket, &self.settings.patience, allowed);
+            (ticket, limit)
+        })
+    }
+
+    /// When patience with an action ends next.
+    pub(super) fn next_silence(&self) -> Option<Rational> {
+        self.limits().map(|(_, limit)| limit).min()
+    }
+
     /// Gives up the actions of which nothing has been heard for too long.
     pub(super) fn give_up_the_silent(&mut self) -> Result<(), Stop> {
-        for (ticket, since) in self.account.silent(&self.settings.patience, &self.now) {
+        let limits = self.limits();
+        let silent: Vec<_> = limits.filter(|(_, limit)| *limit <= self.now).collect();
+        for (ticket, since) in silent {
             self.cancel(ticket)?;
             let entry = self.account.get(ticket);
             let Some((action, step)) = entry.map(|entry| (entry.action.clone(), entry.step)) else {

@@ -69,7 +69,8 @@ pub enum PlanningTime {
 }
 
 /// An action is given up when it is silent for longer than `factor` times its planned duration,
-/// and for at least `at_least`.
+/// and for at least `at_least`; not while the plan allows it to run: a long time within the
+/// guarantee is no silence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Patience {
     /// How many times as long as planned.

@@ -155,13 +155,13 @@ impl Prepared {
         stage: &Stage<'_>,
         running: &[InstanceId],
     ) -> Chosen {
-        let state = stage.state();
-        let key = (order, state.facts.clone(), running.to_vec());
+        let key = (order, stage.state().facts.clone(), running.to_vec());
         if let Some(known) = self.known.get(&key) {
             return *known;
         }
         let is_dead_end = stage.is_dead_end() == Some(true);
-        let chosen = self.consider(order, &circumstances(state, running), is_dead_end);
+        let now = circumstances(stage.state(), running);
+        let chosen = self.consider(order, &now, is_dead_end);
         self.known.insert(key, chosen);
         chosen
     }

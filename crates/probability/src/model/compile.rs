@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{
-    Action, Body, Change, Condition, DurativeBody, Effect, FactId, FluentId, SnapAction,
+    Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, FluentId, SnapAction,
 };
+use elbowroom_model::problem::UpdateOperator;
 use elbowroom_plan::{Node, PartialOrderPlan};
 
 use super::requirement::{Requirement, is_derived, visit_facts};
@@ -236,6 +237,23 @@ impl Compiler<'_> {
         guard.now = Condition::And(vec![Condition::Fact(memory), now]);
     }
 
+    /// Adds a change of a fluent, if the fluent is one of the model's.
+    fn update(
+        &self,
+        event: &mut Event,
+        (operator, fluent, value): (UpdateOperator, FluentId, &Expression),
+        guard: Option<Condition>,
+    ) {
+        if let Ok(fluent) = self.fluents.binary_search(&fluent) {
+            event.updates.push(Update {
+                fluent,
+                operator,
+                value: value.clone(),
+                guard,
+            });
+        }
+    }
+
     fn effect(&self, action: &Action, effect: &Effect, event: &mut Event) -> Result<(), Missing> {
         let guard = Some(effect.guard.now.clone()).filter(|guard| !guard.is_trivial());
         let (fact, makes_true) = match &effect.change {
@@ -246,14 +264,7 @@ impl Compiler<'_> {
                 fluent,
                 value,
             } => {
-                if let Ok(fluent) = self.fluents.binary_search(fluent) {
-                    event.updates.push(Update {
-                        fluent,
-                        operator: *operator,
-                        value: value.clone(),
-                        guard,
-                    });
-                }
+                self.update(event, (*operator, *fluent, value), guard);
                 return Ok(());
             }
         };
@@ -297,14 +308,7 @@ impl Compiler<'_> {
                     fluent,
                     value,
                 } => {
-                    if let Ok(fluent) = self.fluents.binary_search(fluent) {
-                        event.updates.push(Update {
-                            fluent,
-                            operator: *operator,
-                            value: value.clone(),
-                            guard: None,
-                        });
-                    }
+                    self.update(&mut event, (*operator, *fluent, value), None);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use elbowroom_model::ground::FluentId;
 use elbowroom_num::Rational;
-use elbowroom_plan::InstanceId;
+use elbowroom_plan::{InstanceId, NodeId};
 use indexmap::IndexMap;
 
 use crate::circumstances::Circumstances;
@@ -20,6 +20,8 @@ pub(super) struct Key {
     values: Vec<(FluentId, Rational)>,
     /// How long each has been under way.
     running: Vec<(InstanceId, Rational)>,
+    /// How long ago each was.
+    recent: Vec<(NodeId, Rational)>,
     /// Now, if the clock matters.
     now: Option<Rational>,
 }
@@ -38,6 +40,11 @@ pub(super) fn key(model: &Model, circumstances: &Circumstances, has_deadlines: b
             .running
             .iter()
             .map(|running| (running.instance, &circumstances.now - &running.start))
+            .collect(),
+        recent: circumstances
+            .recent
+            .iter()
+            .map(|(node, time)| (*node, &circumstances.now - time))
             .collect(),
         now: has_deadlines.then(|| circumstances.now.clone()),
     }

@@ -74,6 +74,42 @@ impl<'s, 'w> Run<'s, 'w> {
         (self.best, self.sequences)
     }
 
+    /// Looks at one sequence, without what cannot be part of one from here.
+    pub(super) fn try_first(&mut self, sequence: &[NodeId]) -> Result<(), TooCoupled> {
+        let mut done = Vec::new();
+        for &node in sequence {
+            let can_be = match self.model.plan().nodes[node.index()] {
+                Node::Zero => false,
+                Node::Start(id) | Node::Instant(id) => !self.is_used[id.index()],
+                Node::End(id) => self.network.running().contains(&id),
+                Node::Timed(_) => {
+                    let next = self.search.separations.timed.get(self.next_timed);
+                    next.is_some_and(|(next, _)| *next == node)
+                }
+            };
+            let is_placed = |other: NodeId| self.is_placed[other.index()];
+            if !can_be || !self.search.separations.may_follow(node, &is_placed) {
+                continue;
+            }
+            // The goal may be reached before the end, and nothing else then.
+            self.consider()?;
+            if self.push(node)?.is_none() {
+                break;
+            }
+            if !self.timing.push(self.model, node, self.timed_before(node)) {
+                self.pop(node);
+                break;
+            }
+            done.push(node);
+        }
+        self.consider()?;
+        for node in done.into_iter().rev() {
+            self.timing.pop();
+            self.pop(node);
+        }
+        Ok(())
+    }
+
     /// Looks at the sequence so far, and at all that begin with it.
     pub(super) fn explore(&mut self) -> Result<ControlFlow<()>, TooCoupled> {
         self.sequences += 1;

@@ -119,6 +119,8 @@ pub(crate) struct Timing<'s> {
     /// The last happening, or now.
     last: elbowroom_stn::NodeId,
     placed: Vec<(NodeId, elbowroom_stn::NodeId)>,
+    /// How many of these were before now.
+    past: usize,
     /// The ends of the actions under way.
     pending: Vec<(InstanceId, elbowroom_stn::NodeId)>,
     marks: Vec<Mark>,
@@ -144,10 +146,16 @@ impl<'s> Timing<'s> {
             zero,
             last: now,
             placed: Vec::new(),
+            past: circumstances.recent.len(),
             pending: Vec::new(),
             marks: Vec::new(),
         };
         timing.fix(now, &circumstances.now)?;
+        for (node, time) in &circumstances.recent {
+            let own = timing.network.add_node();
+            timing.fix(own, time)?;
+            timing.placed.push((*node, own));
+        }
         for running in &circumstances.running {
             let end = timing.network.add_node();
             let (least, greatest) = &separations.durations[running.instance.index()];
@@ -321,7 +329,7 @@ impl<'s> Timing<'s> {
             let earliest = window.earliest.clone().unwrap_or_default();
             (*node, earliest, window.latest.clone())
         };
-        self.placed.iter().map(window).collect()
+        self.placed[self.past..].iter().map(window).collect()
     }
 }
 

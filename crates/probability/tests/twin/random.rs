@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Change, FactId, SnapAction};
 use elbowroom_model::problem::{PredicateId, SchemaId};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
@@ -33,6 +34,42 @@ pub(crate) struct Case {
     pub(crate) plan: PartialOrderPlan,
     pub(crate) likelihoods: Likelihoods,
     pub(crate) circumstances: Circumstances,
+}
+
+impl Case {
+    /// All facts.
+    pub(crate) fn facts(&self) -> impl Iterator<Item = FactId> {
+        let count = u32::try_from(self.task.fact_count()).expect("a small case");
+        (0..count).map(FactId)
+    }
+
+    /// The effects of a snap action on facts: which fact, whether it becomes true, and how likely
+    /// the effect takes place.
+    pub(crate) fn fact_effects(
+        &self,
+        action: &Action,
+        snap: &SnapAction,
+    ) -> Vec<(FactId, bool, f64)> {
+        let changes = snap
+            .effects
+            .iter()
+            .filter_map(|effect| match effect.change {
+                Change::Add(fact) => Some((fact, true)),
+                Change::Delete(fact) => Some((fact, false)),
+                Change::Update { .. } => None,
+            });
+        let likely = |(fact, makes_true)| {
+            let likelihood = self
+                .likelihoods
+                .effect(&self.task, action, fact, makes_true);
+            (
+                fact,
+                makes_true,
+                likelihood.expect("a case has all of them"),
+            )
+        };
+        changes.map(likely).collect()
+    }
 }
 
 pub(crate) fn case(rng: &mut impl Rng, taste: Taste) -> Case {

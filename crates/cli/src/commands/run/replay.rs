@@ -3,13 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use elbowroom::execution::Odds;
 use elbowroom::execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::Source;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored};
+use elbowroom::sim::WorldModel;
 use serde_json::{Value, json};
 
-use super::{Choices, Texts, planning_time};
+use super::planner::odds;
+use super::{Choices, Planning, Texts, planning_time};
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::{BAD, GOOD, styled};
 use crate::{input, output};
@@ -35,12 +39,20 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     } else {
         None
     };
-    let choices = header.choices()?;
+    let choices = match header.source("likelihoods") {
+        Some(text) => header.choices()?.with_likelihoods(&text, &task)?,
+        None => header.choices()?,
+    };
     let task = Arc::new(task);
     let mut world = ReplayWorld::new(&stored, &task);
     let mut planner = ReplayPlanner::new(&stored);
     let mut replay = Replay::new(&stored, Arc::clone(&task));
-    choices.run_with(&task, first.as_ref(), &mut world, &mut planner, &mut replay);
+    let odds = header.odds(&choices, &task).map_err(unreadable)?;
+    let planning = Planning {
+        planner: &mut planner,
+        odds,
+    };
+    choices.run_with(&task, first.as_ref(), &mut world, planning, &mut replay);
     let (agreed, difference) = replay.outcome();
     if as_json {
         output::print_json(&json!({
@@ -107,6 +119,18 @@ impl Header<'_> {
 
     fn number(&self, name: &str, otherwise: Rational) -> Rational {
         self.text(name).parse().unwrap_or(otherwise)
+    }
+
+    /// What was taken for likely, if the executor asked for that.
+    fn odds(&self, choices: &Choices, task: &Task) -> Result<Option<Box<dyn Odds>>, String> {
+        if !choices.executor.asks_odds() {
+            return Ok(None);
+        }
+        let model = WorldModel::read(self.text("world"), task.problem());
+        let model = model.map_err(|error| format!("line 1: the world: {error}"))?;
+        let count = |name: &str| self.0.get(name).and_then(Value::as_u64).unwrap_or_default();
+        let states = (count("planner_states"), count("improve_states"));
+        Ok(Some(odds(&model, states, choices)))
     }
 
     fn choices(&self) -> Result<Choices, Failure> {

@@ -1,0 +1,78 @@
+//! Other people's planners behind the port of [`execution`](crate::execution).
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom_model::{Situation, Task};
+use elbowroom_num::Rational;
+use elbowroom_pddl::Source;
+use elbowroom_planner::external::{self, Event, Outcome, Request, Settings};
+
+use crate::flow;
+
+/// A program that plans, supervised; each of its plans is judged, and where only its times are
+/// rounded, they are chosen again.
+///
+/// The program takes as long as it takes, and that is measured. What goes wrong with it, is said
+/// in the answer: a run has no plan then, and ends.
+pub struct External<'a> {
+    /// Which program.
+    pub planner: external::Planner,
+    /// The domain, to the letter.
+    pub domain: Source,
+    /// The problem, to the letter; in mid-execution it is written anew.
+    pub problem: Source,
+    /// Its limits.
+    pub settings: Settings,
+    /// Whether to take the first plan; otherwise the last one before the time limit.
+    pub takes_first: bool,
+    /// Asked about fifty times a second whether to go on.
+    pub goes_on: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Planner for External<'_> {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+        let epsilon = self.settings.epsilon.clone();
+        let report = external::plan(
+            &self.planner,
+            &mut Request {
+                task,
+                situation,
+                domain: &self.domain,
+                problem: &self.problem,
+            },
+            &self.settings,
+            &mut |task, plan| flow::repaired(task, plan, &epsilon),
+            &mut |event| {
+                let is_enough = self.takes_first && matches!(event, Event::Plan { .. });
+                if is_enough || !(self.goes_on)() {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            },
+        );
+        let name = &self.planner.name;
+        let answer = match report.outcome {
+            Outcome::Plan(found) => PlanAnswer::Plan(found.plan),
+            // "No plan exists" is its claim, not a proof.
+            Outcome::NotStarted { ref help, .. } => PlanAnswer::NotFound {
+                why: format!("{name}: {}; {help}", report.outcome),
+            },
+            other => PlanAnswer::NotFound {
+                why: format!("{name}: {other}"),
+            },
+        };
+        PlannerAnswer {
+            answer,
+            seconds: Some(seconds(report.statistics.elapsed)),
+        }
+    }
+}
+
+/// In whole microseconds.
+fn seconds(duration: Duration) -> Rational {
+    let micros = i64::try_from(duration.as_micros()).unwrap_or(i64::MAX);
+    Rational::new(micros, 1_000_000)
+}

@@ -1,0 +1,360 @@
+//! Plans that are likely to succeed in a world of which something is known.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use elbowroom_execution::{Compared, Odds, PlanAnswer, Planner, PlannerAnswer, Remainder};
+use elbowroom_model::ground::{Action, Expression};
+use elbowroom_model::problem::{Comparison, SchemaId};
+use elbowroom_model::validate::{self, validate_from};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::deorder::{self, deorder};
+use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan};
+use elbowroom_sim::draw::keyed;
+use elbowroom_sim::{Purpose, WorldModel};
+use elbowroom_stn::ConsistentNetwork;
+
+use super::planners::Embedded;
+use super::rewrite::set_durations;
+
+/// How many worlds a plan is tried in.
+const SAMPLES: u64 = 200;
+
+/// For how slow a world plans are made: in hundredths of all durations that are shorter.
+const QUANTILES: [u64; 2] = [80, 95];
+
+/// How many samples a quantile is taken from.
+const QUANTILE_SAMPLES: u64 = 100;
+
+/// Where the seeds of the samples begin: far from those that people choose.
+const SEED: u64 = 0x6f64_6473_0000_0000;
+
+/// Chooses among several plans the one that is likeliest to succeed.
+///
+/// The plans: the one that the planner makes for the problem as it is, and those that it makes for
+/// problems in which every action takes long. How likely: the share of sampled worlds in which
+/// durations drawn from the world's distributions leave the plan's network consistent and no action
+/// fails. That is the probability that the plan can be scheduled by one who knows the durations;
+/// when one learns them on the way, it is less at times. Amounts are taken as the domain has them.
+///
+/// The samples are the same for all plans, and depend on nothing but the actions' names.
+pub struct Likeliest<'a> {
+    /// What is known of the world.
+    pub model: WorldModel,
+    /// Who makes the plans.
+    pub planner: Embedded<'a>,
+    /// How long making a plan takes in the world.
+    pub planning_time: Rational,
+    quantiles: BTreeMap<(String, Rational, u64), Rational>,
+}
+
+impl Planner for Likeliest<'_> {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+        let begun = self.planner.clock.map(|clock| clock());
+        let answer = match self.best(task, situation) {
+            Ok((plan, _)) => PlanAnswer::Plan(plan),
+            Err(answer) => answer,
+        };
+        let seconds = self
+            .planner
+            .clock
+            .map(|clock| clock() - begun.unwrap_or_default());
+        PlannerAnswer { answer, seconds }
+    }
+}
+
+impl Odds for Likeliest<'_> {
+    fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared> {
+        let mission = rest.mission;
+        let plan = mission.plan.plan.at(&mission.plan.nominal());
+        let now = rest.now - &mission.origin;
+        let present = self.probability(&plan, &rest.happened, &now, 0);
+        if present == Rational::ONE {
+            return None;
+        }
+        let mut state = rest.belief.clone();
+        let time = rest.now + &self.planning_time + &self.planner.settings.epsilon;
+        let _ = state.advance(&time);
+        let situation = Situation {
+            state: state.state(),
+            time,
+            running: Vec::new(),
+        };
+        let mut task = Task::clone(rest.belief.task());
+        let (_, other) = self.best(&mut task, &situation).ok()?;
+        Some(Compared { present, other })
+    }
+}
+
+/// One [`Likeliest`] behind both ports.
+#[derive(Clone)]
+pub struct SharedLikeliest(Rc<RefCell<Likeliest<'static>>>);
+
+impl SharedLikeliest {
+    /// Shares it.
+    pub fn new(likeliest: Likeliest<'static>) -> Self {
+        Self(Rc::new(RefCell::new(likeliest)))
+    }
+}
+
+impl Planner for SharedLikeliest {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+        self.0.borrow_mut().plan(task, situation)
+    }
+}
+
+impl Odds for SharedLikeliest {
+    fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared> {
+        self.0.borrow_mut().compare(rest)
+    }
+}
+
+impl<'a> Likeliest<'a> {
+    /// A planner for a world like that.
+    pub fn new(model: WorldModel, planner: Embedded<'a>, planning_time: Rational) -> Self {
+        Self {
+            model,
+            planner,
+            planning_time,
+            quantiles: BTreeMap::new(),
+        }
+    }
+
+    /// The likeliest plan and its probability, or what the planner says instead of a plan.
+    fn best(
+        &mut self,
+        task: &mut Task,
+        situation: &Situation,
+    ) -> Result<(TimeTriggeredPlan, Rational), PlanAnswer> {
+        let mut plans = Vec::new();
+        let answer = self.planner.plan(task, situation).answer;
+        if let PlanAnswer::Plan(plan) = &answer {
+            plans.push(plan.clone());
+        }
+        // Times of what is running already are no more to be chosen.
+        if situation.running.is_empty() && answer != PlanAnswer::Unsolvable {
+            for quantile in QUANTILES {
+                plans.extend(self.slow_plan(task, situation, quantile));
+            }
+        }
+        let mut best: Option<(TimeTriggeredPlan, Rational)> = None;
+        for plan in plans {
+            let share = self.probability_of(task, situation, &plan);
+            if best.as_ref().is_none_or(|(_, known)| share > *known) {
+                best = Some((plan, share));
+            }
+        }
+        best.ok_or(answer)
+    }
+
+    /// A plan for a world in which every action takes long, as a plan of the task.
+    fn slow_plan(
+        &mut self,
+        task: &mut Task,
+        situation: &Situation,
+        quantile: u64,
+    ) -> Option<TimeTriggeredPlan> {
+        let mut problem = task.beginning_at(situation).problem().clone();
+        for schema in (0..problem.schemas.len()).map(SchemaId::from) {
+            let values = RefCell::new(&mut *self);
+            set_durations(task, schema, &mut problem, &|name, planned| {
+                values.borrow_mut().quantile(name, planned, quantile)
+            });
+        }
+        let mut slow = Task::new(problem);
+        let there = Situation {
+            time: situation.time.clone(),
+            state: slow.initial().clone(),
+            running: Vec::new(),
+        };
+        let PlanAnswer::Plan(plan) = self.planner.plan(&mut slow, &there).answer else {
+            return None;
+        };
+        let mut steps = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            let arguments = &step.action.arguments;
+            let action = task.instantiate(step.action.schema, arguments).ok()?;
+            let planned = fixed_duration(&action).or_else(|| step.duration.clone());
+            steps.push(Step {
+                start: step.start.clone(),
+                duration: step.duration.as_ref().and(planned),
+                action,
+            });
+        }
+        let plan = TimeTriggeredPlan { steps };
+        let settings = validate::Settings {
+            epsilon: Some(self.planner.settings.epsilon.clone()),
+            ..validate::Settings::default()
+        };
+        let verdict = validate_from(task, situation, &plan, &settings);
+        verdict.is_valid().then_some(plan)
+    }
+
+    /// A duration that so many in a hundred do not exceed.
+    fn quantile(&mut self, name: &str, planned: &Rational, quantile: u64) -> Rational {
+        let key = (name.to_owned(), planned.clone(), quantile);
+        if let Some(known) = self.quantiles.get(&key) {
+            return known.clone();
+        }
+        let mut draws: Vec<Rational> = (0..QUANTILE_SAMPLES)
+            .map(|sample| self.duration(sample, name, planned, 0))
+            .collect();
+        draws.sort();
+        let index = usize::try_from(quantile * (QUANTILE_SAMPLES - 1) / 100).unwrap_or(0);
+        let value = draws.swap_remove(index);
+        self.quantiles.insert(key, value.clone());
+        value
+    }
+
+    /// From the command to the end, in one of the sampled worlds.
+    fn duration(&self, sample: u64, name: &str, planned: &Rational, occurrence: u64) -> Rational {
+        let rng = |purpose| keyed(SEED + sample, name, occurrence, purpose);
+        let delay = self.model.delay(name, &mut rng(Purpose::Delay));
+        delay
+            + self
+                .model
+                .duration(name, planned, &mut rng(Purpose::Duration))
+    }
+
+    /// How likely a plan from a situation is to succeed.
+    fn probability_of(
+        &self,
+        task: &Task,
+        situation: &Situation,
+        plan: &TimeTriggeredPlan,
+    ) -> Rational {
+        let settings = deorder::Settings {
+            epsilon: self.planner.settings.epsilon.clone(),
+        };
+        let rest = situation.rest_of_task(task);
+        let freed = deorder(&rest, &situation.rest_of_plan(plan), &settings);
+        let Ok(freed) = freed else {
+            return Rational::ZERO;
+        };
+        let mut happened = vec![None; freed.plan.nodes.len()];
+        happened[0] = Some(Rational::ZERO);
+        let running = situation.running.len();
+        self.probability(&freed.plan, &happened, &Rational::ZERO, running)
+    }
+
+    /// The share of sampled worlds in which the rest of a plan works. What is running comes first
+    /// in the plan, and takes as long as planned.
+    fn probability(
+        &self,
+        plan: &StnPlan,
+        happened: &[Option<Rational>],
+        now: &Rational,
+        running: usize,
+    ) -> Rational {
+        let rest = Rest::of(plan, happened, now, running);
+        let works = |sample: &u64| rest.works(self, *sample);
+        let successes = (0..SAMPLES).filter(works).count();
+        let count = |number: usize| Rational::from(i64::try_from(number).unwrap_or(i64::MAX));
+        count(successes) / Rational::from(i64::try_from(SAMPLES).unwrap_or(i64::MAX))
+    }
+}
+
+/// What is left of a plan.
+struct Rest {
+    /// With what has happened fixed, and what is to come not before now.
+    plan: StnPlan,
+    /// The constraints that say how long an action takes that is to come: which, what it is
+    /// called, how long it is planned to take (the least, where the plan has a choice), and how
+    /// many of that name come before.
+    to_come: Vec<(usize, String, Rational, u64)>,
+}
+
+impl Rest {
+    fn of(plan: &StnPlan, happened: &[Option<Rational>], now: &Rational, running: usize) -> Self {
+        let mut plan = plan.clone();
+        // Start and end may also have to be ε apart: the duration is the longest that is asked for.
+        let mut durations: BTreeMap<InstanceId, (usize, Rational)> = BTreeMap::new();
+        for (index, constraint) in plan.constraints.iter().enumerate() {
+            let Some(instance) = duration_of(&plan, constraint) else {
+                continue;
+            };
+            let has_started = happened[constraint.from.index()].is_some();
+            let Bound::Finite(least) = &constraint.lower else {
+                continue;
+            };
+            if has_started || instance.index() < running {
+                continue;
+            }
+            let known = durations.get(&instance);
+            if known.is_none_or(|(_, known)| known < least) {
+                durations.insert(instance, (index, least.clone()));
+            }
+        }
+        let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+        let mut to_come = Vec::with_capacity(durations.len());
+        for (instance, (index, planned)) in durations {
+            let name = plan.instance(instance).action.name.as_str();
+            let count = counts.entry(name).or_default();
+            to_come.push((index, name.to_owned(), planned, *count));
+            *count += 1;
+        }
+        // What an observed duration was, has been told by its two ends.
+        let is_over = |constraint: &Constraint| {
+            happened[constraint.from.index()].is_some() && happened[constraint.to.index()].is_some()
+        };
+        for index in 0..plan.constraints.len() {
+            if is_over(&plan.constraints[index]) {
+                plan.constraints[index].lower = Bound::Infinite;
+                plan.constraints[index].upper = Bound::Infinite;
+            }
+        }
+        let nodes: Vec<_> = plan.nodes().skip(1).collect();
+        for (node, what) in nodes {
+            let (lower, upper) = match (&happened[node.index()], what) {
+                (_, Node::Timed(_)) => continue,
+                (Some(time), _) => (time.clone(), Bound::Finite(time.clone())),
+                (None, _) => (now.clone(), Bound::Infinite),
+            };
+            plan.constraints.push(Constraint {
+                from: NodeId::ZERO,
+                to: node,
+                lower: Bound::Finite(lower),
+                upper,
+                reason: Reason::Given,
+            });
+        }
+        Self { plan, to_come }
+    }
+
+    /// Whether it works in one of the sampled worlds.
+    fn works(&self, odds: &Likeliest<'_>, sample: u64) -> bool {
+        let mut plan = self.plan.clone();
+        for (index, name, planned, occurrence) in &self.to_come {
+            let mut rng = keyed(SEED + sample, name, *occurrence, Purpose::Failure);
+            if odds.model.fails(name, &mut rng) {
+                return false;
+            }
+            let duration = odds.duration(sample, name, planned, *occurrence);
+            plan.constraints[*index].lower = Bound::Finite(duration.clone());
+            plan.constraints[*index].upper = Bound::Finite(duration);
+        }
+        ConsistentNetwork::try_from(plan.network(&[])).is_ok()
+    }
+}
+
+/// The instance whose duration a constraint bounds.
+fn duration_of(plan: &StnPlan, constraint: &Constraint) -> Option<InstanceId> {
+    let node = |id: NodeId| plan.nodes[id.index()];
+    match (node(constraint.from), node(constraint.to)) {
+        (Node::Start(start), Node::End(end)) if start == end => Some(start),
+        _ => None,
+    }
+}
+
+/// The duration that the domain fixes to a number.
+fn fixed_duration(action: &Action) -> Option<Rational> {
+    let [only] = action.durative()?.duration.as_slice() else {
+        return None;
+    };
+    match (&only.comparison, &only.bound) {
+        (Comparison::Equal, Expression::Constant(value)) => Some(value.clone()),
+        _ => None,
+    }
+}

@@ -1,0 +1,84 @@
+//! Problems with other numbers in them.
+
+use elbowroom_model::Task;
+use elbowroom_model::problem::{
+    Body, Comparison, DurationConstraint, Expression, Fluent, Function, FunctionId, ObjectId,
+    Problem, Schema, SchemaId, Term,
+};
+use elbowroom_num::Rational;
+
+/// Gives each instance of a schema a duration of its own: a function of its name and of what the
+/// domain says. Where the plan has a say in the duration, or the state, it stays as it is.
+pub(crate) fn set_durations(
+    task: &Task,
+    schema: SchemaId,
+    problem: &mut Problem,
+    value: &dyn Fn(&str, &Rational) -> Rational,
+) {
+    let Body::Durative { duration, .. } = &problem.schemas[schema.index()].body else {
+        return;
+    };
+    let [
+        DurationConstraint {
+            comparison: Comparison::Equal,
+            bound: Expression::Constant(planned),
+            ..
+        },
+    ] = duration.as_slice()
+    else {
+        return;
+    };
+    let planned = planned.clone();
+    let known = add_function_of(task, schema, "duration", problem, &|name, _| {
+        Some(value(name, &planned))
+    });
+    if let Body::Durative { duration, .. } = &mut problem.schemas[schema.index()].body {
+        duration[0].bound = known;
+    }
+}
+
+/// A function of the schema's parameters, with a value for each of its instances.
+pub(crate) fn add_function_of(
+    task: &Task,
+    schema: SchemaId,
+    what: &str,
+    problem: &mut Problem,
+    value: &dyn Fn(&str, &[ObjectId]) -> Option<Rational>,
+) -> Expression {
+    let lifted = problem.schemas[schema.index()].clone();
+    let function = FunctionId::from(problem.functions.len());
+    problem.functions.push(Function {
+        // No PDDL name has a space, so none is the same.
+        name: format!("{} {what}", lifted.name),
+        parameters: lifted.parameters.clone(),
+    });
+    for arguments in instances(&lifted, problem) {
+        let name = task.action_name(schema, &arguments);
+        if let Some(value) = value(&name, &arguments) {
+            problem.initial_values.push((function, arguments, value));
+        }
+    }
+    Expression::Fluent(Fluent {
+        function,
+        arguments: (0..lifted.parameters.len()).map(Term::Variable).collect(),
+    })
+}
+
+/// All arguments of fitting types.
+fn instances(schema: &Schema, problem: &Problem) -> Vec<Vec<ObjectId>> {
+    let mut instances: Vec<Vec<ObjectId>> = vec![Vec::new()];
+    for parameter in &schema.parameters {
+        let objects: Vec<ObjectId> = problem.objects_of(&parameter.types).collect();
+        instances = instances
+            .iter()
+            .flat_map(|instance| {
+                objects.iter().map(move |object| {
+                    let mut longer = instance.clone();
+                    longer.push(*object);
+                    longer
+                })
+            })
+            .collect();
+    }
+    instances
+}

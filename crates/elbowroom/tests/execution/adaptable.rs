@@ -1,0 +1,176 @@
+//! Olisipo on a clock: orders, deadlines, retries; and whole problems of others.
+
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::{Report, Verdict};
+use elbowroom::model::validate;
+use elbowroom::num::Rational;
+
+use crate::scene::Scene;
+use crate::shared;
+
+/// The photo needs the light, and the sample a rock that may roll away.
+const DOMAIN: &str = "
+    (define (domain field) (:requirements :durative-actions :timed-initial-literals)
+      (:predicates (light) (rock) (photo) (sample) (report))
+      (:durative-action take-photo :parameters () :duration (= ?duration 5)
+        :condition (over all (light)) :effect (at end (photo)))
+      (:durative-action take-sample :parameters () :duration (= ?duration 3)
+        :condition (over all (rock)) :effect (at end (sample)))
+      (:durative-action write :parameters () :duration (= ?duration 2)
+        :condition (at start (photo)) :effect (at end (report))))";
+
+const PLAN: &str = "0: (take-photo) [5]  0: (take-sample) [3]  5.001: (write) [2]";
+
+const CHANCES: &str = "
+    [defaults]
+    becomes_true = 0.0
+    becomes_false = 0.0
+    start = 0.5
+    effect = 1.0
+    [facts.rock]
+    becomes_false = 0.2
+    [facts.light]
+    becomes_false = 0.0";
+
+fn field(dark: u32) -> Scene {
+    let problem = format!(
+        "(define (problem day) (:domain field)
+           (:init (light) (rock) (at {dark} (not (light))))
+           (:goal (and (photo) (sample) (report))))"
+    );
+    let plan = PLAN.replace("  ", "\n");
+    Scene::new(DOMAIN, &problem, Some(&plan)).with_likelihoods(CHANCES)
+}
+
+fn done(report: &Report) -> Vec<&str> {
+    let names = report
+        .executed
+        .iter()
+        .map(|executed| &executed.step.action.name);
+    names.map(|name| name.trim_matches(['(', ')'])).collect()
+}
+
+/// What the judge says of what was done.
+fn is_valid(scene: &Scene, report: &Report) -> bool {
+    matches!(scene.judged(report), validate::Verdict::Valid(_))
+}
+
+/// When an action started, and when it ended.
+fn times(report: &Report, name: &str) -> (Rational, Rational) {
+    let steps = report.executed.iter().map(|executed| &executed.step);
+    let mut found = steps.filter(|step| step.action.name.contains(name));
+    let step = found.next().expect("it was done");
+    (step.start.clone(), step.end())
+}
+
+#[test]
+fn what_can_be_lost_is_over_before_anything_else_begins_where_there_is_time() {
+    let scene = field(100);
+    let report = scene.run("adaptable", &scene.world(""), 1);
+    assert_eq!(report.verdict, Verdict::GoalReached);
+    assert_eq!(done(&report), ["take-sample", "take-photo", "write"]);
+    assert!(times(&report, "photo").0 >= times(&report, "sample").1);
+    assert!(is_valid(&scene, &report));
+}
+
+#[test]
+fn an_order_that_misses_its_deadline_is_not_chosen() {
+    let scene = field(7);
+    let report = scene.run("adaptable", &scene.world(""), 1);
+    assert_eq!(report.verdict, Verdict::GoalReached);
+    assert!(times(&report, "photo").1 < 7.into());
+    assert!(times(&report, "photo").0 < times(&report, "sample").1);
+    assert_eq!(report.replans, 0);
+    assert!(is_valid(&scene, &report));
+}
+
+#[test]
+fn what_has_come_about_by_itself_is_skipped() {
+    let scene = field(100);
+    let world = scene.world("[[event]]\nfact = \"(photo)\"\nbecomes = true\nconstant = 1");
+    let report = scene.run("adaptable", &world, 1);
+    assert_eq!(report.verdict, Verdict::GoalReached);
+    assert_eq!(done(&report), ["take-sample", "write"]);
+}
+
+#[test]
+fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
+    let scene = field(100);
+    let fails = |probability: &str| {
+        let section = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = ";
+        scene.world(&format!("{section}{probability}"))
+    };
+    let mut failures = 0;
+    for seed in 0..20 {
+        let report = scene.run("adaptable", &fails("0.5"), seed);
+        assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
+        assert_eq!(report.replans, 0, "{:?}", report.reasons);
+        failures += report.starts - 3;
+    }
+    assert!(failures > 20, "{failures}");
+    // Twenty failures in a row with probability 0.5 are not believed.
+    let report = scene.run("adaptable", &fails("1"), 1);
+    assert_eq!(report.verdict, Verdict::ReplanLimit);
+    assert!(
+        report
+            .reasons
+            .iter()
+            .all(|reason| reason.cause == Cause::Failed)
+    );
+    assert_eq!(report.starts, 20 * report.reasons.len());
+}
+
+/// Robot deliveries with batteries and deadlines, and rovers with and without energy.
+const PROBLEMS: &[(&str, &[&str])] = &[
+    (
+        "delivery_battery/domain.pddl",
+        &["delivery_battery/p1.pddl", "delivery_battery/p2.pddl"],
+    ),
+    (
+        "pddl/ipc-2002/rovers-time-simple-automatic/domain.pddl",
+        &[
+            "pddl/ipc-2002/rovers-time-simple-automatic/instances/instance-1.pddl",
+            "pddl/ipc-2002/rovers-time-simple-automatic/instances/instance-2.pddl",
+        ],
+    ),
+    (
+        "pddl/ipc-2002/rovers-time-automatic/domain.pddl",
+        &[
+            "pddl/ipc-2002/rovers-time-automatic/instances/instance-1.pddl",
+            "pddl/ipc-2002/rovers-time-automatic/instances/instance-2.pddl",
+        ],
+    ),
+    (
+        "pddl/strathclyde/rovers-metric-time-2006/domain.pddl",
+        &["pddl/strathclyde/rovers-metric-time-2006/instances/instance-1.pddl"],
+    ),
+];
+
+#[test]
+fn problems_of_others_are_executed_without_change() {
+    let Some(data) = shared::data() else { return };
+    let read = |path: &str| {
+        let bytes = std::fs::read(data.join(path)).expect("a file of the data");
+        String::from_utf8_lossy(&bytes).into_owned()
+    };
+    let chances = "
+        [defaults]
+        becomes_true = 0.001
+        becomes_false = 0.01
+        start = 0.8
+        effect = 0.95";
+    for (domain, problems) in PROBLEMS {
+        for problem in *problems {
+            let scene = Scene::new(&read(domain), &read(problem), None).with_likelihoods(chances);
+            let failing = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = 0.2";
+            for (world, seeds) in [("", 1), (failing, 3)] {
+                for seed in 0..seeds {
+                    let report = scene.run("adaptable", &scene.world(world), seed);
+                    let words = format!("{problem}, seed {seed}: {:?}", report.reasons);
+                    assert_eq!(report.verdict, Verdict::GoalReached, "{words}");
+                    assert!(is_valid(&scene, &report), "{words}");
+                }
+            }
+        }
+    }
+}

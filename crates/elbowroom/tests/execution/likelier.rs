@@ -1,0 +1,75 @@
+//! `live:X` gives a plan up for a likelier one.
+
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::Verdict;
+use elbowroom::sim::WorldModel;
+
+use crate::scene::Scene;
+
+/// Two orders, the nearer of which has next to no time to spare.
+fn hasty_order() -> (Scene, WorldModel) {
+    let scene = Scene::two_orders("425", "800");
+    let model = scene.world(
+        "[[duration]]\naction = \"make-base-1\"\n\
+         normal = { mean = 170, deviation = 70, minimum = 0 }\n\
+         [[duration]]\naction = \"make-base-2\"\n\
+         normal = { mean = 160, deviation = 70, minimum = 0 }\n",
+    );
+    (scene, model)
+}
+
+#[test]
+fn an_order_that_will_hardly_be_in_time_is_dropped_for_one_that_will() {
+    let (scene, model) = hasty_order();
+    let first = scene
+        .plan
+        .steps
+        .iter()
+        .map(|step| step.action.name.as_str());
+    assert!(
+        first
+            .clone()
+            .any(|name| name.contains("deliver rover front simple"))
+    );
+    let count = 30;
+    let (mut patient, mut prudent) = (0, 0);
+    for seed in 0..count {
+        let report = scene.run("live", &model, seed);
+        patient += u32::from(report.verdict == Verdict::GoalReached);
+        let report = scene.run_likeliest("live:5", &model, seed);
+        prudent += u32::from(report.verdict == Verdict::GoalReached);
+        let why = report.reasons.first().expect("the first plan is given up");
+        assert_eq!(why.cause, Cause::Likelier, "{report:#?}");
+    }
+    println!("{prudent} against {patient} of {count}");
+    // Without looking at the odds, an order is dropped when it is late, and then it is too late for
+    // the other one.
+    assert!(
+        prudent >= patient + 5,
+        "{prudent} against {patient} of {count}"
+    );
+    assert!(
+        prudent * 10 >= 9 * u32::try_from(count).expect("few"),
+        "{prudent} of {count}"
+    );
+}
+
+#[test]
+fn where_everything_goes_as_planned_no_plan_is_likelier() {
+    for scene in [
+        Scene::case("delivery"),
+        Scene::case("match"),
+        hasty_order().0,
+    ] {
+        let model = WorldModel::as_planned();
+        let plain = scene.run("live", &model, 0);
+        assert_eq!(scene.run_likeliest("live:0", &model, 0), plain);
+    }
+}
+
+#[test]
+fn a_small_advantage_is_not_worth_a_new_plan() {
+    let (scene, model) = hasty_order();
+    let plain = scene.run("live", &model, 3);
+    assert_eq!(scene.run_likeliest("live:100", &model, 3), plain);
+}

@@ -1,0 +1,173 @@
+//! Which facts are coupled: how they get into one cluster, and out of it again.
+
+use elbowroom_model::ground::FactId;
+
+use super::super::cluster::Cluster;
+use super::super::outcome::by_itself;
+use super::{Facts, MOST_COUPLED, Record};
+use crate::model::Model;
+
+impl Facts {
+    /// The facts among these that are not certain in the present layer.
+    pub(super) fn open(&mut self, model: &Model, facts: &[usize]) -> Vec<usize> {
+        let mut open = Vec::new();
+        for &fact in facts {
+            let is_coupled = self.records[fact].cluster.is_some();
+            let is_open = is_coupled || {
+                let p = self.single(model, fact);
+                p > 0.0 && p < 1.0
+            };
+            if is_open {
+                open.push(fact);
+            }
+        }
+        open
+    }
+
+    /// The truth of a basic fact, those of a cluster being as the bits of `index` say.
+    ///
+    /// Facts on their own are certain where this is asked.
+    pub(super) fn is_true(
+        &self,
+        model: &Model,
+        fact: FactId,
+        coupled: &[usize],
+        index: usize,
+    ) -> bool {
+        let Some(position) = model.position(fact) else {
+            return false;
+        };
+        match coupled.iter().position(|&own| own == position) {
+            Some(place) => index & (1 << place) != 0,
+            None => self.records[position].p > 0.5,
+        }
+    }
+
+    /// Puts facts into one cluster, with all that they are already coupled to.
+    pub(super) fn couple(&mut self, model: &Model, facts: &[usize]) -> Result<u32, usize> {
+        let mut slots: Vec<u32> = Vec::new();
+        let mut singles: Vec<usize> = Vec::new();
+        for &fact in facts {
+            match self.records[fact].cluster {
+                Some(slot) if !slots.contains(&slot) => slots.push(slot),
+                Some(_) => {}
+                None => singles.push(fact),
+            }
+        }
+        let in_clusters = slots
+            .iter()
+            .map(|&slot| self.cluster(model, slot).facts.len());
+        let count = in_clusters.sum::<usize>() + singles.len();
+        if count > MOST_COUPLED {
+            return Err(count);
+        }
+        if let ([slot], []) = (slots.as_slice(), singles.as_slice()) {
+            return Ok(*slot);
+        }
+        let mut merged = Cluster::unit(self.layer);
+        for slot in slots {
+            self.cluster(model, slot);
+            if let Some(part) = self.clusters[slot as usize].clone() {
+                merged.extend(&part.facts, &part.weights);
+            }
+            self.set_cluster(slot, None);
+        }
+        for fact in singles {
+            let p = self.single(model, fact);
+            merged.extend(&[fact], &[1.0 - p, p]);
+        }
+        let slot = u32::try_from(self.clusters.len()).expect("few clusters");
+        for &fact in &merged.facts {
+            self.put_record(
+                fact,
+                Record {
+                    layer: self.layer,
+                    p: f64::NAN,
+                    cluster: Some(slot),
+                },
+            );
+        }
+        self.clusters.push(Some(merged));
+        Ok(slot)
+    }
+
+    /// Lets facts that have become certain go their own way.
+    pub(super) fn release_certain(&mut self, slot: u32) {
+        let Some(mut cluster) = self.clusters[slot as usize].clone() else {
+            return;
+        };
+        let mut is_changed = false;
+        for &fact in &cluster.facts.clone() {
+            let place = cluster.place(fact);
+            let p = cluster.marginal(place);
+            let bit = 1 << place;
+            let is_false = cluster.mass(|index| index & bit != 0) == 0.0;
+            let is_true = cluster.mass(|index| index & bit == 0) == 0.0;
+            if is_false || is_true || cluster.facts.len() == 1 {
+                cluster.remove(place);
+                let p = if is_false {
+                    0.0
+                } else if is_true {
+                    1.0
+                } else {
+                    p
+                };
+                let record = Record {
+                    layer: cluster.layer,
+                    p,
+                    cluster: None,
+                };
+                self.put_record(fact, record);
+                is_changed = true;
+            }
+        }
+        if is_changed {
+            let rest = (!cluster.facts.is_empty()).then_some(cluster);
+            self.set_cluster(slot, rest);
+        }
+    }
+
+    /// Takes a fact out of its cluster, if it is in one; from the present layer it has `p`.
+    pub(super) fn split_off(&mut self, fact: usize, p: f64) {
+        let record = Record {
+            layer: self.layer,
+            p,
+            cluster: None,
+        };
+        if let Some(slot) = self.records[fact].cluster
+            && let Some(mut cluster) = self.clusters[slot as usize].clone()
+        {
+            cluster.remove(cluster.place(fact));
+            let rest = (!cluster.facts.is_empty()).then_some(cluster);
+            self.set_cluster(slot, rest);
+        }
+        self.put_record(fact, record);
+    }
+
+    /// The same, for a fact that forgets its past and has `p` from the layer `next`.
+    pub(super) fn forget(&mut self, model: &Model, fact: usize, p: f64, next: u32) {
+        if let Some(slot) = self.records[fact].cluster {
+            self.cluster(model, slot);
+        }
+        self.split_off(fact, p);
+        self.set_record_at(fact, p, next);
+    }
+
+    /// A cluster, brought up to the present layer.
+    pub(super) fn cluster(&mut self, model: &Model, slot: u32) -> &Cluster {
+        let layer = self.layer;
+        let is_behind = |cluster: &Cluster| cluster.layer < layer;
+        if let Some(mut cluster) = self.clusters[slot as usize].clone().filter(is_behind) {
+            for _ in cluster.layer..layer {
+                for place in 0..cluster.facts.len() {
+                    let flip = model.flips[cluster.facts[place]];
+                    cluster.transform(place, by_itself(flip));
+                }
+            }
+            cluster.layer = layer;
+            self.set_cluster(slot, Some(cluster));
+        }
+        let cluster = self.clusters[slot as usize].as_ref();
+        cluster.expect("facts refer to clusters that are there")
+    }
+}
