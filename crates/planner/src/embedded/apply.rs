@@ -1,14 +1,20 @@
 //! From one state to the next.
 
-use elbowroom_model::problem::{Comparison, UpdateOperator};
+mod durations;
+mod effects;
+mod places;
+
+use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
-use super::compile::{Action, Change, Compiled, NONE, Snap, Update};
+use super::compile::{Action, Compiled, NONE};
 use super::formula::{Formula, set};
 use super::network::{NodeId, SETTLED};
 use super::state::{Open, State};
 use super::symbolic::{self, Form, Moment};
 use super::time::{NEVER, Ticks};
+use durations::demand_duration;
+use places::{insert, reach_foreseen_end, settle};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -42,13 +48,6 @@ pub(crate) struct Log {
     /// For each end of an action its node, that of its start if it started in the plan, and the
     /// duration's exact bounds.
     pub(crate) ends: Vec<(NodeId, NodeId, Rational, Option<Rational>)>,
-}
-
-/// When a happening may be.
-struct Place {
-    earliest: Ticks,
-    latest: Ticks,
-    after: Vec<(NodeId, Ticks)>,
 }
 
 impl<'a> Stepper<'a> {
@@ -338,30 +337,6 @@ impl<'a> Stepper<'a> {
         Some(())
     }
 
-    /// When the snap may happen, after all that was chosen before.
-    fn place(&self, state: &State, snap: &Snap) -> Place {
-        let mut place = Place {
-            earliest: self.compiled.now,
-            latest: self.horizon,
-            after: Vec::new(),
-        };
-        for &(stamp, distance) in &snap.after {
-            place.earliest = place.earliest.max(state.stamps[stamp as usize] + distance);
-        }
-        for &(stamp, node) in &state.network.marks {
-            if let Ok(found) = snap.after.binary_search_by_key(&stamp, |after| after.0) {
-                place.after.push((node, snap.after[found].1));
-            }
-        }
-        for &(timed, distance) in &snap.before_timed {
-            if timed >= state.timed {
-                let time = self.compiled.timed[timed as usize].time;
-                place.latest = place.latest.min(time - distance);
-            }
-        }
-        place
-    }
-
     fn require(
         &self,
         state: &State,
@@ -419,154 +394,6 @@ impl<'a> Stepper<'a> {
             bits | u64::from(holds(guard)) << number.min(63)
         })
     }
-
-    /// The bounds of an action that would start now, and the duration if there is only one.
-    fn duration_bounds(
-        &mut self,
-        state: &State,
-        action: &Action,
-    ) -> Option<(Ticks, Ticks, Option<Rational>)> {
-        let mut least = action.duration.least.clone();
-        let mut most = action.duration.most.clone();
-        for bound in action.duration.bounds.iter().filter(|bound| !bound.at_end) {
-            let value = match bound.value.value(&state.values, None) {
-                // It depends on times, and is demanded of them.
-                None if state.symbolic.is_some() => continue,
-                value => value?,
-            };
-            let (raises, lowers) = sides(bound.comparison);
-            if raises && value > least {
-                least.clone_from(&value);
-            }
-            if lowers && most.as_ref().is_none_or(|most| value < *most) {
-                most = Some(value);
-            }
-        }
-        if most.as_ref().is_some_and(|most| *most < least) {
-            return None;
-        }
-        let scale = self.compiled.scale;
-        let duration = (most.as_ref() == Some(&least)).then(|| least.clone());
-        let (up, is_exact) = scale.ceil(&least);
-        self.has_rounded |= !is_exact;
-        let down = match &most {
-            None => NEVER,
-            Some(most) => {
-                let (down, is_exact) = scale.floor(most);
-                self.has_rounded |= !is_exact;
-                down
-            }
-        };
-        // Between two ticks, take the lower one for both.
-        let least = if up > down { down } else { up };
-        Some((least, down, duration))
-    }
-
-    fn narrow(
-        &mut self,
-        least: &mut Ticks,
-        most: &mut Ticks,
-        comparison: Comparison,
-        value: &Rational,
-    ) {
-        let (raises, lowers) = sides(comparison);
-        let (down, is_exact) = self.compiled.scale.floor(value);
-        self.has_rounded |= !is_exact;
-        if raises {
-            *least = (*least).max(down);
-        }
-        if lowers {
-            *most = (*most).min(down);
-        }
-    }
-
-    /// Carries out the effects: all read the state on arrival.
-    fn take_effect(
-        &mut self,
-        state: &mut State,
-        snap: &Snap,
-        guards: u64,
-        duration: Option<&Rational>,
-        moment: &Moment,
-    ) -> Option<()> {
-        let (mut adds, mut deletes) = (Vec::new(), Vec::new());
-        let mut updates: Vec<&Update> = snap.updates.iter().collect();
-        for effect in &snap.conditional {
-            let was_chosen = effect
-                .at_start
-                .is_none_or(|guard| guards >> guard.min(63) & 1 == 1);
-            if was_chosen && self.require(state, &effect.now, duration).is_some() {
-                match &effect.change {
-                    Change::Add(fact) => adds.push(*fact),
-                    Change::Delete(fact) => deletes.push(*fact),
-                    Change::Update(update) => updates.push(update),
-                }
-            }
-        }
-        if state.symbolic.is_some() {
-            self.update_symbolic(state, &updates, moment)?;
-        } else {
-            update_values(state, &updates, duration)?;
-        }
-        for &fact in snap.deletes.iter().chain(&deletes) {
-            set(&mut state.facts, fact, false);
-        }
-        for &fact in snap.adds.iter().chain(&adds) {
-            set(&mut state.facts, fact, true);
-        }
-        if !self.compiled.strata.is_empty() {
-            state.derive(self.compiled);
-        }
-        Some(())
-    }
-
-    fn update_symbolic(
-        &mut self,
-        state: &mut State,
-        updates: &[&Update],
-        moment: &Moment,
-    ) -> Option<()> {
-        if updates.is_empty() {
-            return Some(());
-        }
-        let fluents: Vec<u32> = updates.iter().map(|update| update.fluent).collect();
-        self.watch(state, &fluents, moment)?;
-        let read: Option<Vec<_>> = updates
-            .iter()
-            .map(|update| symbolic::read(state, update, moment))
-            .collect();
-        for (fluent, operator, amount) in read? {
-            symbolic::update(state, fluent, operator, &amount, moment)?;
-        }
-        self.watch(state, &fluents, moment)
-    }
-}
-
-/// Carries out numeric effects; all read the state on arrival.
-fn update_values(
-    state: &mut State,
-    updates: &[&Update],
-    duration: Option<&Rational>,
-) -> Option<()> {
-    if updates.is_empty() {
-        return Some(());
-    }
-    let amounts: Option<Vec<Rational>> = updates
-        .iter()
-        .map(|update| update.value.value(&state.values, duration))
-        .collect();
-    for (update, amount) in updates.iter().zip(amounts?) {
-        let place = &mut state.values[update.fluent as usize];
-        *place = Some(match (update.operator, place.take()) {
-            (UpdateOperator::Assign, _) => amount,
-            (_, None) => return None,
-            (UpdateOperator::Increase, Some(old)) => old + amount,
-            (UpdateOperator::Decrease, Some(old)) => old - amount,
-            (UpdateOperator::ScaleUp, Some(old)) => old * amount,
-            (UpdateOperator::ScaleDown, Some(old)) => old.checked_div(&amount)?,
-        });
-    }
-    Some(())
 }
 
 /// A moment, where numbers depend on times; elsewhere nobody looks at it.
@@ -584,100 +411,4 @@ fn duration_form(duration: Option<&Rational>, start: NodeId, end: NodeId) -> For
         Some(duration) => Form::constant(duration.clone()),
         None => Form::node(end).plus(&Rational::from(-1), &Form::node(start)),
     }
-}
-
-/// Gives the happening its place in time. It is settled if nothing can push it and nothing
-/// pushes back.
-fn insert(
-    state: &mut State,
-    settles: bool,
-    snap: &Snap,
-    place: &Place,
-    is_unsettled: bool,
-) -> Option<NodeId> {
-    if !is_unsettled && place.after.is_empty() && settles {
-        if place.earliest > place.latest {
-            return None;
-        }
-        for &stamp in &snap.marks {
-            let stamp = &mut state.stamps[stamp as usize];
-            *stamp = (*stamp).max(place.earliest);
-        }
-        state.settled_end = state.settled_end.max(place.earliest);
-        return Some(SETTLED);
-    }
-    let node = state
-        .network
-        .add_node(place.earliest, place.latest, &place.after)
-        .ok()?;
-    for &stamp in &snap.marks {
-        state.network.mark(stamp, node);
-    }
-    Some(node)
-}
-
-/// Lets an action end whose end has been in the network since its start.
-fn reach_foreseen_end(state: &mut State, snap: &Snap, place: &Place, end: NodeId) -> Option<()> {
-    for &(from, distance) in &place.after {
-        state.network.add_edge(from, end, distance).ok()?;
-    }
-    state.network.delay(end, place.earliest).ok()?;
-    state.network.hurry(end, place.latest).ok()?;
-    for &stamp in &snap.marks {
-        state.network.mark(stamp, end);
-    }
-    Some(())
-}
-
-/// Demands the duration constraints that depend on the state.
-fn demand_duration(
-    state: &mut State,
-    action: &Action,
-    at_end: bool,
-    moment: &Moment,
-) -> Option<()> {
-    for bound in action
-        .duration
-        .bounds
-        .iter()
-        .filter(|bound| bound.at_end == at_end)
-    {
-        let value = symbolic::value(state, &bound.value, moment)?;
-        let duration = moment.duration.clone()?;
-        let difference = duration.plus(&Rational::from(-1), &value);
-        symbolic::demand(state, difference, bound.comparison)?;
-    }
-    Some(())
-}
-
-/// Whether a duration constraint bounds from below, and from above.
-fn sides(comparison: Comparison) -> (bool, bool) {
-    match comparison {
-        Comparison::Less | Comparison::AtMost => (false, true),
-        Comparison::Equal => (true, true),
-        Comparison::AtLeast | Comparison::Greater => (true, false),
-    }
-}
-
-/// Takes what nothing can push any more out of the network.
-fn settle(state: &mut State) {
-    if state.network.is_empty() {
-        return;
-    }
-    let open = &state.open;
-    let mut nodes = open.iter().map(|open| open.node).filter(|&n| n != SETTLED);
-    let end = state.network.earliest_end();
-    let stamps = &mut state.stamps;
-    let names = state.network.settle(&mut nodes, &mut |stamp, time| {
-        let stamp = &mut stamps[stamp as usize];
-        *stamp = (*stamp).max(time);
-    });
-    for open in &mut state.open {
-        if open.node != SETTLED {
-            open.node = names[open.node as usize];
-        }
-    }
-    // At its earliest, what is left may be earlier than what was settled; but it cannot end
-    // earlier than it does now.
-    state.settled_end = state.settled_end.max(end);
 }

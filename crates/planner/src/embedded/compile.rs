@@ -10,16 +10,23 @@
 mod builder;
 mod directions;
 mod eager;
+mod eagerness;
 mod gaps;
+mod initial;
 mod interference;
+mod reads;
+mod rules;
+mod shortened;
 mod symbols;
+mod times;
+mod unsupported;
 
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
-pub use builder::Unsupported;
 pub(crate) use builder::{Failure, compile};
+pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
 use super::state::State;

@@ -104,6 +104,50 @@ fn a_continuous_effect_is_read_while_it_goes_on() {
     );
 }
 
+#[test]
+fn actions_that_use_up_a_stock_run_side_by_side() {
+    let domain = "
+        (:requirements :typing :durative-actions :numeric-fluents)
+        (:types part) (:predicates (made ?p - part) (raw ?p - part))
+        (:functions (stock))
+        (:durative-action make :parameters (?p - part) :duration (= ?duration 10)
+          :condition (and (at start (raw ?p)) (over all (>= (stock) 0)))
+          :effect (and (at start (not (raw ?p))) (at end (made ?p))
+                       (at end (decrease (stock) 2))))";
+    let problem = "(:objects a b c - part) (:init (raw a) (raw b) (raw c) (= (stock) 6))
+                   (:goal (and (made a) (made b) (made c)))";
+    assert_eq!(makespan(&answer(domain, problem)), "10");
+}
+
+/// A courier who carries a parcel to a counter; handing it over ends the carrying that it needs
+/// throughout.
+const COUNTER: &str = "
+    (:requirements :typing :durative-actions :timed-initial-literals)
+    (:types place) (:predicates (at ?p - place) (open ?p - place) (parcel ?p - place)
+      (carrying) (delivered))
+    (:durative-action go :parameters (?a ?b - place) :duration (= ?duration 10)
+      :condition (at start (at ?a)) :effect (and (at start (not (at ?a))) (at end (at ?b))))
+    (:durative-action take :parameters (?p - place) :duration (= ?duration 5)
+      :condition (and (over all (at ?p)) (at start (parcel ?p)))
+      :effect (and (at start (not (parcel ?p))) (at end (carrying))))
+    (:durative-action hand-over :parameters (?p - place) :duration (= ?duration 1)
+      :condition (and (over all (at ?p)) (over all (carrying)) (over all (open ?p)))
+      :effect (and (at end (not (carrying))) (at end (delivered))))";
+
+#[test]
+fn what_must_be_carried_there_takes_both_ways() {
+    let problem = "(:objects home shelf counter - place)
+        (:init (at home) (parcel shelf) (open counter) (at 25.9 (not (open counter))))
+        (:goal (delivered))";
+    // Each of being there, carrying, and the counter's being open is possible in time by itself.
+    assert_eq!(
+        describe(&answer(COUNTER, problem)),
+        "no plan exists: `(delivered)` cannot be reached before `(open counter)` closes at 25.9"
+    );
+    let later = problem.replace("25.9", "26.1");
+    assert_eq!(makespan(&answer(COUNTER, &later)), "26");
+}
+
 const LAMPS: &str = "
     (:requirements :adl :typing)
     (:types lamp)

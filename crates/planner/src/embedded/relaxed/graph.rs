@@ -1,11 +1,14 @@
 //! The relaxed problem: propositions and operators without deletions.
 
+mod timetables;
+
 use std::ops::Range;
 
-use super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Timed, Update};
-use super::super::formula::{Formula, Literal};
+use super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
+use super::super::formula::Formula;
 use super::super::time::{NEVER, Ticks};
 use super::numbers;
+pub(crate) use timetables::Window;
 
 /// What an operator stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,17 +36,6 @@ pub(crate) struct Operator {
     pub(crate) windows: Range<usize>,
     /// The least time from when the preconditions hold to when it is over.
     pub(crate) span: Ticks,
-}
-
-/// A literal that changes at fixed times only, and an operator needs.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Window {
-    /// Position in [`Graph::timetable`].
-    pub(crate) timetable: u32,
-    /// The operator must begin at least so long after the literal has become true …
-    pub(crate) lead: Ticks,
-    /// … and at least so long before it becomes false.
-    pub(crate) tail: Ticks,
 }
 
 /// See the module.
@@ -132,30 +124,10 @@ impl Graph {
         self.first_running + action
     }
 
-    /// Whether the literal changes at fixed times only.
-    pub(crate) fn has_timetable(&self, literal: Literal) -> bool {
-        self.timetable_of[literal.index()] != NONE
-    }
-
     /// The operators of an action's start and end; [`NONE`] if there is none.
     pub(crate) fn operators_of(&self, action: u32) -> (u32, u32) {
         let end = self.end_of[action as usize];
         (self.start_of[action as usize], end)
-    }
-
-    /// Takes the literal of a timetable to be true at all times; returns when it was.
-    pub(crate) fn forget_timetable(&mut self, number: usize) -> Vec<(Ticks, Ticks)> {
-        std::mem::replace(&mut self.timetable[number], vec![(-NEVER, NEVER)])
-    }
-
-    /// The literal of a timetable.
-    pub(crate) fn timetable_literal(&self, number: usize) -> Option<Literal> {
-        let number = narrow(number);
-        let place = self
-            .timetable_of
-            .iter()
-            .position(|&entry| entry == number)?;
-        Some(Literal(narrow(place)))
     }
 
     /// Where in `needing_list` the operators stand that need the proposition.
@@ -373,85 +345,6 @@ impl Graph {
             let kind = Kind::Timed(narrow(number));
             self.add(kind, 1, Vec::new(), &effects, gains);
         }
-    }
-
-    /// Finds the literals that only timed initials change.
-    fn add_timetables(&mut self, compiled: &Compiled) {
-        self.timetable_of = vec![NONE; 2 * compiled.facts.len()];
-        if compiled.timed.is_empty() {
-            return;
-        }
-        let mut is_changed = vec![false; compiled.facts.len()];
-        for snap in &compiled.snaps {
-            for &fact in snap.adds.iter().chain(&snap.deletes) {
-                is_changed[fact as usize] = true;
-            }
-            for effect in &snap.conditional {
-                if let Change::Add(fact) | Change::Delete(fact) = effect.change {
-                    is_changed[fact as usize] = true;
-                }
-            }
-        }
-        for &fact in compiled.derived.iter().flatten() {
-            is_changed[fact as usize] = true;
-        }
-        for fact in (0..narrow(compiled.facts.len())).filter(|&f| !is_changed[f as usize]) {
-            let touches =
-                |timed: &&Timed| timed.adds.contains(&fact) || timed.deletes.contains(&fact);
-            if !compiled.timed.iter().any(|timed| touches(&timed)) {
-                continue;
-            }
-            for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
-                let mut spans = Vec::new();
-                let mut since = literal.holds(&compiled.initial.facts).then_some(-NEVER);
-                for timed in compiled.timed.iter().filter(touches) {
-                    let is_true = timed.adds.contains(&fact);
-                    match (since, is_true == literal.truth()) {
-                        (None, true) => since = Some(timed.time),
-                        (Some(begin), false) => {
-                            spans.push((begin, timed.time));
-                            since = None;
-                        }
-                        _ => {}
-                    }
-                }
-                spans.extend(since.map(|begin| (begin, NEVER)));
-                self.timetable_of[literal.index()] = narrow(self.timetable.len());
-                self.timetable.push(spans);
-            }
-        }
-    }
-
-    /// The windows in which the operator can begin.
-    fn windows_of(&mut self, compiled: &Compiled, draft: &Draft<'_>) -> Range<usize> {
-        let begin = self.windows.len();
-        if self.timetable.is_empty() {
-            return begin..begin;
-        }
-        let epsilon = compiled.epsilon;
-        let least = least_ticks(compiled, draft.action);
-        let most = most_ticks(compiled, draft.action);
-        let mut add = |formula: &Formula, lead: Ticks, tail: Ticks| {
-            for literal in &formula.literals {
-                let timetable = self.timetable_of[literal.index()];
-                if timetable != NONE {
-                    self.windows.push(Window {
-                        timetable,
-                        lead,
-                        tail,
-                    });
-                }
-            }
-        };
-        add(&draft.snaps[0].condition, epsilon, epsilon);
-        if !matches!(draft.kind, Kind::End(_)) {
-            add(&draft.action.over_all, 0, least);
-            if draft.action.end != NONE {
-                let end = &compiled.snap(draft.action.end).condition;
-                add(end, (epsilon - most).max(-NEVER), least + epsilon);
-            }
-        }
-        begin..self.windows.len()
     }
 
     /// Sorts the operators by what they need.

@@ -163,7 +163,10 @@ impl Run {
             if left == Some(Duration::ZERO) {
                 return Some(Ending::TimeLimit);
             }
-            self.measure(elapsed);
+            // So short before the end, measuring would only delay it.
+            if left.is_none_or(|left| left > TICK) {
+                self.measure(elapsed);
+            }
             let Usage { memory, work } = self.usage;
             if self.limits.memory.is_some_and(|limit| memory > limit) {
                 return Some(Ending::MemoryLimit);

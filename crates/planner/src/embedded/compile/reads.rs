@@ -1,0 +1,54 @@
+//! What actions read and change.
+
+use elbowroom_model::ground::{self, Body, Change as ModelChange};
+
+use super::symbols::Symbols;
+
+/// Numbers what the action's conditions read.
+pub(super) fn read_action(symbols: &mut Symbols, action: &ground::Action) {
+    let snap = |symbols: &mut Symbols, snap: &ground::SnapAction| {
+        symbols.formula(&snap.condition);
+        for effect in &snap.effects {
+            symbols.formula(&effect.guard.now);
+            symbols.formula(&effect.guard.at_start);
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(body) => snap(symbols, body),
+        Body::Durative(body) => {
+            snap(symbols, &body.start);
+            snap(symbols, &body.end);
+            symbols.formula(&body.over_all);
+            for constraint in &body.duration {
+                symbols.numeric(&constraint.bound);
+            }
+            for effect in &body.continuous {
+                symbols.formula(&effect.guard.at_start);
+            }
+        }
+    }
+}
+
+/// Calls `visit` for each numeric effect of the action.
+pub(super) fn visit_changes(
+    action: &ground::Action,
+    visit: &mut impl FnMut(ground::FluentId, &ground::Expression),
+) {
+    let effects = |effects: &[ground::Effect], visit: &mut dyn FnMut(_, &_)| {
+        for effect in effects {
+            if let ModelChange::Update { fluent, value, .. } = &effect.change {
+                visit(*fluent, value);
+            }
+        }
+    };
+    match &action.body {
+        Body::Instantaneous(body) => effects(&body.effects, visit),
+        Body::Durative(body) => {
+            effects(&body.start.effects, visit);
+            effects(&body.end.effects, visit);
+            for effect in &body.continuous {
+                visit(effect.fluent, &effect.rate);
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! What cannot be searched.
+
+use elbowroom_model::ground;
+
+/// A feature that the embedded planner does not handle, with the action or the like that uses it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the embedded planner does not handle {feature} ({place}); try an external planner")]
+pub struct Unsupported {
+    /// What it is.
+    pub feature: String,
+    /// Where it was met.
+    pub place: String,
+}
+
+/// Refuses what cannot be searched.
+pub(super) fn check(action: &ground::Action) -> Result<(), Unsupported> {
+    let refuse = |feature: &str| {
+        Err(Unsupported {
+            feature: feature.to_owned(),
+            place: format!("action {}", action.name),
+        })
+    };
+    let mut has_unknown = false;
+    let _ = action.map_leaves(&mut |leaf| {
+        has_unknown |= matches!(leaf, ground::Expression::Unknown(_));
+        None
+    });
+    if has_unknown {
+        return refuse("numbers left open (:synth-parameters)");
+    }
+    let Some(body) = action.durative() else {
+        return Ok(());
+    };
+    let guarded = |effect: &&ground::Effect| !effect.guard.over_all.is_trivial();
+    if body.end.effects.iter().any(|e| guarded(&e)) {
+        return refuse("effects under a condition over the whole action");
+    }
+    if body
+        .continuous
+        .iter()
+        .any(|e| !e.guard.over_all.is_trivial())
+    {
+        return refuse("continuous effects under a condition over the whole action");
+    }
+    Ok(())
+}
