@@ -7,6 +7,7 @@
 
 mod explain;
 mod news;
+mod progress;
 mod watch;
 
 pub(crate) use watch::{in_words, replan, unmet};
@@ -23,6 +24,7 @@ use elbowroom_stn::{ConsistentNetwork, Network};
 use crate::executor::{Mission, Planned, StepId};
 use crate::horizon::Horizon;
 use crate::reason::{Cause, Reason};
+use progress::Progress;
 
 /// Finite bounds of a constraint.
 pub(crate) type Bounds = (Option<Rational>, Option<Rational>);
@@ -53,23 +55,6 @@ pub(crate) struct Dispatch {
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
     progress: Progress,
-}
-
-/// What has happened of a plan.
-#[derive(Clone, Debug)]
-struct Progress {
-    /// When each node happened, on the plan's clock.
-    happened: Vec<Option<Rational>>,
-    /// For each node, how many of those that come before it have not happened.
-    missing: Vec<u32>,
-    /// For each node, those that come after it.
-    successors: Vec<Vec<NodeId>>,
-    /// Starts that have everything behind them that must come before.
-    ready: BTreeSet<NodeId>,
-    /// Instances that were told to start and have not ended.
-    running: BTreeSet<InstanceId>,
-    /// Instances that have not ended.
-    left: usize,
 }
 
 impl Dispatch {
@@ -242,99 +227,6 @@ impl Dispatch {
             }
         }
     }
-}
-
-impl Progress {
-    /// Nothing has happened. `constraints` are the plan's, without parameters.
-    fn new(plan: &StnPlan, constraints: &[Constraint]) -> Self {
-        let count = plan.nodes.len();
-        let mut progress = Self {
-            happened: vec![None; count],
-            missing: vec![0; count],
-            successors: vec![Vec::new(); count],
-            ready: BTreeSet::new(),
-            running: BTreeSet::new(),
-            left: plan.instances.len(),
-        };
-        let mut before = vec![BTreeSet::new(); count];
-        let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
-            let is_end = matches!(plan.nodes[earlier.index()], Node::End(_));
-            let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
-            // A start that may fall together with another one does not wait for it.
-            let waits = least.is_positive() || (least.is_zero() && is_end);
-            if waits && !is_timed && earlier != NodeId::ZERO {
-                before[later.index()].insert(earlier);
-            }
-        };
-        for constraint in constraints {
-            if duration_of(plan, constraint).is_some() {
-                order(constraint.from, constraint.to, &Rational::ONE);
-                continue;
-            }
-            if let Bound::Finite(lower) = &constraint.lower {
-                order(constraint.from, constraint.to, lower);
-            }
-            if let Bound::Finite(upper) = &constraint.upper {
-                order(constraint.to, constraint.from, &-upper);
-            }
-        }
-        for (node, what) in plan.nodes() {
-            if !matches!(what, Node::Start(_) | Node::Instant(_)) {
-                continue;
-            }
-            for earlier in with_ends_before(plan, &before, node) {
-                progress.successors[earlier.index()].push(node);
-                progress.missing[node.index()] += 1;
-            }
-        }
-        for (node, what) in plan.nodes() {
-            if matches!(what, Node::Start(_) | Node::Instant(_))
-                && progress.missing[node.index()] == 0
-            {
-                progress.ready.insert(node);
-            }
-        }
-        progress
-    }
-
-    /// Notes that a node has happened.
-    fn happen(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
-        if self.happened[node.index()].replace(time.clone()).is_some() {
-            return;
-        }
-        for after in std::mem::take(&mut self.successors[node.index()]) {
-            let missing = &mut self.missing[after.index()];
-            *missing -= 1;
-            let is_start = matches!(plan.nodes[after.index()], Node::Start(_) | Node::Instant(_));
-            if *missing == 0 && is_start && self.happened[after.index()].is_none() {
-                self.ready.insert(after);
-            }
-        }
-    }
-}
-
-/// What a start waits for: what comes before it, and the ends that come before ends among these.
-///
-/// Ends may fall together and are reported one after the other; the plan then orders only one of
-/// them before the start.
-fn with_ends_before(
-    plan: &StnPlan,
-    before: &[BTreeSet<NodeId>],
-    start: NodeId,
-) -> BTreeSet<NodeId> {
-    let mut all = before[start.index()].clone();
-    let mut frontier: Vec<NodeId> = all.iter().copied().collect();
-    while let Some(node) = frontier.pop() {
-        if !matches!(plan.nodes[node.index()], Node::End(_)) {
-            continue;
-        }
-        for &earlier in &before[node.index()] {
-            if matches!(plan.nodes[earlier.index()], Node::End(_)) && all.insert(earlier) {
-                frontier.push(earlier);
-            }
-        }
-    }
-    all
 }
 
 /// The instance whose duration a constraint bounds.

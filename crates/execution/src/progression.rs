@@ -4,6 +4,7 @@
 //! the effects of happenings one by one; two happenings at one time do not interfere, or else the
 //! executed plan is not valid, which the judge says.
 
+mod effects;
 mod motion;
 mod reading;
 
@@ -11,9 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::ground::{
-    Action, Body, Change, Condition, DurativeBody, Effect, FactId, FluentId, SnapAction,
+    Action, Body, Change, Condition, DurativeBody, FactId, FluentId, SnapAction,
 };
-use elbowroom_model::problem::UpdateOperator;
 use elbowroom_model::{RunningAction, State, Task};
 use elbowroom_num::{Interval, Rational};
 
@@ -308,69 +308,6 @@ impl Progression {
         Ok(())
     }
 
-    /// The effects of a happening: all read the state on arrival, deletions come first.
-    fn happen(
-        &mut self,
-        snap: &SnapAction,
-        duration: Option<&Rational>,
-        guards: Option<&[bool]>,
-        measured: &[Measured],
-    ) -> Result<(), Unreadable> {
-        let mut outcome = Ok(());
-        let takes_place = |(index, effect): &(usize, &Effect)| {
-            guards.is_none_or(|guards| guards[*index])
-                && self.holds(&effect.guard.now, duration) == Ok(true)
-        };
-        let effects = snap.effects.iter().enumerate();
-        let due = effects
-            .filter(takes_place)
-            .map(|(_, effect)| self.amount(&effect.change, duration, measured));
-        let mut due: Vec<(&Change, Result<Rational, Unreadable>)> = due.collect();
-        due.sort_by_key(|(change, _)| matches!(change, Change::Add(_)));
-        for (change, amount) in due {
-            outcome = outcome.and(amount.and_then(|amount| self.apply(change, &amount)));
-        }
-        self.check_guards();
-        outcome
-    }
-
-    /// A change with its amount, read now; 0 for facts.
-    fn amount<'c>(
-        &self,
-        change: &'c Change,
-        duration: Option<&Rational>,
-        measured: &[Measured],
-    ) -> (&'c Change, Result<Rational, Unreadable>) {
-        let amount = match change {
-            Change::Add(_) | Change::Delete(_) => Ok(Rational::ZERO),
-            Change::Update { fluent, value, .. } => {
-                match measured.iter().find(|measured| measured.fluent == *fluent) {
-                    Some(measured) => Ok(measured.amount.clone()),
-                    None => reading::evaluate(value, duration, &self.values),
-                }
-            }
-        };
-        (change, amount)
-    }
-
-    fn apply(&mut self, change: &Change, amount: &Rational) -> Result<(), Unreadable> {
-        match change {
-            Change::Add(fact) => self.set_fact(*fact, true),
-            Change::Delete(fact) => self.set_fact(*fact, false),
-            Change::Update {
-                operator, fluent, ..
-            } => {
-                let old = self.value(*fluent).cloned();
-                let new = updated(*operator, old, amount, *fluent)?;
-                if *operator == UpdateOperator::Assign {
-                    self.doubtful_values.remove(fluent);
-                }
-                self.set_value(*fluent, Some(new));
-            }
-        }
-        Ok(())
-    }
-
     fn set_fact(&mut self, fact: FactId, truth: bool) {
         if self.facts.len() <= fact.index() {
             self.facts.resize(fact.index() + 1, false);
@@ -384,36 +321,6 @@ impl Progression {
             self.values.resize(fluent.index() + 1, None);
         }
         self.values[fluent.index()] = value;
-    }
-
-    /// Guards over the whole of an action must hold at every moment: each change can end them.
-    fn check_guards(&mut self) {
-        let mut lost = Vec::new();
-        for (ticket, underway) in &self.running {
-            let Some(body) = underway.action.durative() else {
-                continue;
-            };
-            let fails = |condition: &Condition| {
-                !condition.is_trivial()
-                    && self.holds(condition, Some(&underway.planned)) != Ok(true)
-            };
-            let ends = body.end.effects.iter().enumerate();
-            let ends = ends.filter(|(_, effect)| fails(&effect.guard.over_all));
-            lost.extend(ends.map(|(index, _)| (*ticket, index, true)));
-            let rates = body.continuous.iter().enumerate();
-            let rates = rates.filter(|(_, effect)| fails(&effect.guard.over_all));
-            lost.extend(rates.map(|(index, _)| (*ticket, index, false)));
-        }
-        for (ticket, index, is_end) in lost {
-            if let Some(underway) = self.running.get_mut(&ticket) {
-                let guards = if is_end {
-                    &mut underway.end_guards
-                } else {
-                    &mut underway.continuous
-                };
-                guards[index] = false;
-            }
-        }
     }
 }
 
@@ -432,25 +339,6 @@ fn decide_guards(body: &mut DurativeBody, underway: &Underway) {
     for effect in &mut body.continuous {
         effect.guard.at_start = Condition::TRUE;
     }
-}
-
-fn updated(
-    operator: UpdateOperator,
-    old: Option<Rational>,
-    amount: &Rational,
-    fluent: FluentId,
-) -> Result<Rational, Unreadable> {
-    if operator == UpdateOperator::Assign {
-        return Ok(amount.clone());
-    }
-    let old = old.ok_or(Unreadable::Undefined(fluent))?;
-    Ok(match operator {
-        UpdateOperator::Assign => amount.clone(),
-        UpdateOperator::Increase => old + amount,
-        UpdateOperator::Decrease => old - amount,
-        UpdateOperator::ScaleUp => old * amount,
-        UpdateOperator::ScaleDown => old.checked_div(amount).ok_or(Unreadable::DivisionByZero)?,
-    })
 }
 
 fn narrow(index: usize) -> u32 {

@@ -1,11 +1,11 @@
 //! One trajectory of a world.
 
+mod world;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_execution::{
-    Command, Ending, Event, Measured, Observation, Passage, Progression, Ticket, World, WorldError,
-};
+use elbowroom_execution::{Ending, Event, Measured, Observation, Progression, Ticket};
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Effect, FactId, FluentId, SnapAction};
 use elbowroom_num::Rational;
@@ -295,104 +295,6 @@ impl<'a> SimWorld<'a> {
         if exogenous.is_reported {
             self.tell(event);
         }
-    }
-}
-
-impl World for SimWorld<'_> {
-    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        self.now = now.clone().max(self.now.clone());
-        let _ = self.truth.advance(&self.now.clone());
-        match command {
-            Command::Start {
-                ticket,
-                action,
-                duration,
-            } => {
-                let count = self.occurrences.entry(action.name.clone()).or_default();
-                let occurrence = *count;
-                *count += 1;
-                self.actions.insert(
-                    *ticket,
-                    Commanded {
-                        action: Arc::clone(action),
-                        planned: duration.clone(),
-                        occurrence,
-                        has_started: false,
-                    },
-                );
-                let mut rng = keyed(self.seed, &action.name, occurrence, Purpose::Delay);
-                let delay = self.model.delay(&action.name, &mut rng);
-                if delay.is_positive() {
-                    self.put(&self.now + delay, Coming::Start(*ticket));
-                } else {
-                    self.happen(self.now.clone(), Some(&Coming::Start(*ticket)));
-                }
-            }
-            Command::Cancel { ticket } => {
-                if self.actions.remove(ticket).is_some() {
-                    self.truth.stop(*ticket);
-                    self.tell(Event::Ended {
-                        ticket: *ticket,
-                        ending: Ending::Cancelled,
-                        measured: Vec::new(),
-                    });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        while self.untold.is_empty() {
-            let first = self.agenda.keys().next().map(|(time, _)| time.clone());
-            // Timed initials can break what is under way.
-            let timed = self.truth.next_timed().cloned();
-            let is_timed = timed
-                .as_ref()
-                .is_some_and(|timed| first.as_ref().is_none_or(|first| timed < first));
-            let next = if is_timed { timed } else { first };
-            let Some(time) = next.filter(|time| time <= until) else {
-                let _ = self.truth.advance(until);
-                self.now = until.clone().max(self.now.clone());
-                break;
-            };
-            let coming = if is_timed {
-                None
-            } else {
-                self.agenda.pop_first().map(|(_, coming)| coming)
-            };
-            self.happen(time.max(self.now.clone()), coming.as_ref());
-        }
-        Ok(Passage {
-            now: self.now.clone(),
-            observations: std::mem::take(&mut self.untold),
-        })
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.truth.know(Arc::clone(task));
-    }
-
-    fn look(
-        &mut self,
-        facts: &[FactId],
-        fluents: &[FluentId],
-    ) -> Result<Vec<Observation>, WorldError> {
-        let facts = facts.iter().map(|&fact| Event::Fact {
-            fact,
-            truth: self.truth.fact(fact),
-        });
-        let values = fluents.iter().filter_map(|&fluent| {
-            Some(Event::Value {
-                fluent,
-                value: self.truth.value(fluent)?.clone(),
-            })
-        });
-        let events = facts.chain(values).map(|event| Observation {
-            time: self.now.clone(),
-            event,
-        });
-        Ok(events.collect())
     }
 }
 

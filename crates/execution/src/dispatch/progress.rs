@@ -1,0 +1,118 @@
+//! What has happened of a plan, and what is ready to be started.
+
+use std::collections::BTreeSet;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan};
+
+use super::duration_of;
+
+/// What has happened of a plan.
+#[derive(Clone, Debug)]
+pub(super) struct Progress {
+    /// When each node happened, on the plan's clock.
+    pub(super) happened: Vec<Option<Rational>>,
+    /// For each node, how many of those that come before it have not happened.
+    pub(super) missing: Vec<u32>,
+    /// For each node, those that come after it.
+    pub(super) successors: Vec<Vec<NodeId>>,
+    /// Starts that have everything behind them that must come before.
+    pub(super) ready: BTreeSet<NodeId>,
+    /// Instances that were told to start and have not ended.
+    pub(super) running: BTreeSet<InstanceId>,
+    /// Instances that have not ended.
+    pub(super) left: usize,
+}
+
+impl Progress {
+    /// Nothing has happened. `constraints` are the plan's, without parameters.
+    pub(super) fn new(plan: &StnPlan, constraints: &[Constraint]) -> Self {
+        let count = plan.nodes.len();
+        let mut progress = Self {
+            happened: vec![None; count],
+            missing: vec![0; count],
+            successors: vec![Vec::new(); count],
+            ready: BTreeSet::new(),
+            running: BTreeSet::new(),
+            left: plan.instances.len(),
+        };
+        let mut before = vec![BTreeSet::new(); count];
+        let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
+            let is_end = matches!(plan.nodes[earlier.index()], Node::End(_));
+            let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
+            // A start that may fall together with another one does not wait for it.
+            let waits = least.is_positive() || (least.is_zero() && is_end);
+            if waits && !is_timed && earlier != NodeId::ZERO {
+                before[later.index()].insert(earlier);
+            }
+        };
+        for constraint in constraints {
+            if duration_of(plan, constraint).is_some() {
+                order(constraint.from, constraint.to, &Rational::ONE);
+                continue;
+            }
+            if let Bound::Finite(lower) = &constraint.lower {
+                order(constraint.from, constraint.to, lower);
+            }
+            if let Bound::Finite(upper) = &constraint.upper {
+                order(constraint.to, constraint.from, &-upper);
+            }
+        }
+        for (node, what) in plan.nodes() {
+            if !matches!(what, Node::Start(_) | Node::Instant(_)) {
+                continue;
+            }
+            for earlier in with_ends_before(plan, &before, node) {
+                progress.successors[earlier.index()].push(node);
+                progress.missing[node.index()] += 1;
+            }
+        }
+        for (node, what) in plan.nodes() {
+            if matches!(what, Node::Start(_) | Node::Instant(_))
+                && progress.missing[node.index()] == 0
+            {
+                progress.ready.insert(node);
+            }
+        }
+        progress
+    }
+
+    /// Notes that a node has happened.
+    pub(super) fn happen(&mut self, plan: &StnPlan, node: NodeId, time: &Rational) {
+        if self.happened[node.index()].replace(time.clone()).is_some() {
+            return;
+        }
+        for after in std::mem::take(&mut self.successors[node.index()]) {
+            let missing = &mut self.missing[after.index()];
+            *missing -= 1;
+            let is_start = matches!(plan.nodes[after.index()], Node::Start(_) | Node::Instant(_));
+            if *missing == 0 && is_start && self.happened[after.index()].is_none() {
+                self.ready.insert(after);
+            }
+        }
+    }
+}
+
+/// What a start waits for: what comes before it, and the ends that come before ends among these.
+///
+/// Ends may fall together and are reported one after the other; the plan then orders only one of
+/// them before the start.
+fn with_ends_before(
+    plan: &StnPlan,
+    before: &[BTreeSet<NodeId>],
+    start: NodeId,
+) -> BTreeSet<NodeId> {
+    let mut all = before[start.index()].clone();
+    let mut frontier: Vec<NodeId> = all.iter().copied().collect();
+    while let Some(node) = frontier.pop() {
+        if !matches!(plan.nodes[node.index()], Node::End(_)) {
+            continue;
+        }
+        for &earlier in &before[node.index()] {
+            if matches!(plan.nodes[earlier.index()], Node::End(_)) && all.insert(earlier) {
+                frontier.push(earlier);
+            }
+        }
+    }
+    all
+}
