@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use elbowroom::flow;
 use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
 use elbowroom::pddl::{Source, read_problem};
 use elbowroom::planner::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 
@@ -239,7 +240,7 @@ fn run(job: &Job, options: &Options) -> Row {
     };
     let epsilon = settings.epsilon.clone();
     let situation = Situation::initial(&task);
-    let mut first_makespan = None;
+    let mut makespans = Vec::new();
     let report = plan(
         &planner,
         &mut Request {
@@ -252,12 +253,19 @@ fn run(job: &Job, options: &Options) -> Row {
         &mut |task, plan| flow::repaired(task, plan, &epsilon),
         &mut |event| {
             if let Event::Plan { found, .. } = event {
-                first_makespan.get_or_insert_with(|| found.makespan.to_decimal(3));
+                makespans.push(found.makespan.clone());
             }
             ControlFlow::Continue(())
         },
     );
-    row.first_makespan = first_makespan.unwrap_or_default();
+    let shown = |makespan: Option<&Rational>| {
+        makespan
+            .map(|makespan| makespan.to_decimal(3))
+            .unwrap_or_default()
+    };
+    row.first_makespan = shown(makespans.first());
+    // Not the last plan's: planners can go on for a metric that has nothing to do with time.
+    row.best_makespan = shown(makespans.iter().min());
     filled(row, &report)
 }
 
@@ -291,9 +299,6 @@ fn filled(row: Row, report: &Report) -> Row {
     Row {
         outcome: report.outcome.name().to_owned(),
         first_seconds: statistics.first_plan.map(seconds).unwrap_or_default(),
-        best_makespan: found
-            .map(|found| found.makespan.to_decimal(3))
-            .unwrap_or_default(),
         plans: statistics.plans.to_string(),
         refused: statistics.refused.to_string(),
         repaired: found
