@@ -25,10 +25,15 @@ pub(crate) const PATIENCE: u64 = 64;
 /// After how many states the stronger bound is asked about the next ones too.
 const DOUBT: u64 = 512;
 
-/// How much of the time the stronger bound may take: more if it cuts many states.
+/// How many states a search evaluates that takes long.
+const LONG: u64 = 4096;
+
+/// How much of the time the stronger bound may take: at first at most about half, if it cuts all
+/// states. Many that it cuts would never have had their turn, so cutting many need not save much;
+/// but the longer a search takes, the likelier it does, and the more is allowed.
 ///
-/// Time is counted in pairs looked up; an estimate takes as long as some hundred of them for each
-/// of its operators.
+/// Time is counted in pairs looked up; an estimate takes as long as some 80 of them for each of its
+/// operators.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     /// How many pairs may be looked up now.
@@ -46,9 +51,10 @@ impl Share {
         cuts: 64,
     };
 
-    /// One more state with an estimate of that size. Whether to ask.
-    fn asks(&mut self, size: u64) -> bool {
-        self.credit = (self.credit + (50 + 4 * self.cuts) * size).min(2 * self.price);
+    /// One more state with an estimate of that size, after so many. Whether to ask.
+    fn asks(&mut self, size: u64, evaluated: u64) -> bool {
+        let doubts = 1 + evaluated / LONG;
+        self.credit = (self.credit + (16 + self.cuts * doubts / 4) * size).min(2 * self.price);
         self.credit >= self.price
     }
 
@@ -374,7 +380,7 @@ impl<'a> Search<'a> {
             Hope::Unknown => {}
         }
         node.hope = Hope::Some;
-        if !self.share.asks(self.relaxed.size()) {
+        if !self.share.asks(self.relaxed.size(), self.evaluated) {
             return false;
         }
         pairs.horizon = self.stepper.horizon;
