@@ -8,6 +8,7 @@
 
 mod clairvoyant;
 mod experiment;
+pub(crate) mod parts;
 mod results;
 mod trials;
 
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
 pub use results::{Cell, Pair, Results, ResultsError};
 
+use parts::Partial;
 use trials::Setting;
 
 /// Which trials to make, and how.

@@ -7,6 +7,7 @@ use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
+use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Part};
 
 /// Counts by row and column. Everything is a sum, so parts add up exactly, in any order.
@@ -118,59 +119,12 @@ impl Results {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// Adds the counts of another part.
-    pub(crate) fn add(&mut self, other: &Self) {
-        for (mine, theirs) in self
-            .cells
-            .iter_mut()
-            .flatten()
-            .zip(other.cells.iter().flatten())
-        {
-            mine.runs += theirs.runs;
-            mine.successes += theirs.successes;
-            mine.replans += theirs.replans;
-            merge(&mut mine.verdicts, &theirs.verdicts);
-            merge(&mut mine.causes, &theirs.causes);
-        }
-        for (mine, theirs) in self
-            .pairs
-            .iter_mut()
-            .flatten()
-            .zip(other.pairs.iter().flatten())
-        {
-            mine.only_first += theirs.only_first;
-            mine.only_this += theirs.only_this;
-        }
-    }
-
     /// Puts parts of one experiment together.
     ///
     /// # Errors
     /// When they are parts of different ones, or the same part comes twice.
     pub fn merged(parts: &[Self]) -> Result<Self, ResultsError> {
-        let Some((first, rest)) = parts.split_first() else {
-            return Err(ResultsError("there is nothing to put together".to_owned()));
-        };
-        let mut whole = first.clone();
-        for part in rest {
-            let same = (&part.fingerprint, part.shards) == (&whole.fingerprint, whole.shards)
-                && (&part.rows, &part.columns) == (&whole.rows, &whole.columns);
-            if !same {
-                return Err(ResultsError(
-                    "these are parts of different experiments".to_owned(),
-                ));
-            }
-            if let Some(twice) = part.parts.iter().find(|shard| whole.parts.contains(shard)) {
-                return Err(ResultsError(format!("part {twice} is there twice")));
-            }
-            whole.add(part);
-            whole.parts.extend(&part.parts);
-        }
-        whole.parts.sort_unstable();
-        if (0..whole.shards).eq(whole.parts.iter().copied()) {
-            (whole.shards, whole.parts) = (1, vec![0]);
-        }
-        Ok(whole)
+        parts::merged(parts).map_err(ResultsError)
     }
 
     /// The table: coverage with its 95 % interval, and mean number of new plans of successful
@@ -198,6 +152,44 @@ impl Results {
             caption: format!("{} ({} trials of each problem)", self.title, self.trials),
             rows: rows.collect(),
             headings,
+        }
+    }
+}
+
+impl Partial for Results {
+    fn origin(&self) -> (&str, u64) {
+        (&self.fingerprint, self.shards)
+    }
+
+    fn has_shape_of(&self, other: &Self) -> bool {
+        (&self.rows, &self.columns) == (&other.rows, &other.columns)
+    }
+
+    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
+        (&mut self.shards, &mut self.parts)
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (mine, theirs) in self
+            .cells
+            .iter_mut()
+            .flatten()
+            .zip(other.cells.iter().flatten())
+        {
+            mine.runs += theirs.runs;
+            mine.successes += theirs.successes;
+            mine.replans += theirs.replans;
+            merge(&mut mine.verdicts, &theirs.verdicts);
+            merge(&mut mine.causes, &theirs.causes);
+        }
+        for (mine, theirs) in self
+            .pairs
+            .iter_mut()
+            .flatten()
+            .zip(other.pairs.iter().flatten())
+        {
+            mine.only_first += theirs.only_first;
+            mine.only_this += theirs.only_this;
         }
     }
 }
@@ -269,15 +261,4 @@ fn merge(mine: &mut BTreeMap<String, u64>, theirs: &BTreeMap<String, u64>) {
     for (name, count) in theirs {
         *mine.entry(name.clone()).or_default() += count;
     }
-}
-
-/// A number that is different for different experiments: FNV-1a over all that they depend on.
-fn fingerprint(experiment: &Experiment, trials: u64) -> String {
-    let everything = format!("{trials} {experiment:?}");
-    let hash = everything
-        .bytes()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    format!("{hash:016x}")
 }

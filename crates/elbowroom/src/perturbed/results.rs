@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Case, ExecutorKind, PerturbedError, PerturbedExperiment, WorldKind};
 use crate::compare::Part;
+use crate::compare::parts::{self, Partial, fingerprint};
 
 /// Counts by case, world and executor. Everything is a sum, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,47 +74,31 @@ impl PerturbedResults {
     /// # Errors
     /// When they are parts of different ones, or the same part comes twice.
     pub fn merged(parts: &[Self]) -> Result<Self, PerturbedError> {
-        let Some((first, rest)) = parts.split_first() else {
-            return Err(PerturbedError::other("there is nothing to put together"));
-        };
-        let mut whole = first.clone();
-        for part in rest {
-            let rows = part.rows.iter().zip(&whole.rows);
-            let is_same = (&part.fingerprint, part.shards) == (&whole.fingerprint, whole.shards)
-                && part.rows.len() == whole.rows.len()
-                && rows.into_iter().all(|(a, b)| a.name() == b.name());
-            if !is_same {
-                return Err(PerturbedError::other(
-                    "these are parts of different experiments",
-                ));
-            }
-            if let Some(twice) = part.parts.iter().find(|shard| whole.parts.contains(shard)) {
-                return Err(PerturbedError::other(format!(
-                    "part {twice} is there twice"
-                )));
-            }
-            for (mine, theirs) in whole.rows.iter_mut().zip(&part.rows) {
-                mine.merge(theirs);
-            }
-            whole.parts.extend(&part.parts);
-        }
-        whole.parts.sort_unstable();
-        if (0..whole.shards).eq(whole.parts.iter().copied()) {
-            (whole.shards, whole.parts) = (1, vec![0]);
-        }
-        Ok(whole)
+        parts::merged(parts).map_err(PerturbedError::other)
     }
 }
 
-/// FNV-1a of everything that the results depend on.
-fn fingerprint(experiment: &PerturbedExperiment, trials: u64) -> String {
-    let everything = format!("{trials} {experiment:?}");
-    let hash = everything
-        .bytes()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    format!("{hash:016x}")
+impl Partial for PerturbedResults {
+    fn origin(&self) -> (&str, u64) {
+        (&self.fingerprint, self.shards)
+    }
+
+    fn has_shape_of(&self, other: &Self) -> bool {
+        self.rows
+            .iter()
+            .map(Row::name)
+            .eq(other.rows.iter().map(Row::name))
+    }
+
+    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
+        (&mut self.shards, &mut self.parts)
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (mine, theirs) in self.rows.iter_mut().zip(&other.rows) {
+            mine.merge(theirs);
+        }
+    }
 }
 
 /// The trials of one case in one world with one executor.
