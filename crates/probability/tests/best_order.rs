@@ -5,12 +5,13 @@ mod shared;
 mod twin;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use elbowroom_plan::NodeId;
 use elbowroom_probability::dispatch::patient;
 use elbowroom_probability::{
-    Candidates, Circumstances, Model, OrderSearch, PrunedNetwork, SearchSettings, Semantics,
-    TotalOrderPlan,
+    Candidates, Circumstances, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings,
+    Semantics, TotalOrderPlan,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,12 +44,13 @@ fn compare(case: &Case, semantics: Semantics, settings: SearchSettings) -> Compa
     );
     match (&found.order, best) {
         (None, None) => {}
-        (Some(order), Some(best)) => {
+        (Some(order), Some((best, shortest))) => {
             let p = order.probability;
             assert!(
                 (p - best).abs() <= 1e-9 * best,
                 "{p} is not {best}: {words}\n{order:?}"
             );
+            assert_eq!(order.sequence.len(), shortest, "{words}\n{order:?}");
             // What is claimed of the order holds of it.
             let mut network = PrunedNetwork::new(search.model(), &case.circumstances).unwrap();
             for &node in &order.sequence {
@@ -131,4 +133,31 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
     }
     assert!(long > 250, "{long} orders had more than one happening");
     assert!(hasty > 100, "{hasty} orders were there from the beginning");
+}
+
+/// Twelve things to do, in any order and also at once: where nothing is uncertain, every order is
+/// as likely and as long as the first.
+#[test]
+fn a_world_where_nothing_is_uncertain_is_not_searched() {
+    let domain = "(define (domain lamps) (:types lamp)
+        (:predicates (whole ?l - lamp) (lit ?l - lamp))
+        (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
+          :condition (over all (whole ?l)) :effect (at end (lit ?l))))";
+    let lamps =
+        |form: &str| -> String { (0..12).map(|l| form.replace('#', &l.to_string())).collect() };
+    let problem = format!(
+        "(define (problem p) (:domain lamps) (:objects{} - lamp) (:init{}) (:goal (and{})))",
+        lamps(" l#"),
+        lamps(" (whole l#)"),
+        lamps(" (lit l#)"),
+    );
+    let (task, plan) = shared::read_task(domain, &problem, &lamps("0: (screw l#) [1]\n"));
+    let initial = Circumstances::initial(&task);
+    let certain = Likelihoods::certain();
+    let model = Model::new(Arc::new(task), plan, &certain, Semantics::Paper).unwrap();
+    let mut search = OrderSearch::new(model, SearchSettings::default());
+    let found = search.best_order(&initial, &mut patient).unwrap();
+    let order = found.order.unwrap();
+    assert_eq!((order.probability, order.sequence.len()), (1.0, 24));
+    assert!(found.sequences <= 25, "{} sequences", found.sequences);
 }

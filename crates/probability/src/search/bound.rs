@@ -1,4 +1,4 @@
-//! How likely an order can still become: a bound that no way to go on exceeds.
+//! How likely an order can still become, and how short: a bound that no way to go on exceeds.
 //!
 //! The paper bounds P(A ∩ G) by P(A) (Proposition 3). That is a bound, but a weak one: it forgets
 //! that the actions still needed may fail, that their conditions decay while others are done, and
@@ -35,6 +35,25 @@ pub(crate) struct Bounds {
     /// What its start needs.
     needs_at_start: Vec<Vec<(usize, bool)>>,
     goal: Vec<(usize, bool)>,
+}
+
+/// What no way to go on can exceed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bound {
+    /// P(A ∩ G) is at most this.
+    pub(crate) probability: f64,
+    /// The order has at least so many happenings, those already in the sequence included. Among
+    /// orders that are equally likely the shortest counts; a world where nothing is uncertain has
+    /// many of them, and without this bound the search would go through all.
+    pub(crate) length: usize,
+}
+
+impl Bound {
+    /// Of what cannot become an order.
+    pub(crate) const IMPOSSIBLE: Self = Self {
+        probability: 0.0,
+        length: usize::MAX,
+    };
 }
 
 /// Something that changes a fact.
@@ -110,21 +129,28 @@ impl Bounds {
         }
     }
 
-    /// An upper bound of P(A ∩ G) for all ways to go on, including not to.
+    /// What no way to go on exceeds, not going on included.
     pub(crate) fn bound(
         &self,
         model: &Model,
         network: &mut PrunedNetwork<'_>,
         outlook: &Outlook<'_>,
         separations: &Separations,
-    ) -> f64 {
+    ) -> Bound {
         let probability = network.actions_probability();
         if probability <= 0.0 {
-            return 0.0;
+            return Bound::IMPOSSIBLE;
         }
         let Some(needed) = self.needed(network, outlook) else {
-            return 0.0;
+            return Bound::IMPOSSIBLE;
         };
+        let is_durative = |id: &&InstanceId| {
+            let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
+            start != end
+        };
+        let unstarted = needed.len() - network.running().len();
+        let ends = needed.iter().filter(is_durative).count();
+        let length = network.sequence().len() + unstarted + ends;
         let mut run = Run {
             bounds: self,
             model,
@@ -135,7 +161,10 @@ impl Bounds {
         };
         run.count(&needed, separations);
         // Products of the same numbers in another order may differ in the last digits.
-        run.bound * (1.0 + 1e-12)
+        Bound {
+            probability: run.bound * (1.0 + 1e-12),
+            length,
+        }
     }
 
     /// The instances that every way to go on that works does or ends; `None` if there is no way.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use super::bound::Outlook;
+use super::bound::{Bound, Outlook};
 use super::memo::Memo;
 use super::nominal::Nominal;
 use super::timing::Timing;
@@ -32,8 +32,9 @@ pub(super) struct Run<'s, 'w> {
     watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
 }
 
-/// Two probabilities closer than this, relatively, count as equal.
-const TIE: f64 = 1e-12;
+/// Two probabilities closer than this, relatively, count as equal. It is more than what a bound is
+/// raised by against rounding; otherwise a bound would always promise a little more than there is.
+const TIE: f64 = 1e-11;
 
 impl<'s, 'w> Run<'s, 'w> {
     /// With no happening yet.
@@ -128,7 +129,10 @@ impl<'s, 'w> Run<'s, 'w> {
                 self.pop(node);
             }
         }
-        promising.sort_by(|(a, first), (b, second)| b.total_cmp(a).then(first.cmp(second)));
+        promising.sort_by(|(a, first), (b, second): &(Bound, NodeId)| {
+            let likelier = b.probability.total_cmp(&a.probability);
+            likelier.then(first.cmp(second))
+        });
         for (bound, node) in promising {
             if !self.can_beat(bound) {
                 continue;
@@ -161,20 +165,15 @@ impl<'s, 'w> Run<'s, 'w> {
         self.next_timed - usize::from(is_timed)
     }
 
-    /// Whether something of that probability, or of any up to that bound, could be better than the
-    /// best so far.
-    fn can_beat(&self, bound: f64) -> bool {
+    /// Whether something within that bound could be better than the best so far.
+    fn can_beat(&self, bound: Bound) -> bool {
         match &self.best {
-            None => bound > 0.0,
+            None => bound.probability > 0.0,
             Some((best, order)) => {
-                bound > best * (1.0 + TIE)
-                    || (bound >= best * (1.0 - TIE) && self.length() < order.len())
+                bound.probability > best * (1.0 + TIE)
+                    || (bound.probability >= best * (1.0 - TIE) && bound.length < order.len())
             }
         }
-    }
-
-    fn length(&self) -> usize {
-        self.network.sequence().len() + self.network.running().len()
     }
 
     /// Keeps the sequence so far, if it is an order and better than the best.
@@ -236,7 +235,7 @@ impl<'s, 'w> Run<'s, 'w> {
 
     /// Adds a happening to everything but the timing; the bound of all that can follow, unless
     /// the happening is impossible or the bound is not good enough.
-    fn push(&mut self, node: NodeId) -> Result<Option<f64>, TooCoupled> {
+    fn push(&mut self, node: NodeId) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;
         let event = model.event(node);
         self.memo.mark(self.nominal.checkpoint());
@@ -259,7 +258,7 @@ impl<'s, 'w> Run<'s, 'w> {
         let bound = if works && probability > 0.0 {
             self.bound()
         } else {
-            0.0
+            Bound::IMPOSSIBLE
         };
         if self.can_beat(bound) {
             Ok(Some(bound))
@@ -285,7 +284,7 @@ impl<'s, 'w> Run<'s, 'w> {
         self.nominal.undo_to(checkpoint);
     }
 
-    fn bound(&mut self) -> f64 {
+    fn bound(&mut self) -> Bound {
         let is_used = &self.is_used;
         let is_free = |id: InstanceId| !is_used[id.index()];
         let outlook = Outlook {

@@ -6,9 +6,14 @@ use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
 use super::Worlds;
 use super::random::Case;
 
-/// The best P(A ∩ G) of all orders; only those count for which there is time, which is asked of
-/// the network as a whole, and those that work nominally if `works` says so.
-pub(crate) fn best(case: &Case, semantics: Semantics, search: &OrderSearch) -> Option<f64> {
+/// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as likely
+/// has. Only those count for which there is time, which is asked of the network as a whole, and
+/// those that work nominally if the settings ask for it.
+pub(crate) fn best(
+    case: &Case,
+    semantics: Semantics,
+    search: &OrderSearch,
+) -> Option<(f64, usize)> {
     let worlds = Worlds::new(
         &case.task,
         &case.plan,
@@ -16,7 +21,7 @@ pub(crate) fn best(case: &Case, semantics: Semantics, search: &OrderSearch) -> O
         semantics,
         &case.circumstances,
     );
-    let mut best = None;
+    let mut orders = Vec::new();
     let mut sequence = Vec::new();
     let certain = Likelihoods::certain();
     // What happens if nothing goes wrong; every world of it counts where all orders do.
@@ -27,8 +32,10 @@ pub(crate) fn best(case: &Case, semantics: Semantics, search: &OrderSearch) -> O
         Semantics::Paper,
         &case.circumstances,
     );
-    extend(case, search, (worlds, nominal), &mut sequence, &mut best);
-    best
+    extend(case, search, (worlds, nominal), &mut sequence, &mut orders);
+    let best = orders.iter().map(|(p, _)| *p).reduce(f64::max)?;
+    let likeliest = orders.iter().filter(|(p, _)| *p >= best * (1.0 - 1e-10));
+    Some((best, likeliest.map(|(_, length)| *length).min()?))
 }
 
 fn extend(
@@ -36,7 +43,7 @@ fn extend(
     search: &OrderSearch,
     (worlds, nominal): (Worlds<'_>, Worlds<'_>),
     sequence: &mut Vec<NodeId>,
-    best: &mut Option<f64>,
+    orders: &mut Vec<(f64, usize)>,
 ) {
     if search.windows(&case.circumstances, sequence).is_none() {
         return;
@@ -46,8 +53,8 @@ fn extend(
     if worlds.running().is_empty() && !sequence.last().is_some_and(is_timed) {
         let p = worlds.success_probability();
         let counts = !must_work || nominal.success_probability() > 0.0;
-        if counts && p > 0.0 && best.is_none_or(|best| p > best) {
-            *best = Some(p);
+        if counts && p > 0.0 {
+            orders.push((p, sequence.len()));
         }
     }
     let is_dead = must_work && nominal.actions_probability() == 0.0;
@@ -74,7 +81,7 @@ fn extend(
             worlds.push(node);
             nominal.push(node);
             sequence.push(node);
-            extend(case, search, (worlds, nominal), sequence, best);
+            extend(case, search, (worlds, nominal), sequence, orders);
             sequence.pop();
         }
     }
