@@ -18,7 +18,9 @@ mod bound;
 mod cache;
 mod memo;
 mod nominal;
+mod room;
 mod run;
+mod separations;
 mod timing;
 
 use std::ops::ControlFlow;
@@ -34,8 +36,10 @@ use crate::total_order::TotalOrderPlan;
 use bound::Bounds;
 use cache::Cache;
 use nominal::Nominal;
+use room::Rooms;
 use run::Run;
-use timing::{Separations, Timing};
+use separations::Separations;
+use timing::Timing;
 
 /// Which sequences are orders of the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -188,7 +192,7 @@ impl OrderSearch {
             stop: SearchStop::Complete,
             sequences,
         };
-        let Some(timing) = Timing::new(&self.separations, circumstances) else {
+        let Some(rooms) = Rooms::new(&self.separations, circumstances) else {
             return Ok(nothing(0));
         };
         let must_work = self.settings.candidates == Candidates::Working;
@@ -196,7 +200,7 @@ impl OrderSearch {
         if must_work && !works {
             return Ok(nothing(0));
         }
-        let mut run = Run::new(self, circumstances, nominal, timing, watch)?;
+        let mut run = Run::new(self, circumstances, nominal, rooms, watch)?;
         run.try_first(&self.first)?;
         let stop = match run.explore()? {
             ControlFlow::Continue(()) => SearchStop::Complete,
@@ -266,9 +270,7 @@ impl OrderSearch {
         let passed = next_timed.by_ref().take_while(|(_, time)| time <= now);
         let mut next_timed = passed.count();
         for &node in sequence {
-            if !timing.push(&self.model, node, next_timed) {
-                return None;
-            }
+            timing.push(&self.model, node, next_timed)?;
             let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
             next_timed += usize::from(is_timed);
         }

@@ -7,7 +7,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use super::bound::{Bound, Outlook};
 use super::memo::Memo;
 use super::nominal::Nominal;
-use super::timing::Timing;
+use super::room::Rooms;
 use super::{Candidates, OrderSearch, Progress};
 use crate::circumstances::Circumstances;
 use crate::model::Model;
@@ -21,7 +21,7 @@ pub(super) struct Run<'s, 'w> {
     has_deadlines: bool,
     network: PrunedNetwork<'s>,
     nominal: Nominal,
-    timing: Timing<'s>,
+    rooms: Rooms<'s>,
     is_used: Vec<bool>,
     is_placed: Vec<bool>,
     /// The next of the timed initials that matter.
@@ -42,7 +42,7 @@ impl<'s, 'w> Run<'s, 'w> {
         search: &'s OrderSearch,
         circumstances: &Circumstances,
         nominal: Nominal,
-        timing: Timing<'s>,
+        rooms: Rooms<'s>,
         watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TooCoupled> {
         let model = &*search.model;
@@ -59,7 +59,7 @@ impl<'s, 'w> Run<'s, 'w> {
             has_deadlines: search.separations.has_deadlines(now),
             network: PrunedNetwork::new(model, circumstances)?,
             nominal,
-            timing,
+            rooms,
             is_used,
             is_placed: vec![false; model.plan().nodes.len()],
             next_timed: timed.take_while(|(_, time)| time <= now).count(),
@@ -97,7 +97,7 @@ impl<'s, 'w> Run<'s, 'w> {
             if self.push(node)?.is_none() {
                 break;
             }
-            if !self.timing.push(self.model, node, self.timed_before(node)) {
+            if !self.rooms.push(self.model, node, self.timed_before(node)) {
                 self.pop(node);
                 break;
             }
@@ -105,7 +105,7 @@ impl<'s, 'w> Run<'s, 'w> {
         }
         self.consider()?;
         for node in done.into_iter().rev() {
-            self.timing.pop();
+            self.rooms.pop();
             self.pop(node);
         }
         Ok(())
@@ -140,13 +140,13 @@ impl<'s, 'w> Run<'s, 'w> {
             if self.push(node)?.is_none() {
                 continue;
             }
-            let deeper = if self.timing.push(self.model, node, self.timed_before(node)) {
+            let deeper = if self.rooms.push(self.model, node, self.timed_before(node)) {
                 let deeper = if self.is_dominated() {
                     ControlFlow::Continue(())
                 } else {
                     self.explore()?
                 };
-                self.timing.pop();
+                self.rooms.pop();
                 deeper
             } else {
                 ControlFlow::Continue(())
@@ -233,7 +233,7 @@ impl<'s, 'w> Run<'s, 'w> {
         next
     }
 
-    /// Adds a happening to everything but the timing; the bound of all that can follow, unless
+    /// Adds a happening to everything but the rooms; the bound of all that can follow, unless
     /// the happening is impossible or the bound is not good enough.
     fn push(&mut self, node: NodeId) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;
@@ -304,7 +304,7 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Whether a sequence that has done the same stands at least as well.
     fn is_dominated(&mut self) -> bool {
         let has_timed = self.next_timed < self.search.separations.timed.len();
-        let room = self.timing.room(self.has_deadlines && has_timed);
+        let room = self.rooms.room(self.has_deadlines && has_timed);
         self.memo.is_dominated(
             self.model,
             &self.nominal,
