@@ -3,8 +3,10 @@
 mod adaptable;
 mod bad_worlds;
 mod campaigns;
+mod esterel;
 mod guarantee;
 mod likelier;
+mod others;
 mod reasons;
 mod reports;
 mod scene;
