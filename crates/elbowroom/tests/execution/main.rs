@@ -5,6 +5,7 @@ mod bad_worlds;
 mod campaigns;
 mod esterel;
 mod guarantee;
+mod handover;
 mod likelier;
 mod others;
 mod reasons;
