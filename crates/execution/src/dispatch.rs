@@ -8,6 +8,7 @@
 mod explain;
 mod news;
 mod progress;
+mod retry;
 mod watch;
 
 pub(crate) use watch::{in_words, replan, unmet};
@@ -25,6 +26,7 @@ use crate::executor::{Mission, Planned, StepId};
 use crate::horizon::Horizon;
 use crate::reason::{Cause, Reason};
 use progress::Progress;
+use retry::Retry;
 
 /// Finite bounds of a constraint.
 pub(crate) type Bounds = (Option<Rational>, Option<Rational>);
@@ -55,6 +57,8 @@ pub(crate) struct Dispatch {
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
     progress: Progress,
+    /// Starts that have failed and are to be tried again.
+    retries: BTreeMap<NodeId, Retry>,
 }
 
 impl Dispatch {
@@ -111,6 +115,7 @@ impl Dispatch {
             ends,
             durations,
             progress,
+            retries: BTreeMap::new(),
         };
         dispatch.begin(&mission.running);
         Ok(dispatch)

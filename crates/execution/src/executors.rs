@@ -5,6 +5,7 @@
 //! made from that list.
 
 mod adaptable;
+mod esterel;
 mod fixed;
 mod guarded;
 mod live;
@@ -28,6 +29,7 @@ pub const EXECUTORS: &[Registered] = &[
     stn::REGISTERED,
     guarded::REGISTERED,
     live::REGISTERED,
+    esterel::REGISTERED,
     adaptable::REGISTERED,
 ];
 
@@ -219,6 +221,7 @@ mod tests {
             "guarded",
             "live",
             "live:5",
+            "esterel",
             "adaptable",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();

@@ -3,8 +3,11 @@
 mod adaptable;
 mod bad_worlds;
 mod campaigns;
+mod esterel;
 mod guarantee;
+mod handover;
 mod likelier;
+mod others;
 mod reasons;
 mod reports;
 mod scene;

@@ -62,6 +62,7 @@ impl Dispatch {
         let fixed = self.horizon.fix(network_node(start), &local);
         self.progress.happen(&self.plan, start, &local);
         self.progress.ready.remove(&start);
+        self.retries.remove(&start);
         if start == end {
             self.finish(id);
         }
@@ -136,6 +137,16 @@ impl Dispatch {
         });
         reason.by = Some(missed.by);
         reason
+    }
+
+    /// An action has started, in time or not.
+    pub(crate) fn note_start(&mut self, id: InstanceId, time: &Rational) {
+        let _ = self.started(id, time);
+    }
+
+    /// An action has ended as the domain says, in time or not.
+    pub(crate) fn note_end(&mut self, id: InstanceId, time: &Rational) {
+        let _ = self.ended(id, time, &Ending::Succeeded);
     }
 
     fn finish(&mut self, id: InstanceId) {
