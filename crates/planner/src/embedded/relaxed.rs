@@ -15,9 +15,9 @@ mod numbers;
 use super::apply::Step;
 use super::compile::{Compiled, Eagerness, NONE};
 use super::formula::Literal;
-use super::state::State;
-
+use super::guide::Guide;
 use super::network::SETTLED;
+use super::state::State;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
@@ -36,7 +36,7 @@ const NO_OPERATOR: u32 = u32::MAX;
 /// What one evaluation found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Estimate {
-    /// How many steps the relaxed plan has.
+    /// How many steps the relaxed plan has; what they cost, in a weighing search.
     pub(crate) steps: u32,
     /// The steps whose conditions hold in the state; in time they may still be impossible.
     pub(crate) applicable: Vec<Step>,
@@ -95,6 +95,11 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             graph,
         }
+    }
+
+    /// From now on a step counts for what it costs, not for one.
+    pub(crate) fn weigh(&mut self, guide: &Guide) {
+        self.graph.weigh(guide);
     }
 
     /// The number of operators.

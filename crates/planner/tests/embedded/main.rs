@@ -9,6 +9,7 @@
 
 mod cancellation;
 mod features;
+mod metric;
 mod situations;
 mod twin;
 mod world;
