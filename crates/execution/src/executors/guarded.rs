@@ -81,19 +81,12 @@ impl Executor for Guarded {
 impl Guard {
     /// Why an amount that was measured is not guaranteed to do.
     fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
-        let (about, observed, allowed) = match reading.value() {
-            Some((parameter, value)) => {
-                let name = &self.mission.plan.parameter(parameter).name;
-                (
-                    name.clone(),
-                    value,
-                    self.envelope.interval(parameter).clone(),
-                )
-            }
-            None => {
-                let about = format!("change of {}", reading.fluent);
-                (about, reading.observed.clone(), self.guaranteed(reading))
-            }
+        let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {
+            let name = self.mission.plan.parameter(parameter).name.clone();
+            (name, value, self.envelope.interval(parameter).clone())
+        } else {
+            let about = format!("change of {}", reading.fluent);
+            (about, reading.observed.clone(), self.guaranteed(reading))
         };
         if allowed.contains(&observed) {
             return None;

@@ -108,7 +108,7 @@ fn greatest(
         let next = &good + &step;
         if does(&next) {
             good = next;
-            step = step * &two;
+            step *= &two;
         } else {
             bad = next;
         }
