@@ -8,6 +8,7 @@ mod esterel;
 mod guarantee;
 mod handover;
 mod likelier;
+mod lookahead;
 mod others;
 mod reasons;
 mod reports;
