@@ -42,6 +42,8 @@ pub(crate) struct Style {
     pub(crate) haste: Option<Eagerness>,
     /// How many states that differ in times only are kept; more are dropped, and some plans lost.
     pub(crate) variants: usize,
+    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
+    pub(crate) fills_up: bool,
     /// What is looked for.
     pub(crate) aim: Aim,
 }
@@ -65,6 +67,7 @@ impl Style {
     pub(crate) const COMPLETE: Self = Self {
         haste: None,
         variants: usize::MAX,
+        fills_up: false,
         aim: Aim::Goal,
     };
 
@@ -73,7 +76,16 @@ impl Style {
         Self {
             haste: Some(haste),
             variants: 4,
+            fills_up: false,
             aim: Aim::Goal,
+        }
+    }
+
+    /// The same, filling up what is used up.
+    pub(crate) fn filling_up(self) -> Self {
+        Self {
+            fills_up: true,
+            ..self
         }
     }
 
@@ -159,6 +171,9 @@ impl<'a> Search<'a> {
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let guide = metric.map(|metric| Guide::of(compiled, metric));
         let mut relaxed = Relaxed::new(compiled, style.haste);
+        if style.fills_up {
+            relaxed.count_resources();
+        }
         if let Some(guide) = &guide {
             relaxed.weigh(guide);
         }
@@ -338,6 +353,8 @@ impl<'a> Search<'a> {
         }
         self.evaluated += 1;
         let Some(mut estimate) = self.relaxed.evaluate(&state) else {
+            // In haste, what the relaxed plan does without may be what a plan needs.
+            self.has_lost |= self.style.haste.is_some();
             return Turn::Nothing;
         };
         self.symmetry

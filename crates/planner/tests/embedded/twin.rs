@@ -79,6 +79,18 @@ fn drafts() -> impl Strategy<Value = Draft> {
         })
 }
 
+/// Drafts with an end: the store is never refilled. Several happenings of one time that touch it,
+/// which are beyond the planner, do not matter to anyone.
+fn thrifty_drafts() -> impl Strategy<Value = Draft> {
+    drafts().prop_map(|mut draft| {
+        for action in &mut draft.actions {
+            action.minds = false;
+            action.gain = action.gain.min(0);
+        }
+        draft
+    })
+}
+
 fn written(literals: &[(u8, bool)], when: &str) -> String {
     let mut text = String::new();
     // A fact both added and deleted at once is not what is tested here.
@@ -253,15 +265,16 @@ impl Twin<'_> {
         Some(finds)
     }
 
-    /// The least metric of all continuations, if some are plans; `None` if the budget does not
-    /// suffice.
-    fn least_metric(&mut self) -> Option<Option<Rational>> {
-        let mut least: Option<Rational> = None;
+    /// The least metric of all continuations, if some are plans, and the least makespan with that;
+    /// `None` if the budget does not suffice.
+    fn least_metric(&mut self) -> Option<Option<(Rational, Rational)>> {
+        let mut least: Option<(Rational, Rational)> = None;
         let task = self.task;
         let _ = self.walk(&mut |report| {
             let metric = report.metric(task).expect("the problems have one");
-            if least.as_ref().is_none_or(|least| metric < *least) {
-                least = Some(metric);
+            let worth = (metric, report.makespan.clone());
+            if least.as_ref().is_none_or(|least| worth < *least) {
+                least = Some(worth);
             }
             ControlFlow::Continue(())
         })?;
@@ -468,8 +481,8 @@ proptest! {
 
     #[test]
     fn a_search_that_ends_has_found_the_best_metric(
-        draft in drafts(),
-        prices in prop::collection::vec((0..5_u8, 0..5_u8, 0..3_u8), 4),
+        draft in thrifty_drafts(),
+        prices in prop::collection::vec((1..5_u8, 0..5_u8, 0..3_u8), 4),
         metric in 0..METRICS.len(),
     ) {
         let mut task = draft.task_with(&prices, METRICS[metric]);
@@ -483,17 +496,17 @@ proptest! {
         let verdict = validate_from(&task, &situation, &found.plan, &Strictness::default());
         let Verdict::Valid(report) = verdict else { panic!("an invalid plan") };
         prop_assert_eq!(&report.metric(&task), &found.metric);
-        // Several happenings of one time that touch the store are beyond the planner.
-        if *stopped != Stopped::Exhausted || draft.actions.iter().any(|action| action.minds) {
+        if *stopped != Stopped::Exhausted {
             return Ok(());
         }
         let actions = draft.ground(&mut task);
         let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 1_500 };
         if let Some(Some(least)) = twin.least_metric() {
-            let ours = found.metric.as_ref().expect("there is a metric");
-            prop_assert!(*ours <= least, "{least}, not {ours}:\n{}", describe(&answer));
+            let metric = found.metric.clone().expect("there is a metric");
+            let ours = (metric, found.makespan.clone());
+            prop_assert!(ours <= least, "{least:?}, not {ours:?}:\n{}", describe(&answer));
             if happenings(&found.plan) <= MOST {
-                prop_assert_eq!(ours, &least, "{}", describe(&answer));
+                prop_assert_eq!(ours, least, "{}", describe(&answer));
             }
         }
     }
