@@ -129,7 +129,7 @@ fn af3(bencher: divan::Bencher<'_, '_>, number: usize) {
     first_order(bencher, &world.model(Semantics::Paper), &initial);
 }
 
-#[divan::bench(args = [3, 5, 8, 10])]
+#[divan::bench(args = [3, 5, 7, 8, 10])]
 fn lamps_in_any_order(bencher: divan::Bencher<'_, '_>, count: usize) {
     let (model, initial) = lamps(count, false);
     first_order(bencher, &model, &initial);
