@@ -5,9 +5,12 @@
 //! made from that list.
 
 mod adaptable;
+mod chooser;
+mod esterel;
 mod fixed;
 mod guarded;
 mod live;
+mod lookahead;
 mod stn;
 
 use std::fmt;
@@ -16,6 +19,8 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
+
+pub use lookahead::Foresight;
 
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
@@ -28,7 +33,9 @@ pub const EXECUTORS: &[Registered] = &[
     stn::REGISTERED,
     guarded::REGISTERED,
     live::REGISTERED,
+    esterel::REGISTERED,
     adaptable::REGISTERED,
+    lookahead::REGISTERED,
 ];
 
 /// What there is to know of an executor before there is one.
@@ -59,6 +66,8 @@ pub struct Means {
     /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
     /// look.
     pub odds: Option<Box<dyn Odds>>,
+    /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
+    pub foresight: Foresight,
 }
 
 impl Means {
@@ -76,6 +85,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
             region,
             likelihoods: Arc::new(Likelihoods::certain()),
             odds: None,
+            foresight: Foresight::default(),
         }
     }
 }
@@ -219,7 +229,9 @@ mod tests {
             "guarded",
             "live",
             "live:5",
+            "esterel",
             "adaptable",
+            "lookahead",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);

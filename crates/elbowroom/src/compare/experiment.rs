@@ -1,12 +1,16 @@
 //! Experiment files: `docs/formats/experiment.md`.
 
+mod file;
+
 use elbowroom_execution::executors::ExecutorSpec;
-use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom_execution::run::RunSettings;
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
 use indexmap::IndexMap;
 use serde::Deserialize;
 use toml::Spanned;
+
+use file::{File, exact, text_of};
 
 /// An experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
@@ -68,6 +72,9 @@ pub struct Column {
     pub name: String,
     /// The world file.
     pub world: String,
+    /// How likely everything is, for executors that go by that: a likelihood file. Without one,
+    /// everything is certain.
+    pub likelihoods: Option<String>,
     /// What is left open.
     pub vary: Vec<VarySpec>,
 }
@@ -79,13 +86,6 @@ pub struct Together {
     pub names: Vec<String>,
     /// A value for each, row by row.
     pub rows: Vec<Vec<String>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TogetherFile {
-    names: Vec<String>,
-    rows: Vec<Spanned<Vec<toml::Value>>>,
 }
 
 /// Figures of a paper, one for each column.
@@ -121,46 +121,6 @@ impl ExperimentError {
     pub(crate) fn other(message: impl Into<String>) -> Self {
         Self::Other(message.into())
     }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    format: Spanned<String>,
-    version: Spanned<i64>,
-    title: String,
-    domain: Spanned<String>,
-    problem: Spanned<String>,
-    trials: u64,
-    #[serde(default)]
-    seed: u64,
-    executors: Vec<Spanned<String>>,
-    #[serde(default)]
-    clairvoyant: bool,
-    running: Option<Spanned<String>>,
-    planning_time: Option<Spanned<toml::Value>>,
-    max_replans: Option<usize>,
-    precision: Option<Spanned<f64>>,
-    planner: Option<Spanned<String>>,
-    planner_time: Option<Spanned<f64>>,
-    planner_states: Option<u64>,
-    improve_states: Option<u64>,
-    #[serde(default)]
-    blanks: IndexMap<String, Vec<toml::Value>>,
-    #[serde(default)]
-    together: Vec<TogetherFile>,
-    column: Vec<ColumnFile>,
-    #[serde(default)]
-    published: Vec<Spanned<Published>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ColumnFile {
-    name: String,
-    world: Spanned<String>,
-    #[serde(default)]
-    vary: Vec<Spanned<String>>,
 }
 
 impl Experiment {
@@ -202,6 +162,7 @@ impl Experiment {
             columns.push(Column {
                 name: column.name.clone(),
                 world: named(&column.world)?,
+                likelihoods: column.likelihoods.as_ref().map(&named).transpose()?,
                 vary,
             });
         }
@@ -303,94 +264,3 @@ impl Experiment {
 
 /// The row for plans that are made knowing what will happen.
 pub(crate) const CLAIRVOYANT: &str = "clairvoyant";
-
-impl File {
-    fn planning(&self) -> Result<Planning, (usize, String)> {
-        let seconds = match &self.planner_time {
-            None => None,
-            Some(given) => {
-                let seconds = exact(*given.get_ref()).filter(Rational::is_positive);
-                let wrong = || (given.span().start, "it must be positive".to_owned());
-                Some(seconds.ok_or_else(wrong)?)
-            }
-        };
-        match &self.planner {
-            Some(name) if name.get_ref() != EMBEDDED => {
-                known(name.get_ref()).map_err(|message| (name.span().start, message))?;
-                Ok(Planning::Another {
-                    name: name.get_ref().clone(),
-                    seconds,
-                })
-            }
-            _ => Ok(Planning::Embedded),
-        }
-    }
-
-    fn settings(&self) -> Result<RunSettings, (usize, String)> {
-        let mut settings = RunSettings::default();
-        if let Some(running) = &self.running {
-            settings.running = one_of(running, RunningRule::NAMES)?;
-        }
-        if let Some(time) = &self.planning_time {
-            let number = match time.get_ref() {
-                toml::Value::Integer(number) => Some(Rational::from(*number)),
-                toml::Value::Float(number) => exact(*number),
-                _ => None,
-            };
-            // Measured times would make a result depend on the machine.
-            let number = number.filter(|number| !number.is_negative());
-            settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
-                (
-                    time.span().start,
-                    "write a number of seconds, so that results can be repeated".to_owned(),
-                )
-            })?);
-        } else {
-            settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
-        }
-        if let Some(most) = self.max_replans {
-            settings.most_replans = most;
-        }
-        Ok(settings)
-    }
-}
-
-/// The planner that is always there.
-const EMBEDDED: &str = "embedded";
-
-/// Whether there is such a planner; if not, which there are.
-#[cfg(feature = "external")]
-fn known(name: &str) -> Result<(), String> {
-    let found = elbowroom_planner::external::Planner::named(name);
-    found.map(|_| ()).map_err(|error| error.to_string())
-}
-
-/// Whether there is such a planner; if not, which there are.
-#[cfg(not(feature = "external"))]
-fn known(_name: &str) -> Result<(), String> {
-    Err("this program has no planner but `embedded`".to_owned())
-}
-
-/// The value of that name; or where the name stands, and what it may be.
-fn one_of<T: Copy>(
-    given: &Spanned<String>,
-    names: &[(T, &'static str)],
-) -> Result<T, (usize, String)> {
-    let found = names.iter().find(|(_, name)| name == given.get_ref());
-    found.map(|(value, _)| *value).ok_or_else(|| {
-        let known: Vec<&str> = names.iter().map(|(_, name)| *name).collect();
-        let message = format!("choose one of {}", known.join(", "));
-        (given.span().start, message)
-    })
-}
-
-fn text_of(value: &toml::Value) -> String {
-    match value {
-        toml::Value::String(text) => text.clone(),
-        other => other.to_string(),
-    }
-}
-
-fn exact(value: f64) -> Option<Rational> {
-    value.is_finite().then(|| value.to_string().parse().ok())?
-}

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom_execution::run::{self, PlanningTime, Ports, Report, Verdict};
 use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
+use elbowroom_probability::{Likelihoods, likelihoods};
 use elbowroom_sim::{SimWorld, Unreliable, WorldModel};
 
 use super::{Column, Experiment, ExperimentError, Part, Planning, Results, clairvoyant};
@@ -45,6 +46,8 @@ struct Common<'a> {
 /// A column for one problem.
 struct Place {
     world: WorldModel,
+    likelihoods: Arc<Likelihoods>,
+    foresight: Foresight,
     preparer: RememberingPreparer<Analyst>,
     /// For executors that look for likelier plans: who makes them, and the same with a memory.
     odds: SharedLikeliest,
@@ -113,6 +116,12 @@ impl Setting<'_> {
         let world = WorldModel::read(&column.world, task.problem()).map_err(|error| {
             ExperimentError::other(format!("the world of {}: {error}", column.name))
         })?;
+        let likelihoods = match &column.likelihoods {
+            None => Likelihoods::certain(),
+            Some(text) => likelihoods::read(text.as_bytes(), task).map_err(|error| {
+                ExperimentError::other(format!("the likelihoods of {}: {error}", column.name))
+            })?,
+        };
         let mut preparer = RememberingPreparer::new(Analyst::new(self.flow(column)), PREPARED);
         for spec in &self.experiment.executors {
             preparer
@@ -127,6 +136,8 @@ impl Setting<'_> {
         let odds = SharedLikeliest::new(odds);
         Ok(Place {
             world,
+            likelihoods: Arc::new(likelihoods),
+            foresight: Foresight::default(),
             preparer,
             likeliest: RememberingPlanner::new(odds.clone(), PLANS),
             odds,
@@ -177,6 +188,8 @@ impl Setting<'_> {
         let settings = &self.experiment.settings;
         let Place {
             world,
+            likelihoods,
+            foresight,
             preparer,
             odds,
             likeliest,
@@ -196,7 +209,12 @@ impl Setting<'_> {
         });
         let asks_odds = spec.asks_odds();
         let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
-        let mut executor = spec.build(Means::from(region).with_odds(odds));
+        let mut executor = spec.build(Means {
+            region,
+            likelihoods: Arc::clone(likelihoods),
+            odds,
+            foresight: foresight.clone(),
+        });
         let ports = Ports {
             world,
             planner: if asks_odds {

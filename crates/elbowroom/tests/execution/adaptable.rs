@@ -1,12 +1,10 @@
-//! Olisipo on a clock: orders, deadlines, retries; and whole problems of others.
+//! Olisipo on a clock: orders, deadlines, retries.
 
 use elbowroom::execution::Cause;
 use elbowroom::execution::run::{Report, Verdict};
-use elbowroom::model::validate;
 use elbowroom::num::Rational;
 
 use crate::scene::Scene;
-use crate::shared;
 
 /// The photo needs the light, and the sample a rock that may roll away.
 const DOMAIN: &str = "
@@ -52,7 +50,7 @@ fn done(report: &Report) -> Vec<&str> {
 
 /// What the judge says of what was done.
 fn is_valid(scene: &Scene, report: &Report) -> bool {
-    matches!(scene.judged(report), validate::Verdict::Valid(_))
+    scene.judged(report).is_valid()
 }
 
 /// When an action started, and when it ended.
@@ -118,59 +116,4 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
             .all(|reason| reason.cause == Cause::Failed)
     );
     assert_eq!(report.starts, 20 * report.reasons.len());
-}
-
-/// Robot deliveries with batteries and deadlines, and rovers with and without energy.
-const PROBLEMS: &[(&str, &[&str])] = &[
-    (
-        "delivery_battery/domain.pddl",
-        &["delivery_battery/p1.pddl", "delivery_battery/p2.pddl"],
-    ),
-    (
-        "pddl/ipc-2002/rovers-time-simple-automatic/domain.pddl",
-        &[
-            "pddl/ipc-2002/rovers-time-simple-automatic/instances/instance-1.pddl",
-            "pddl/ipc-2002/rovers-time-simple-automatic/instances/instance-2.pddl",
-        ],
-    ),
-    (
-        "pddl/ipc-2002/rovers-time-automatic/domain.pddl",
-        &[
-            "pddl/ipc-2002/rovers-time-automatic/instances/instance-1.pddl",
-            "pddl/ipc-2002/rovers-time-automatic/instances/instance-2.pddl",
-        ],
-    ),
-    (
-        "pddl/strathclyde/rovers-metric-time-2006/domain.pddl",
-        &["pddl/strathclyde/rovers-metric-time-2006/instances/instance-1.pddl"],
-    ),
-];
-
-#[test]
-fn problems_of_others_are_executed_without_change() {
-    let Some(data) = shared::data() else { return };
-    let read = |path: &str| {
-        let bytes = std::fs::read(data.join(path)).expect("a file of the data");
-        String::from_utf8_lossy(&bytes).into_owned()
-    };
-    let chances = "
-        [defaults]
-        becomes_true = 0.001
-        becomes_false = 0.01
-        start = 0.8
-        effect = 0.95";
-    for (domain, problems) in PROBLEMS {
-        for problem in *problems {
-            let scene = Scene::new(&read(domain), &read(problem), None).with_likelihoods(chances);
-            let failing = "[[failure]]\naction = \"*\"\nwhen = \"start\"\nprobability = 0.2";
-            for (world, seeds) in [("", 1), (failing, 3)] {
-                for seed in 0..seeds {
-                    let report = scene.run("adaptable", &scene.world(world), seed);
-                    let words = format!("{problem}, seed {seed}: {:?}", report.reasons);
-                    assert_eq!(report.verdict, Verdict::GoalReached, "{words}");
-                    assert!(is_valid(&scene, &report), "{words}");
-                }
-            }
-        }
-    }
 }

@@ -52,3 +52,68 @@ fn mistakes_in_an_experiment_have_their_line() {
         .count();
     assert!(error.starts_with(&format!("line {line}: ")), "{error}");
 }
+
+/// `clumsy.toml` with few trials.
+fn clumsy(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
+    let file = |name: &str| Ok(read(&format!("experiments/{name}")));
+    let text = change(&read("experiments/clumsy.toml"));
+    Experiment::read(&text, &file).map_err(|error| error.to_string())
+}
+
+/// Three starts in ten fail, which no executor can know but by the likelihoods.
+#[test]
+fn a_column_says_how_likely_everything_is() {
+    let told = clumsy(&str::to_owned).expect("a correct test");
+    let untold = clumsy(&|text| {
+        let lines = text.lines();
+        let kept = lines.filter(|line| !line.starts_with("likelihoods"));
+        kept.collect::<Vec<_>>().join("\n")
+    });
+    let untold = untold.expect("a correct test");
+    let part = Part {
+        trials: 60,
+        ..WHOLE
+    };
+    let make = |experiment| run(experiment, part, &|_| true).expect("a correct test");
+    let (told, untold) = (make(&told), make(&untold));
+    let row = |name: &str| told.rows.iter().position(|row| row == name).unwrap();
+    let (adaptable, failing) = (row("adaptable"), 1);
+    // Told, it tries failed starts again; untold, a start is certain, and so a failure is a reason
+    // to plan anew.
+    assert_eq!(told.cells[adaptable][failing].replans, 0);
+    assert!(untold.cells[adaptable][failing].replans > 30);
+    for other in ["esterel", "stn", "guarded", "live"].map(row) {
+        assert_eq!(
+            told.cells[other], untold.cells[other],
+            "{}",
+            told.rows[other]
+        );
+    }
+}
+
+#[test]
+fn mistakes_about_likelihoods_are_told_with_their_place() {
+    let text = read("experiments/clumsy.toml");
+    let line = 1 + text[..text
+        .find("clumsy/starts-fail.toml")
+        .expect("a correct test")]
+        .matches('\n')
+        .count();
+    let file = |name: &str| match name {
+        "clumsy/starts-fail.toml" => Err("cannot read it".to_owned()),
+        name => Ok(read(&format!("experiments/{name}"))),
+    };
+    let error = Experiment::read(&text, &file).unwrap_err().to_string();
+    assert_eq!(error, format!("line {line}: cannot read it"));
+    let file = |name: &str| {
+        let text = read(&format!("experiments/{name}"));
+        Ok(text.replace("facts.unlocked", "facts.unlokced"))
+    };
+    let experiment = Experiment::read(&text, &file).expect("a correct test");
+    let error = run(&experiment, WHOLE, &|_| true).unwrap_err().to_string();
+    assert!(
+        error.contains("the likelihoods of and the door locks: line 11"),
+        "{error}"
+    );
+    assert!(error.contains("unlokced"), "{error}");
+}

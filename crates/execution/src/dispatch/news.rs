@@ -61,7 +61,9 @@ impl Dispatch {
         let local = self.local(time);
         let fixed = self.horizon.fix(network_node(start), &local);
         self.progress.happen(&self.plan, start, &local);
+        self.leave_open(id);
         self.progress.ready.remove(&start);
+        self.retries.remove(&start);
         if start == end {
             self.finish(id);
         }
@@ -119,7 +121,8 @@ impl Dispatch {
     ) -> Reason {
         let name = self.action(id).name.clone();
         let mut reason = if is_own {
-            let mut reason = Reason::new(Cause::OutsideInterval).about("duration");
+            let about = self.duration_in_words(id);
+            let mut reason = Reason::new(Cause::OutsideInterval).about(about);
             reason.observed = duration;
             reason.allowed = Some(explain::interval(&self.durations[id.index()]));
             reason
@@ -136,6 +139,16 @@ impl Dispatch {
         });
         reason.by = Some(missed.by);
         reason
+    }
+
+    /// An action has started, in time or not.
+    pub(crate) fn note_start(&mut self, id: InstanceId, time: &Rational) {
+        let _ = self.started(id, time);
+    }
+
+    /// An action has ended as the domain says, in time or not.
+    pub(crate) fn note_end(&mut self, id: InstanceId, time: &Rational) {
+        let _ = self.ended(id, time, &Ending::Succeeded);
     }
 
     fn finish(&mut self, id: InstanceId) {

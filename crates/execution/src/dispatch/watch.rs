@@ -19,6 +19,14 @@ impl Dispatch {
         if let Some(reason) = self.overdue(moment).or_else(|| broken(moment)) {
             return replan(reason);
         }
+        self.go_on(moment)
+    }
+
+    /// The same without looking at what should have ended by now, and at over-all conditions.
+    pub(crate) fn go_on(&mut self, moment: &Moment<'_>) -> Decided {
+        if self.progress.left == 0 {
+            return at_the_end(moment);
+        }
         let now = self.local(moment.now);
         let mut orders = Vec::new();
         let mut wake: Option<(Rational, NodeId)> = None;
@@ -29,6 +37,7 @@ impl Dispatch {
         };
         for node in self.progress.ready.iter().copied() {
             let (earliest, latest) = self.horizon.window(network_node(node));
+            let earliest = earliest.max(self.held_until(node));
             match earliest.filter(|earliest| *earliest > now) {
                 Some(earliest) => wake_at(earliest, node),
                 None => orders.push(node),
@@ -48,7 +57,13 @@ impl Dispatch {
         }
         let mut reason = Reason::new(Cause::NothingDue);
         reason.about = Some(match &wake {
-            Some((_, node)) => self.plan.node_words(&self.task, *node),
+            Some((_, node)) => {
+                let words = self.plan.node_words(&self.task, *node);
+                match self.failures_in_words(*node) {
+                    Some(failures) => format!("{words} is tried again: {failures}"),
+                    None => words,
+                }
+            }
             None => "something is observed".to_owned(),
         });
         Decided {
@@ -81,6 +96,7 @@ impl Dispatch {
                 planned: self.planned(StepId::from(id), false).unwrap_or_default(),
             });
         }
+        let first = orders.first().map(|order| InstanceId(order.step.0));
         for order in &orders {
             let id = InstanceId(order.step.0);
             self.progress.ready.remove(&self.ends[id.index()][0]);
@@ -88,6 +104,7 @@ impl Dispatch {
         }
         let mut reason = Reason::new(Cause::Due);
         reason.action = orders.first().map(|order| order.action.name.clone());
+        reason.about = first.and_then(|id| self.failures_in_words(self.nodes_of(id)[0]));
         Decided {
             decision: Decision::Start(orders),
             reason,
@@ -121,6 +138,9 @@ impl Dispatch {
             let is_own = node == end && self.is_limited_by_duration(id, WindowEnd::Latest);
             let mut reason = if is_own {
                 let mut reason = Reason::new(Cause::Outlived);
+                if self.resumed.contains(&id) {
+                    reason = reason.about(self.duration_in_words(id));
+                }
                 reason.observed = self.happened(start).map(|start| &now - start);
                 reason.allowed = Some(explain::interval(&self.durations[id.index()]));
                 reason

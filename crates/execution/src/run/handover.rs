@@ -1,5 +1,6 @@
 //! From one plan to the next.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
@@ -90,6 +91,9 @@ impl Run<'_> {
             PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
             PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
             PlanAnswer::Plan(plan) => {
+                // What ends from now on is no step of the plan that was given up, and not yet one
+                // of the new plan: what it changes is news, and the new plan is told of its end.
+                self.account.begin_plan(&BTreeMap::new());
                 while self.now < ready {
                     self.pass(&ready)?;
                 }

@@ -1,0 +1,54 @@
+//! Starts that have failed and are tried again.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, NodeId};
+
+use super::Dispatch;
+
+/// A start that has failed.
+#[derive(Clone, Debug)]
+pub(super) struct Retry {
+    /// When it may be tried again, on the plan's clock.
+    pub(super) not_before: Rational,
+    /// How often it has failed in a row.
+    pub(super) failures: u32,
+}
+
+/// After so many failures in a row the wait does not grow any more: ε · 2⁴⁰ is 35 years.
+const MOST_DOUBLINGS: u32 = 40;
+
+impl Dispatch {
+    /// A start has failed: it is ready again, ε later after its first failure, and after each
+    /// further one in a row twice as late as before. So a start that always fails is tried a few
+    /// dozen times in the longest of runs, and one that fails now and then loses next to no time.
+    pub(crate) fn try_again(&mut self, id: InstanceId, failed: &Rational) {
+        let [start, _] = self.nodes_of(id);
+        let known = self.retries.get(&start);
+        let failures = known.map_or(0, |retry| retry.failures) + 1;
+        let doublings = (failures - 1).min(MOST_DOUBLINGS);
+        let wait = &self.epsilon * Rational::from(1_i64 << doublings);
+        let retry = Retry {
+            not_before: self.local(failed) + wait,
+            failures,
+        };
+        self.retries.insert(start, retry);
+        self.progress.running.remove(&id);
+        self.progress.ready.insert(start);
+    }
+
+    /// When a start may be tried again, if it has failed.
+    pub(super) fn held_until(&self, start: NodeId) -> Option<Rational> {
+        self.retries
+            .get(&start)
+            .map(|retry| retry.not_before.clone())
+    }
+
+    /// How often a start has failed in a row, in words.
+    pub(super) fn failures_in_words(&self, start: NodeId) -> Option<String> {
+        let times = match self.retries.get(&start)?.failures {
+            1 => "once".to_owned(),
+            many => format!("{many} times in a row"),
+        };
+        Some(format!("its start has failed {times}"))
+    }
+}

@@ -1,0 +1,137 @@
+//! `esterel`: paper 2's baseline.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, InstanceId};
+
+use super::Registered;
+use crate::dispatch::{Bounds, Dispatch, Sight, duration_of, replan};
+use crate::event::Ending;
+use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
+use crate::preparation::Need;
+use crate::reason::{Cause, Reason};
+
+pub(super) const REGISTERED: Registered = Registered {
+    name: "esterel",
+    argument: None,
+    is_optional: false,
+    summary: "Does the plan's happenings as soon as its orderings allow, whatever the likelihoods: \
+              it tries a failed start again, without limit and each time after twice the wait, and \
+              replans when something needs a condition that does not hold, when an action breaks \
+              off, or when the plan is done and the goal is not reached. It looks at no deadline \
+              and no duration.",
+    paper: "the Esterel Dispatcher of ROSPlan, the baseline in Ribeiro et al. (2021), section 3",
+    need: Need::Network,
+    make: |_, _| Box::new(Esterel { dispatch: None }),
+};
+
+/// See [`REGISTERED`]. Without time it is [`untimed::Esterel`](crate::untimed::Esterel).
+#[derive(Debug)]
+struct Esterel {
+    dispatch: Option<Dispatch>,
+}
+
+impl Executor for Esterel {
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let plan = &mission.plan.plan;
+        let bounds = |constraint: &Constraint| -> Bounds {
+            if duration_of(plan, constraint).is_some() {
+                // An end comes when it comes.
+                return (None, None);
+            }
+            orderings(constraint)
+        };
+        self.dispatch = Some(Dispatch::new(mission, Sight::Whole, &bounds)?);
+        Ok(())
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let Some(dispatch) = &mut self.dispatch else {
+            return super::without_plan();
+        };
+        let mut trouble = None;
+        for news in moment.news {
+            let new = learn(dispatch, news);
+            trouble = trouble.or(new);
+        }
+        match trouble {
+            Some(reason) => replan(reason),
+            None => dispatch.go_on(moment),
+        }
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        self.dispatch.as_ref()?.planned(step, is_end)
+    }
+}
+
+/// Takes note of what is new; why the plan has to be given up, if it has to.
+fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
+    match news {
+        News::Started { step, time, .. } => {
+            dispatch.note_start(InstanceId(step.0), time);
+            None
+        }
+        News::Ended {
+            step, time, ending, ..
+        } => {
+            let id = InstanceId(step.0);
+            let [start, _] = dispatch.nodes_of(id);
+            let name = &dispatch.action(id).name;
+            let why = match ending {
+                Ending::Succeeded => {
+                    dispatch.note_end(id, time);
+                    return None;
+                }
+                Ending::Failed { .. } if dispatch.happened(start).is_none() => {
+                    dispatch.try_again(id, time);
+                    return None;
+                }
+                Ending::Failed { why } => why.as_str(),
+                Ending::Cancelled => "it was cancelled",
+            };
+            let reason = Reason::new(Cause::Failed).of(name).about(why);
+            Some(reason.since(time.clone()))
+        }
+        // What holds is looked at when something needs it.
+        News::Fact(_) | News::Value(_) => None,
+        News::Contradiction { action } => Some(Reason::new(Cause::Contradiction).of(action)),
+        News::Silence { action, since } => {
+            Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
+        }
+    }
+}
+
+/// What a constraint says about which of its time points comes first, and by how much; not how
+/// much later the other may be.
+fn orderings(constraint: &Constraint) -> Bounds {
+    let value = |bound: &Bound| match bound {
+        Bound::Finite(value) => Some(value.clone()),
+        Bound::Infinite | Bound::Parameter(_) => None,
+    };
+    let lower = value(&constraint.lower).filter(|lower| !lower.is_negative());
+    let upper = value(&constraint.upper).filter(|upper| *upper <= Rational::ZERO);
+    (lower, upper)
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_num::Rational;
+    use elbowroom_plan::{Bound, Constraint, NodeId, Reason};
+
+    use super::orderings;
+
+    #[test]
+    fn only_what_comes_first_is_taken_from_a_constraint() {
+        let between = |lower: i64, upper: i64| Constraint {
+            from: NodeId(1),
+            to: NodeId(2),
+            lower: Bound::Finite(Rational::from(lower)),
+            upper: Bound::Finite(Rational::from(upper)),
+            reason: Reason::Given,
+        };
+        let number = |value: i64| Some(Rational::from(value));
+        assert_eq!(orderings(&between(2, 5)), (number(2), None));
+        assert_eq!(orderings(&between(-3, 5)), (None, None));
+        assert_eq!(orderings(&between(-5, -2)), (None, number(-2)));
+    }
+}
