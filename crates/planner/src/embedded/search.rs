@@ -7,23 +7,24 @@
 //! A search for plans of a better metric weighs what a state has spent against what the relaxed
 //! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
+mod doubt;
 mod limit;
 mod queue;
-mod share;
+mod style;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
-use super::compile::{Compiled, Eagerness, NONE};
+use super::compile::{Compiled, NONE};
 use super::guide::Guide;
 use super::hash::Map;
-use super::pairs::Pairs;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
+use doubt::Doubt;
 pub(crate) use limit::Limit;
 use queue::Queue;
-use share::Share;
+pub(crate) use style::{Aim, Style};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
@@ -34,67 +35,6 @@ pub(crate) const PATIENCE: u64 = 64;
 /// After how many states the stronger bound is asked about the next ones too.
 const DOUBT: u64 = 512;
 
-/// How a search goes about it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Style {
-    /// If present, actions that are at least so eager end at once, and states are compared
-    /// roughly. Some plans are lost.
-    pub(crate) haste: Option<Eagerness>,
-    /// How many states that differ in times only are kept; more are dropped, and some plans lost.
-    pub(crate) variants: usize,
-    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
-    pub(crate) fills_up: bool,
-    /// What is looked for.
-    pub(crate) aim: Aim,
-}
-
-/// What a search looks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Aim {
-    /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.
-    Goal,
-    /// Plans of a better metric. What costs least to finish comes first.
-    CheapRest,
-    /// Plans of a better metric. What has been spent counts too, what is still to be spent so many
-    /// times as much (weighted A*; Pohl 1970).
-    CheapWhole(i64),
-    /// Shorter plans of the same metric.
-    Shortest,
-}
-
-impl Style {
-    /// Loses nothing but what [`Search::is_incomplete`] tells.
-    pub(crate) const COMPLETE: Self = Self {
-        haste: None,
-        variants: usize::MAX,
-        fills_up: false,
-        aim: Aim::Goal,
-    };
-
-    /// Actions that are at least so eager end at once.
-    pub(crate) fn hasty(haste: Eagerness) -> Self {
-        Self {
-            haste: Some(haste),
-            variants: 4,
-            fills_up: false,
-            aim: Aim::Goal,
-        }
-    }
-
-    /// The same, filling up what is used up.
-    pub(crate) fn filling_up(self) -> Self {
-        Self {
-            fills_up: true,
-            ..self
-        }
-    }
-
-    /// The same with another aim.
-    pub(crate) fn towards(self, aim: Aim) -> Self {
-        Self { aim, ..self }
-    }
-}
-
 /// A search in progress.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
@@ -103,11 +43,7 @@ pub(crate) struct Search<'a> {
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
-    /// A stronger bound, once the search takes long.
-    pairs: Option<Pairs<'a>>,
-    share: Share,
-    /// Whether there are too many pairs for that.
-    is_too_large: bool,
+    doubt: Doubt<'a>,
     has_begun: bool,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
@@ -189,10 +125,8 @@ impl<'a> Search<'a> {
             symmetry,
             style,
             stepper: Stepper::new(compiled),
+            doubt: Doubt::new(compiled, relaxed.size()),
             relaxed,
-            pairs: None,
-            share: Share::START,
-            is_too_large: false,
             has_begun: false,
             nodes: Vec::new(),
             known: Map::default(),
@@ -259,7 +193,7 @@ impl<'a> Search<'a> {
 
     /// How many pairs the stronger bound has looked up.
     pub(crate) fn lookups(&self) -> u64 {
-        self.pairs.as_ref().map_or(0, |pairs| pairs.work)
+        self.doubt.lookups()
     }
 
     /// Looks at one more state.
@@ -386,36 +320,21 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
-    /// successor of a state has its turn, and gets a share of the time.
+    /// successor of a state has its turn.
     fn is_cut(&mut self, number: u32) -> bool {
-        if self.pairs.is_none()
-            && self.evaluated >= DOUBT
-            && !self.is_timeless
-            && !self.is_too_large
-        {
-            self.pairs = Pairs::of(self.compiled);
-            self.is_too_large = self.pairs.is_none();
-        }
-        let Some(pairs) = &mut self.pairs else {
-            return false;
-        };
         let node = &mut self.nodes[number as usize];
         match node.hope {
             Hope::Some => return false,
             Hope::None => return true,
             Hope::Unknown => {}
         }
-        node.hope = Hope::Some;
-        if !self.share.asks(self.relaxed.size(), self.evaluated) {
+        if self.is_timeless || self.evaluated < DOUBT {
             return false;
         }
-        pairs.horizon = self.stepper.horizon;
-        let before = pairs.work;
-        let is_hopeless = pairs.is_hopeless(&node.state);
-        self.share.note(pairs.work - before, is_hopeless);
-        if is_hopeless {
-            node.hope = Hope::None;
-        }
+        self.doubt.evaluated = self.evaluated;
+        self.doubt.horizon = self.stepper.horizon;
+        let is_hopeless = self.doubt.is_hopeless(&node.state);
+        node.hope = if is_hopeless { Hope::None } else { Hope::Some };
         is_hopeless
     }
 
