@@ -270,7 +270,7 @@ mod tests {
     fn actions_take_as_long_as_they_must() {
         let look = |duration: &str| action("look", duration, "()", "(at end (done ?p))");
         let numbers = |text: &str| {
-            let numbers = text.split(' ').map(|number| number.parse::<Rational>());
+            let numbers = text.split(' ').map(str::parse::<Rational>);
             Some(numbers.collect::<Result<Vec<_>, _>>().unwrap())
         };
         let of = |duration: &str| durations(&look(duration), "");
