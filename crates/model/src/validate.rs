@@ -36,6 +36,7 @@ mod explain;
 mod interference;
 mod judge;
 mod margin;
+mod metric;
 mod piece;
 mod polynomial;
 mod reading;

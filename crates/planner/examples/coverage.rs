@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 use elbowroom_model::{Situation, Task};
 use elbowroom_pddl::{Source, read_problem};
-use elbowroom_planner::{Answer, Progress, Settings, plan};
+use elbowroom_planner::{Answer, Found, Progress, Settings, plan};
 
 struct Options {
     limit: Duration,
@@ -34,7 +34,7 @@ fn main() {
     let options = options();
     println!(
         "domain,instance,outcome,first_seconds,first_makespan,best_makespan,total_seconds,\
-         read_seconds,actions,states,megabytes"
+         read_seconds,actions,states,megabytes,first_metric,best_metric"
     );
     match &options.files[..] {
         [folder] => {
@@ -110,7 +110,7 @@ fn run(options: &Options, domain: &str, instance: &str, (first, second): (&Path,
             } else {
                 "not-read"
             };
-            println!("{domain},{instance},{outcome},,,,,,,,");
+            println!("{domain},{instance},{outcome},,,,,,,,,,");
             return;
         }
     };
@@ -118,10 +118,15 @@ fn run(options: &Options, domain: &str, instance: &str, (first, second): (&Path,
     let read = begin.elapsed().as_secs_f64();
     let situation = Situation::initial(&task);
     let begin = Instant::now();
-    let mut first: Option<(f64, String)> = None;
+    let mut first: Option<(f64, String, String)> = None;
+    let metric = |found: &Found| found.metric.as_ref().map(|metric| metric.to_decimal(3));
     let mut observe = |progress: &Progress| {
         if let (Some(found), None) = (&progress.plan, &first) {
-            first = Some((begin.elapsed().as_secs_f64(), found.makespan.to_decimal(3)));
+            let worth = (
+                found.makespan.to_decimal(3),
+                metric(found).unwrap_or_default(),
+            );
+            first = Some((begin.elapsed().as_secs_f64(), worth.0, worth.1));
         }
         if begin.elapsed() >= options.limit {
             ControlFlow::Break(())
@@ -173,13 +178,14 @@ fn run(options: &Options, domain: &str, instance: &str, (first, second): (&Path,
             ("unsupported".to_owned(), String::new(), counts)
         }
     };
-    let (first_seconds, first_makespan) = first
-        .map_or_else(Default::default, |(time, makespan)| {
-            (format!("{time:.4}"), makespan)
+    let (first_seconds, first_makespan, first_metric) = first
+        .map_or_else(Default::default, |(time, makespan, metric)| {
+            (format!("{time:.4}"), makespan, metric)
         });
+    let best_metric = answer.found().and_then(metric).unwrap_or_default();
     println!(
         "{domain},{instance},{outcome},{first_seconds},{first_makespan},{best},{total:.4},\
-         {read:.4},{},{},{}",
+         {read:.4},{},{},{},{first_metric},{best_metric}",
         counts.actions,
         counts.evaluated,
         counts.memory >> 20

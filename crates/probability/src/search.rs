@@ -8,7 +8,8 @@
 //! - there is no time for them: durations, their bounds, timed initials and now leave no schedule;
 //! - no way to go on can beat the best order found (a sharper bound than the paper's P(A), see
 //!   `search/bound.rs`);
-//! - another sequence has done the same and stands at least as well (see `search/memo.rs`).
+//! - another sequence has done the same and stands at least as well (see `search/memo.rs`);
+//! - it has a twin with instances that can stand for each other (see `search/symmetry.rs`).
 //!
 //! Unlike the published code this keeps the best order found, starts from the belief as it is now,
 //! and lets actions be done again that were done before.
@@ -18,7 +19,10 @@ mod bound;
 mod cache;
 mod memo;
 mod nominal;
+mod room;
 mod run;
+mod separations;
+mod symmetry;
 mod timing;
 
 use std::ops::ControlFlow;
@@ -34,8 +38,11 @@ use crate::total_order::TotalOrderPlan;
 use bound::Bounds;
 use cache::Cache;
 use nominal::Nominal;
+use room::Rooms;
 use run::Run;
-use timing::{Separations, Timing};
+use separations::Separations;
+use symmetry::Symmetry;
+use timing::Timing;
 
 /// Which sequences are orders of the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -106,6 +113,7 @@ pub struct OrderSearch {
     model: Arc<Model>,
     settings: SearchSettings,
     separations: Separations,
+    symmetry: Symmetry,
     bounds: Bounds,
     cache: Cache,
     /// Looked at before all others.
@@ -119,6 +127,7 @@ impl OrderSearch {
         let separations = Separations::of(&model, &settings.epsilon, settings.keeps_interference);
         let bounds = Bounds::of(&model, &separations);
         Self {
+            symmetry: Symmetry::of(&model, &separations),
             model,
             settings,
             separations,
@@ -188,7 +197,7 @@ impl OrderSearch {
             stop: SearchStop::Complete,
             sequences,
         };
-        let Some(timing) = Timing::new(&self.separations, circumstances) else {
+        let Some(rooms) = Rooms::new(&self.separations, circumstances) else {
             return Ok(nothing(0));
         };
         let must_work = self.settings.candidates == Candidates::Working;
@@ -196,7 +205,7 @@ impl OrderSearch {
         if must_work && !works {
             return Ok(nothing(0));
         }
-        let mut run = Run::new(self, circumstances, nominal, timing, watch)?;
+        let mut run = Run::new(self, circumstances, nominal, rooms, watch)?;
         run.try_first(&self.first)?;
         let stop = match run.explore()? {
             ControlFlow::Continue(()) => SearchStop::Complete,
@@ -266,9 +275,7 @@ impl OrderSearch {
         let passed = next_timed.by_ref().take_while(|(_, time)| time <= now);
         let mut next_timed = passed.count();
         for &node in sequence {
-            if !timing.push(&self.model, node, next_timed) {
-                return None;
-            }
+            timing.push(&self.model, node, next_timed)?;
             let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
             next_timed += usize::from(is_timed);
         }

@@ -1,6 +1,7 @@
 //! Whole runs: executors, worlds, planner and envelopes together.
 
 mod adaptable;
+mod amounts;
 mod bad_worlds;
 mod campaigns;
 mod esterel;

@@ -23,7 +23,8 @@ pub struct Settings {
 /// What makes a plan better than another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Objective {
-    /// The problem's metric where it has one that can be evaluated, else the makespan.
+    /// The problem's metric where it has one that can be evaluated, else the makespan. Of plans of
+    /// the same metric, the shorter one is better.
     #[default]
     Metric,
     /// The makespan, whatever the problem says.
@@ -92,6 +93,9 @@ pub struct Found {
     pub plan: TimeTriggeredPlan,
     /// The time of its last happening, on the task's clock.
     pub makespan: Rational,
+    /// The value of the problem's metric, as the problem writes it; `None` if it has none that can
+    /// be evaluated.
+    pub metric: Option<Rational>,
     /// The objective's value; less is better (what is to be maximized is negated).
     pub value: Rational,
 }

@@ -10,6 +10,7 @@ use elbowroom_num::Rational;
 use super::compile::{Action, Compiled, NONE};
 use super::formula::{Formula, set};
 use super::network::{NodeId, SETTLED};
+use super::search::Limit;
 use super::state::{Open, State};
 use super::symbolic::{self, Form, Moment};
 use super::time::{NEVER, Ticks};
@@ -35,6 +36,8 @@ pub(crate) struct Stepper<'a> {
     pub(crate) compiled: &'a Compiled,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
+    /// What a plan must be better than, where that depends on times.
+    pub(crate) limit: Option<Limit>,
     /// If present, all happenings stay in the network, to be read off at the end, and what is
     /// needed to compute their times exactly is noted here.
     pub(crate) log: Option<Log>,
@@ -55,6 +58,7 @@ impl<'a> Stepper<'a> {
         Self {
             compiled,
             horizon: NEVER,
+            limit: None,
             log: None,
             has_rounded: false,
         }
@@ -96,7 +100,9 @@ impl<'a> Stepper<'a> {
         }
         self.keeps_conditions(state)?;
         let is_in_time = state.earliest_end() <= self.horizon;
-        (is_in_time && symbolic::is_possible(state, self.compiled.scale)).then_some(())
+        let metric = self.compiled.metric.as_ref();
+        let limit = metric.zip(self.limit.as_ref());
+        (is_in_time && symbolic::is_possible(state, self.compiled.scale, limit)).then_some(())
     }
 
     /// Whether happenings may leave the network.
@@ -256,7 +262,7 @@ impl<'a> Stepper<'a> {
     pub(crate) fn reach_goal(&mut self, state: &mut State) -> Option<()> {
         let goal = &self.compiled.goal;
         self.demand(state, goal, None, &Moment::default())?;
-        symbolic::is_possible(state, self.compiled.scale).then_some(())
+        symbolic::is_possible(state, self.compiled.scale, None).then_some(())
     }
 
     /// Requires a condition, now or, where numbers depend on times, of the times.

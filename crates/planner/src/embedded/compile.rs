@@ -14,6 +14,7 @@ mod eagerness;
 mod gaps;
 mod initial;
 mod interference;
+mod metric;
 mod reads;
 mod rules;
 mod shortened;
@@ -25,7 +26,8 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
-pub(crate) use builder::{Failure, compile};
+pub(crate) use builder::{Failure, Wanted, compile};
+pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
@@ -57,6 +59,8 @@ pub(crate) struct Compiled {
     /// The timed initials to come, by time.
     pub(crate) timed: Vec<Timed>,
     pub(crate) goal: Formula,
+    /// What a plan shall have little of, if that is more than the makespan and was asked for.
+    pub(crate) metric: Option<Metric>,
     /// The timed initials that write something the goal reads.
     pub(crate) goal_timed: Vec<u32>,
     /// The rules of derived facts: what a stratum negates is settled in an earlier one.
@@ -83,6 +87,8 @@ pub(crate) struct Snap {
     pub(crate) deletes: Vec<u32>,
     pub(crate) updates: Vec<Update>,
     pub(crate) conditional: Vec<Conditional>,
+    /// What it adds to [`State::cost`].
+    pub(crate) cost: Option<Numeric>,
     /// Stamps, and how long after them this must happen.
     pub(crate) after: Vec<(u32, Ticks)>,
     /// Stamps that this sets.
@@ -114,6 +120,8 @@ pub(crate) enum Change {
     Add(u32),
     Delete(u32),
     Update(Update),
+    /// Something is added to [`State::cost`].
+    Cost(Numeric),
 }
 
 /// A ground action.

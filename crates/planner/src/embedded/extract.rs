@@ -103,7 +103,10 @@ pub(crate) fn plan_of(
     let log = stepper.log.as_ref()?;
     let times = match &state.symbolic {
         None => exact_times(compiled, &state.network, log, settings)?,
-        Some(_) => symbolic::solve(&state, compiled.scale, &exact_distances(log))?,
+        Some(_) => {
+            let exact = exact_distances(log);
+            symbolic::solve(&state, compiled.scale, &exact, compiled.metric.as_ref())?
+        }
     };
     let mut plan = TimeTriggeredPlan::default();
     for (number, timing) in timings.iter().enumerate() {

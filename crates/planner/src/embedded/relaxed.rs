@@ -11,18 +11,21 @@
 mod deadlines;
 mod graph;
 mod numbers;
+mod resources;
 
 use super::apply::Step;
 use super::compile::{Compiled, Eagerness, NONE};
 use super::formula::Literal;
-use super::state::State;
-
+use super::guide::Guide;
 use super::network::SETTLED;
+use super::state::State;
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
 use graph::Kind;
+use resources::Resources;
+pub(crate) use resources::floors;
 
 /// Beyond this, costs are all alike.
 const MOST: u32 = 1 << 15;
@@ -36,7 +39,7 @@ const NO_OPERATOR: u32 = u32::MAX;
 /// What one evaluation found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Estimate {
-    /// How many steps the relaxed plan has.
+    /// How many steps the relaxed plan has; what they cost, in a weighing search.
     pub(crate) steps: u32,
     /// The steps whose conditions hold in the state; in time they may still be impossible.
     pub(crate) applicable: Vec<Step>,
@@ -70,6 +73,7 @@ pub(crate) struct Relaxed<'a> {
     buckets: Vec<Vec<u32>>,
     applicable: Vec<u32>,
     deadlines: Deadlines,
+    resources: Resources,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
 }
@@ -81,6 +85,7 @@ impl<'a> Relaxed<'a> {
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
+            resources: Resources::default(),
             cost: vec![UNREACHED; propositions],
             achiever: vec![NO_OPERATOR; propositions],
             repetitions: vec![1; propositions],
@@ -95,6 +100,16 @@ impl<'a> Relaxed<'a> {
             horizon: NEVER,
             graph,
         }
+    }
+
+    /// From now on a step counts for what it costs, not for one.
+    pub(crate) fn weigh(&mut self, guide: &Guide) {
+        self.graph.weigh(guide);
+    }
+
+    /// From now on, what a relaxed plan uses up is counted, and filled up.
+    pub(crate) fn count_resources(&mut self) {
+        self.resources = Resources::of(self.compiled, &self.graph);
     }
 
     /// The number of operators.
@@ -335,29 +350,9 @@ impl<'a> Relaxed<'a> {
             let needs = self.graph.operators[end as usize].preconditions.clone();
             wanted.extend_from_slice(&self.graph.preconditions[needs]);
         }
-        while let Some(proposition) = wanted.pop() {
-            let index = proposition as usize;
-            if self.cost[index] == 0 || std::mem::replace(&mut self.is_wanted[index], true) {
-                continue;
-            }
-            touched.push(proposition);
-            let operator = self.achiever[index];
-            let data = &self.graph.operators[operator as usize];
-            estimate.steps += (self.repetitions[index] - 1) * data.cost;
-            if Self::use_operator(&mut self.is_used, &mut used, operator) {
-                wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
-                if let Kind::Start(action) = data.kind {
-                    // What starts must end.
-                    let end = self.graph.end_of[action as usize];
-                    if end != NONE
-                        && self.missing[end as usize] == 0
-                        && Self::use_operator(&mut self.is_used, &mut used, end)
-                    {
-                        let needs = self.graph.operators[end as usize].preconditions.clone();
-                        wanted.extend_from_slice(&self.graph.preconditions[needs]);
-                    }
-                }
-            }
+        self.collect(&mut wanted, &mut used, &mut touched, estimate);
+        if !self.resources.is_empty() {
+            self.fill_up(state, &mut wanted, &mut used, &mut touched, estimate);
         }
         for &operator in &used {
             let data = &self.graph.operators[operator as usize];
@@ -373,6 +368,71 @@ impl<'a> Relaxed<'a> {
         }
         estimate.preferred.sort_unstable();
         estimate.preferred.dedup();
+    }
+
+    /// Collects the operators of the relaxed plan for what is wanted.
+    fn collect(
+        &mut self,
+        wanted: &mut Vec<u32>,
+        used: &mut Vec<u32>,
+        touched: &mut Vec<u32>,
+        estimate: &mut Estimate,
+    ) {
+        while let Some(proposition) = wanted.pop() {
+            let index = proposition as usize;
+            if self.cost[index] == 0 || std::mem::replace(&mut self.is_wanted[index], true) {
+                continue;
+            }
+            touched.push(proposition);
+            let operator = self.achiever[index];
+            let data = &self.graph.operators[operator as usize];
+            estimate.steps += (self.repetitions[index] - 1) * data.cost;
+            if Self::use_operator(&mut self.is_used, used, operator) {
+                wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
+                if let Kind::Start(action) = data.kind {
+                    // What starts must end.
+                    let end = self.graph.end_of[action as usize];
+                    if end != NONE
+                        && self.missing[end as usize] == 0
+                        && Self::use_operator(&mut self.is_used, used, end)
+                    {
+                        let needs = self.graph.operators[end as usize].preconditions.clone();
+                        wanted.extend_from_slice(&self.graph.preconditions[needs]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds what fills up the resources that the relaxed plan uses up.
+    fn fill_up(
+        &mut self,
+        state: &State,
+        wanted: &mut Vec<u32>,
+        used: &mut Vec<u32>,
+        touched: &mut Vec<u32>,
+        estimate: &mut Estimate,
+    ) {
+        self.resources.begin(state);
+        let mut noted = 0;
+        loop {
+            for &operator in &used[noted..] {
+                self.resources.note(operator, 1);
+            }
+            noted = used.len();
+            let (missing, costs) = (&self.missing, &self.operator_cost);
+            let cost = |o: u32| (missing[o as usize] == 0).then(|| costs[o as usize]);
+            let Some(shortage) = self.resources.shortage(cost) else {
+                break;
+            };
+            let data = &self.graph.operators[shortage.operator as usize];
+            let is_new = Self::use_operator(&mut self.is_used, used, shortage.operator);
+            let more = shortage.times - u32::from(is_new);
+            self.resources.note(shortage.operator, more);
+            estimate.steps += more * data.cost;
+            wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
+            self.collect(wanted, used, touched, estimate);
+        }
     }
 
     fn use_operator(is_used: &mut [bool], used: &mut Vec<u32>, operator: u32) -> bool {

@@ -3,18 +3,27 @@
 //!
 //! Two queues take turns, one with all successors and one with the preferred ones only; whenever
 //! a better estimate is found, the preferred ones get a long turn.
+//!
+//! A search for plans of a better metric weighs what a state has spent against what the relaxed
+//! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
-use std::collections::{BTreeMap, VecDeque};
+mod limit;
+mod queue;
+mod share;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::compile::{Compiled, Eagerness, NONE};
+use super::guide::Guide;
 use super::hash::Map;
 use super::pairs::Pairs;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
+pub(crate) use limit::Limit;
+use queue::Queue;
+use share::Share;
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
@@ -25,46 +34,6 @@ pub(crate) const PATIENCE: u64 = 64;
 /// After how many states the stronger bound is asked about the next ones too.
 const DOUBT: u64 = 512;
 
-/// How many states a search evaluates that takes long.
-const LONG: u64 = 4096;
-
-/// How much of the time the stronger bound may take: at first at most about half, if it cuts all
-/// states. Many that it cuts would never have had their turn, so cutting many need not save much;
-/// but the longer a search takes, the likelier it does, and the more is allowed.
-///
-/// Time is counted in pairs looked up; an estimate takes as long as some 80 of them for each of its
-/// operators.
-#[derive(Clone, Copy, Debug)]
-struct Share {
-    /// How many pairs may be looked up now.
-    credit: u64,
-    /// How many the last answer took.
-    price: u64,
-    /// How many of the last answers have cut a state, in 256ths.
-    cuts: u64,
-}
-
-impl Share {
-    const START: Self = Self {
-        credit: 0,
-        price: 0,
-        cuts: 64,
-    };
-
-    /// One more state with an estimate of that size, after so many. Whether to ask.
-    fn asks(&mut self, size: u64, evaluated: u64) -> bool {
-        let doubts = 1 + evaluated / LONG;
-        self.credit = (self.credit + (16 + self.cuts * doubts / 4) * size).min(2 * self.price);
-        self.credit >= self.price
-    }
-
-    fn note(&mut self, price: u64, has_cut: bool) {
-        self.price = price;
-        self.credit = self.credit.saturating_sub(price);
-        self.cuts = (7 * self.cuts + if has_cut { 256 } else { 0 }) / 8;
-    }
-}
-
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Style {
@@ -73,6 +42,24 @@ pub(crate) struct Style {
     pub(crate) haste: Option<Eagerness>,
     /// How many states that differ in times only are kept; more are dropped, and some plans lost.
     pub(crate) variants: usize,
+    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
+    pub(crate) fills_up: bool,
+    /// What is looked for.
+    pub(crate) aim: Aim,
+}
+
+/// What a search looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.
+    Goal,
+    /// Plans of a better metric. What costs least to finish comes first.
+    CheapRest,
+    /// Plans of a better metric. What has been spent counts too, what is still to be spent so many
+    /// times as much (weighted A*; Pohl 1970).
+    CheapWhole(i64),
+    /// Shorter plans of the same metric.
+    Shortest,
 }
 
 impl Style {
@@ -80,6 +67,8 @@ impl Style {
     pub(crate) const COMPLETE: Self = Self {
         haste: None,
         variants: usize::MAX,
+        fills_up: false,
+        aim: Aim::Goal,
     };
 
     /// Actions that are at least so eager end at once.
@@ -87,7 +76,22 @@ impl Style {
         Self {
             haste: Some(haste),
             variants: 4,
+            fills_up: false,
+            aim: Aim::Goal,
         }
+    }
+
+    /// The same, filling up what is used up.
+    pub(crate) fn filling_up(self) -> Self {
+        Self {
+            fills_up: true,
+            ..self
+        }
+    }
+
+    /// The same with another aim.
+    pub(crate) fn towards(self, aim: Aim) -> Self {
+        Self { aim, ..self }
     }
 }
 
@@ -104,6 +108,7 @@ pub(crate) struct Search<'a> {
     share: Share,
     /// Whether there are too many pairs for that.
     is_too_large: bool,
+    has_begun: bool,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
     known: Map<u64, Vec<u32>>,
@@ -113,6 +118,12 @@ pub(crate) struct Search<'a> {
     best_steps: u32,
     /// Whether times are irrelevant but for their distances.
     is_timeless: bool,
+    /// What steps cost, in a search for a better metric.
+    guide: Option<Guide>,
+    /// What plans must be better than.
+    limit: Option<Limit>,
+    /// Nothing may happen later, whatever it costs.
+    horizon: Ticks,
     /// Whether something was dropped that could have led to a plan.
     pub(crate) has_lost: bool,
     pub(crate) expanded: u64,
@@ -143,30 +154,6 @@ enum Hope {
 
 const ROOT: u32 = u32::MAX;
 
-/// Successors by estimate, first come first served.
-#[derive(Debug, Default)]
-struct Queue {
-    buckets: BTreeMap<u32, VecDeque<(u32, Step)>>,
-}
-
-impl Queue {
-    fn push(&mut self, estimate: u32, parent: u32, step: Step) {
-        self.buckets
-            .entry(estimate)
-            .or_default()
-            .push_back((parent, step));
-    }
-
-    fn pop(&mut self) -> Option<(u32, Step)> {
-        let mut first = self.buckets.first_entry()?;
-        let entry = first.get_mut().pop_front();
-        if first.get().is_empty() {
-            first.remove();
-        }
-        entry
-    }
-}
-
 /// What a turn of the search brought.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Turn {
@@ -180,7 +167,18 @@ pub(crate) enum Turn {
 impl<'a> Search<'a> {
     pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, style: Style) -> Self {
         let has_deadline = |most: Ticks| most < NEVER;
+        let is_weighing = style.aim != Aim::Goal;
+        let metric = compiled.metric.as_ref().filter(|_| is_weighing);
+        let guide = metric.map(|metric| Guide::of(compiled, metric));
+        let mut relaxed = Relaxed::new(compiled, style.haste);
+        if style.fills_up {
+            relaxed.count_resources();
+        }
+        if let Some(guide) = &guide {
+            relaxed.weigh(guide);
+        }
         let is_timeless = compiled.timed.is_empty()
+            && metric.is_none_or(Limit::is_timeless)
             && !compiled
                 .initial
                 .open
@@ -191,10 +189,11 @@ impl<'a> Search<'a> {
             symmetry,
             style,
             stepper: Stepper::new(compiled),
-            relaxed: Relaxed::new(compiled, style.haste),
+            relaxed,
             pairs: None,
             share: Share::START,
             is_too_large: false,
+            has_begun: false,
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
@@ -202,6 +201,9 @@ impl<'a> Search<'a> {
             turns: [0, 0],
             best_steps: u32::MAX,
             is_timeless,
+            guide,
+            limit: None,
+            horizon: NEVER,
             has_lost: false,
             expanded: 0,
             generated: 0,
@@ -212,14 +214,31 @@ impl<'a> Search<'a> {
 
     /// From now on only plans count that end by then.
     pub(crate) fn set_horizon(&mut self, horizon: Ticks) {
-        self.stepper.horizon = horizon;
-        self.relaxed.horizon = horizon;
+        self.horizon = horizon;
         self.is_timeless = false;
+    }
+
+    /// From now on only plans count that are within the limit.
+    pub(crate) fn set_limit(&mut self, limit: Limit) {
+        if self.compiled.is_symbolic {
+            self.stepper.limit = Some(limit.clone());
+        }
+        self.limit = Some(limit);
     }
 
     /// Whether the search claims more than it can: it has dropped or rounded something.
     pub(crate) fn is_incomplete(&self) -> bool {
         self.has_lost || self.stepper.has_rounded
+    }
+
+    /// Whether it loses plans for the sake of speed.
+    pub(crate) fn is_hasty(&self) -> bool {
+        self.style.haste.is_some()
+    }
+
+    /// What it looks for.
+    pub(crate) fn aim(&self) -> Aim {
+        self.style.aim
     }
 
     /// Statistics.
@@ -245,15 +264,14 @@ impl<'a> Search<'a> {
 
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
-        if self.nodes.is_empty() {
+        if !std::mem::replace(&mut self.has_begun, true) {
             let initial = self.compiled.initial.clone();
-            if initial.earliest_end() > self.stepper.horizon {
+            if initial.earliest_end() > self.horizon {
                 return Turn::Over;
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
-        let is_preferred_turn =
-            self.turns[0] <= self.turns[1] && !self.preferred.buckets.is_empty();
+        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
         let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
         let entry = match queue {
@@ -263,7 +281,8 @@ impl<'a> Search<'a> {
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
-        if self.is_cut(parent) {
+        let latest_end = self.latest_end(&self.nodes[parent as usize].state);
+        if !self.looks_no_later_than(latest_end) || self.is_cut(parent) {
             return Turn::Nothing;
         }
         let Some((step, state)) = self.make(parent, step) else {
@@ -321,6 +340,11 @@ impl<'a> Search<'a> {
     }
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
+        let latest_end = self.latest_end(&state);
+        let is_in_time = latest_end.is_some_and(|latest| state.earliest_end() <= latest);
+        if !is_in_time || !self.looks_no_later_than(latest_end) {
+            return Turn::Nothing;
+        }
         let hash = state.discrete_hash();
         let outlook = (self.style.haste.is_none() && !state.network.is_empty())
             .then(|| Box::new(state.outlook()));
@@ -329,6 +353,8 @@ impl<'a> Search<'a> {
         }
         self.evaluated += 1;
         let Some(mut estimate) = self.relaxed.evaluate(&state) else {
+            // In haste, what the relaxed plan does without may be what a plan needs.
+            self.has_lost |= self.style.haste.is_some();
             return Turn::Nothing;
         };
         self.symmetry
@@ -400,13 +426,42 @@ impl<'a> Search<'a> {
             self.turns[0] -= BOOST;
         }
         self.memory += 24 * (estimate.preferred.len() + estimate.applicable.len());
+        let rank = self.rank(number, estimate.steps);
         for &step in &estimate.preferred {
-            self.preferred.push(estimate.steps, number, step);
+            self.preferred.push(rank, number, step);
         }
         for &step in &estimate.applicable {
             self.generated += 1;
-            self.all.push(estimate.steps, number, step);
+            self.all.push(rank, number, step);
         }
+    }
+
+    /// When the successors of a state have their turn; lower ranks are earlier.
+    fn rank(&self, number: u32, estimate: u32) -> i64 {
+        let estimate = i64::from(estimate);
+        let (Aim::CheapWhole(factor), Some(guide)) = (self.style.aim, &self.guide) else {
+            return estimate;
+        };
+        guide.spent(self.compiled, &self.nodes[number as usize].state) + factor * estimate
+    }
+
+    /// The latest time at which a plan may end that begins like this; `None` if there is none.
+    fn latest_end(&self, state: &State) -> Option<Ticks> {
+        let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
+            return Some(self.horizon);
+        };
+        let latest = limit.latest_end(metric, self.compiled.scale, state)?;
+        Some(latest.min(self.horizon))
+    }
+
+    /// Sets the horizon for what follows a state. Whether anything can follow it.
+    fn looks_no_later_than(&mut self, latest_end: Option<Ticks>) -> bool {
+        let Some(horizon) = latest_end else {
+            return false;
+        };
+        self.stepper.horizon = horizon;
+        self.relaxed.horizon = horizon;
+        true
     }
 
     /// Whether a state that is at least as good has been looked at.
@@ -420,6 +475,7 @@ impl<'a> Search<'a> {
             let other = &node.state;
             if other.is_discretely(state) {
                 let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
+                is_no_later &= self.guide.is_none() || other.cost <= state.cost;
                 if self.style.haste.is_some() {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {

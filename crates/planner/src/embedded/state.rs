@@ -23,6 +23,8 @@ pub(crate) struct State {
     /// A bit for each fact.
     pub(crate) facts: Vec<u64>,
     pub(crate) values: Vec<Option<Rational>>,
+    /// What the metric sums up: see [`Metric`](super::compile::Metric).
+    pub(crate) cost: Rational,
     /// The latest settled time at which each kind of thing happened.
     pub(crate) stamps: Vec<Ticks>,
     /// What has started and not ended, by action.

@@ -8,12 +8,13 @@
 //! still matter.
 
 use elbowroom_model::problem::{Comparison, UpdateOperator};
-use elbowroom_num::simplex::{Simplex, VariableId};
+use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 
-use super::compile::{Compiled, Update};
+use super::compile::{Compiled, Metric, Update};
 use super::formula::{Formula, Linear, Numeric};
 use super::network::{Network, NodeId};
+use super::search::Limit;
 use super::state::State;
 use super::time::{NEVER, Scale};
 
@@ -282,27 +283,54 @@ fn set_course(state: &mut State, fluent: u32, course: Course) {
     }
 }
 
-/// Whether there are times that meet all demands and the network.
-pub(crate) fn is_possible(state: &State, scale: Scale) -> bool {
+/// Whether there are times that meet all demands and the network, and leave what has been spent
+/// within the limit.
+pub(crate) fn is_possible(state: &State, scale: Scale, limit: Option<(&Metric, &Limit)>) -> bool {
     let Some(symbolic) = &state.symbolic else {
         return true;
     };
-    if !symbolic.has_demands() {
+    let limit = limit.filter(|(metric, _)| metric.only_grows);
+    let is_limited = limit.is_some() && !symbolic.courses.is_empty();
+    if !symbolic.has_demands() && !is_limited {
         return true;
     }
-    let (mut program, _, _) = program(&state.network, &symbolic.demands, scale, &[]);
+    let (mut program, times, end) = program(&state.network, &symbolic.demands, scale, &[]);
+    if is_limited
+        && let Some((metric, limit)) = limit
+        && let Some((row, constant)) = objective(state, metric, &times, end)
+    {
+        let left = &limit.value - &constant;
+        let row = program.define(&row);
+        let bound = if limit.may_equal {
+            Delta::from(left)
+        } else {
+            Delta::just_below(left)
+        };
+        program.assert_upper(row, bound, 0);
+    }
     program.check().is_ok()
 }
 
-/// Times that meet all demands and the network, the last one as early as possible; what `exact`
-/// says of distances from one node to another replaces the network's rounded numbers.
+/// Times that meet all demands and the network; what `exact` says of distances from one node to
+/// another replaces the network's rounded numbers. The metric is as low as it can be, and then the
+/// last one is as early as possible.
 pub(crate) fn solve(
     state: &State,
     scale: Scale,
     exact: &[(NodeId, NodeId, Rational)],
+    metric: Option<&Metric>,
 ) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
     let (mut program, times, end) = program(&state.network, &symbolic.demands, scale, exact);
+    let objective = metric.and_then(|metric| objective(state, metric, &times, end));
+    if let Some((row, _)) = objective {
+        let least = program.minimize(&row).ok()?;
+        // Where it has no minimum, as far as these happenings go, the makespan alone decides.
+        if let Optimum::Value(least) = least {
+            let row = program.define(&row);
+            program.assert_upper(row, least, 0);
+        }
+    }
     program.minimize(&[(end, Rational::ONE)]).ok()?;
     let model = program.model();
     let times: Vec<Rational> = times
@@ -313,6 +341,41 @@ pub(crate) fn solve(
         comparison.holds(&form.at(&times), &Rational::ZERO)
     };
     symbolic.demands.iter().all(is_met).then_some(times)
+}
+
+/// The metric, as far as it has been spent: a row of the program, and a constant. `None` if times
+/// have no bearing on it, or it is not linear in them.
+fn objective(
+    state: &State,
+    metric: &Metric,
+    times: &[VariableId],
+    end: VariableId,
+) -> Option<(Vec<(VariableId, Rational)>, Rational)> {
+    let symbolic = state.symbolic.as_ref()?;
+    let Numeric::Linear(values) = &metric.values else {
+        return None;
+    };
+    let mut sum = Form::constant(&values.constant + &state.cost);
+    for (fluent, weight) in &values.terms {
+        if let Some(value) = &state.values[*fluent as usize] {
+            sum.constant += weight * value;
+        } else if let Some(course) = symbolic.course(*fluent) {
+            if !course.rate.is_zero() {
+                return None;
+            }
+            sum = sum.plus(weight, &course.base);
+        }
+    }
+    let mut row: Vec<(VariableId, Rational)> = sum
+        .terms
+        .into_iter()
+        .map(|(node, coefficient)| (times[usize::from(node)], coefficient))
+        .collect();
+    // The end is not before the last happening, but need not be at it.
+    if metric.time.is_positive() {
+        row.push((end, metric.time.clone()));
+    }
+    (!row.is_empty()).then_some((row, sum.constant))
 }
 
 /// The linear program, the variables of its nodes, and one that is not before any of them.

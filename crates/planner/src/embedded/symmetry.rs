@@ -218,8 +218,11 @@ impl<'a> Finder<'a> {
                     .iter()
                     .all(|(fluent, _)| images.fluents[*fluent as usize] == *fluent)
         });
+        let metric = compiled.metric.as_ref();
+        let is_measured_alike =
+            metric.is_none_or(|metric| images.numeric_is(&metric.values, &metric.values));
         let has_rules = !self.task.rules().is_empty();
-        (is_kept && are_kept && !has_rules).then_some(())
+        (is_kept && are_kept && is_measured_alike && !has_rules).then_some(())
     }
 }
 
@@ -333,6 +336,10 @@ impl Images {
             && snap.after.len() == other.after.len()
             && snap.marks.len() == other.marks.len()
             && snap.updates.len() == other.updates.len()
+            && match (&snap.cost, &other.cost) {
+                (Some(a), Some(b)) => self.numeric_is(a, b),
+                (a, b) => a.is_none() && b.is_none(),
+            }
             && snap.updates.iter().all(|a| {
                 other.updates.iter().any(|b| {
                     self.fluents[a.fluent as usize] == b.fluent

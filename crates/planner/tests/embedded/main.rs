@@ -9,6 +9,8 @@
 
 mod cancellation;
 mod features;
+mod metric;
+mod resources;
 mod situations;
 mod twin;
 mod world;

@@ -8,7 +8,7 @@ use elbowroom_model::ground::Action;
 use elbowroom_model::validate::{self, Settings as Strictness, Verdict};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
-use elbowroom_planner::{Answer, Settings, plan};
+use elbowroom_planner::{Answer, Settings, Stopped, plan};
 use proptest::prelude::*;
 
 use crate::world::{describe, task};
@@ -79,6 +79,18 @@ fn drafts() -> impl Strategy<Value = Draft> {
         })
 }
 
+/// Drafts with an end: the store is never refilled. Several happenings of one time that touch it,
+/// which are beyond the planner, do not matter to anyone.
+fn thrifty_drafts() -> impl Strategy<Value = Draft> {
+    drafts().prop_map(|mut draft| {
+        for action in &mut draft.actions {
+            action.minds = false;
+            action.gain = action.gain.min(0);
+        }
+        draft
+    })
+}
+
 fn written(literals: &[(u8, bool)], when: &str) -> String {
     let mut text = String::new();
     // A fact both added and deleted at once is not what is tested here.
@@ -102,12 +114,30 @@ fn written(literals: &[(u8, bool)], when: &str) -> String {
     text
 }
 
+/// What an action costs: at its start, at its end, and for each unit of its duration.
+type Price = (u8, u8, u8);
+
+/// What is to be minimized, or not.
+const METRICS: &[&str] = &[
+    "minimize (cost)",
+    "minimize (+ (cost) (total-time))",
+    "minimize (+ (* 3 (cost)) (* 0.5 (total-time)))",
+    "minimize (- (cost) (store))",
+    "minimize (total-time)",
+];
+
 impl Draft {
     fn task(&self) -> Task {
+        self.task_with(&[], "")
+    }
+
+    /// The task in which actions cost something.
+    fn task_with(&self, prices: &[Price], metric: &str) -> Task {
         let mut domain = "(:requirements :durative-actions :numeric-fluents :adl
-            :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3)) (:functions (store))"
+            :timed-initial-literals) (:predicates (f0) (f1) (f2) (f3)) (:functions (store) (cost))"
             .to_owned();
         for (number, action) in self.actions.iter().enumerate() {
+            let (at_start, at_end, rate) = prices.get(number).copied().unwrap_or_default();
             let needs = action.at_start.iter().copied().collect::<Vec<_>>();
             if action.duration == 0 {
                 let mut needs = written(&needs, "");
@@ -116,6 +146,9 @@ impl Draft {
                     write!(needs, " (>= (store) {})", action.cost).expect("strings take all");
                     write!(effects, " (decrease (store) {})", action.cost)
                         .expect("strings take all");
+                }
+                if at_start > 0 {
+                    write!(effects, " (increase (cost) {at_start})").expect("strings take all");
                 }
                 write!(
                     domain,
@@ -144,6 +177,17 @@ impl Draft {
                 write!(effects, " (at start (decrease (store) {}))", action.cost)
                     .expect("strings take all");
             }
+            if at_start > 0 {
+                write!(effects, " (at start (increase (cost) {at_start}))")
+                    .expect("strings take all");
+            }
+            if at_end + rate > 0 {
+                write!(
+                    effects,
+                    " (at end (increase (cost) (+ {at_end} (* {rate} ?duration))))"
+                )
+                .expect("strings take all");
+            }
             write!(
                 domain,
                 "(:durative-action a{number} :parameters () :duration (= ?duration {})
@@ -159,14 +203,40 @@ impl Draft {
                 .collect::<Vec<_>>()
                 .concat()
         };
-        let mut initial = facts(self.initial) + "(= (store) 2)";
+        let mut initial = facts(self.initial) + "(= (store) 2) (= (cost) 0)";
         for (time, fact, truth) in &self.timed {
             let literal = written(&[(*fact, *truth)], "");
             write!(initial, " (at {time}{literal})").expect("as written above");
         }
         let goal = facts(self.goal);
-        task(&domain, &format!("(:init {initial}) (:goal (and {goal}))"))
+        let metric = match metric {
+            "" => String::new(),
+            metric => format!("(:metric {metric})"),
+        };
+        task(
+            &domain,
+            &format!("(:init {initial}) (:goal (and {goal})) {metric}"),
+        )
     }
+}
+
+impl Draft {
+    fn ground(&self, task: &mut Task) -> Vec<Action> {
+        let numbers = 0..self.actions.len();
+        let ground = |number: usize| {
+            let schema = task.problem().schema(&format!("a{number}"));
+            let schema = schema.expect("as written above");
+            task.instantiate(schema, &[]).expect("as written above")
+        };
+        numbers.map(ground).collect()
+    }
+}
+
+fn happenings(plan: &TimeTriggeredPlan) -> usize {
+    let steps = plan.steps.iter();
+    steps
+        .map(|step| 1 + usize::from(step.duration.is_some()))
+        .sum()
 }
 
 /// One happening of a sequence: an action's start or instant, or the end of an earlier one.
@@ -187,36 +257,56 @@ struct Twin<'a> {
 impl Twin<'_> {
     /// Whether some continuation of the sequence is a plan; `None` if the budget does not suffice.
     fn finds(&mut self) -> Option<bool> {
+        let mut finds = false;
+        let _ = self.walk(&mut |_| {
+            finds = true;
+            ControlFlow::Break(())
+        })?;
+        Some(finds)
+    }
+
+    /// The least metric of all continuations, if some are plans, and the least makespan with that;
+    /// `None` if the budget does not suffice.
+    fn least_metric(&mut self) -> Option<Option<(Rational, Rational)>> {
+        let mut least: Option<(Rational, Rational)> = None;
+        let task = self.task;
+        let _ = self.walk(&mut |report| {
+            let metric = report.metric(task).expect("the problems have one");
+            let worth = (metric, report.makespan.clone());
+            if least.as_ref().is_none_or(|least| worth < *least) {
+                least = Some(worth);
+            }
+            ControlFlow::Continue(())
+        })?;
+        Some(least)
+    }
+
+    /// Visits all continuations that are plans; `None` if the budget does not suffice.
+    fn walk(
+        &mut self,
+        visit: &mut dyn FnMut(&validate::Report) -> ControlFlow<()>,
+    ) -> Option<ControlFlow<()>> {
         self.budget = self.budget.checked_sub(1)?;
-        if self.open().is_empty() && self.has_schedule() {
-            return Some(true);
-        }
-        if self.sequence.len() == MOST {
-            return Some(false);
+        let open = self.open();
+        if open.is_empty() && self.visit_schedules(visit).is_break() {
+            return Some(ControlFlow::Break(()));
         }
         let room = MOST - self.sequence.len();
-        let open = self.open();
-        for place in &open {
-            self.sequence.push(Choice::End(*place));
-            let found = self.finds();
-            self.sequence.pop();
-            if found != Some(false) {
-                return found;
-            }
-        }
-        for number in 0..self.actions.len() {
+        let ends = open.iter().map(|&place| Choice::End(place));
+        let starts = (0..self.actions.len()).filter(|&number| {
             let takes = 1 + usize::from(self.actions[number].durative().is_some());
-            if open.len() + takes > room {
-                continue;
-            }
-            self.sequence.push(Choice::Start(number));
-            let found = self.finds();
+            open.len() + takes <= room
+        });
+        let choices: Vec<Choice> = ends.chain(starts.map(Choice::Start)).collect();
+        for choice in choices {
+            self.sequence.push(choice);
+            let flow = self.walk(visit);
             self.sequence.pop();
-            if found != Some(false) {
-                return found;
+            if flow? == ControlFlow::Break(()) {
+                return flow;
             }
         }
-        Some(false)
+        Some(ControlFlow::Continue(()))
     }
 
     /// The places of the starts that have not ended.
@@ -234,18 +324,21 @@ impl Twin<'_> {
         open
     }
 
-    /// Whether some interleaving with the timed initials gives a valid plan.
-    fn has_schedule(&self) -> bool {
+    /// Visits the interleavings with the timed initials that give a valid plan.
+    fn visit_schedules(
+        &self,
+        visit: &mut dyn FnMut(&validate::Report) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let timed = self.task.timed().len();
         let count = self.sequence.len();
         // For each timed initial, how many happenings come before it; not descending.
         let mut places = vec![0; timed];
         loop {
-            if self.is_valid(&places) {
-                return true;
+            if let Some(report) = self.report(&places) {
+                visit(&report)?;
             }
             let Some(next) = (0..timed).rev().find(|&t| places[t] < count) else {
-                return false;
+                return ControlFlow::Continue(());
             };
             let place = places[next] + 1;
             places[next..].fill(place);
@@ -253,7 +346,7 @@ impl Twin<'_> {
     }
 
     /// Schedules the happenings as early as their order allows, and asks the judge.
-    fn is_valid(&self, places: &[usize]) -> bool {
+    fn report(&self, places: &[usize]) -> Option<validate::Report> {
         let epsilon = Rational::new(1, 1000);
         let prints: Vec<Footprint> = self
             .sequence
@@ -311,7 +404,7 @@ impl Twin<'_> {
                 break;
             }
             if round > count || times[count].is_positive() {
-                return false;
+                return None;
             }
         }
         let steps = self.sequence.iter().enumerate();
@@ -328,7 +421,10 @@ impl Twin<'_> {
         let candidate = TimeTriggeredPlan {
             steps: steps.collect(),
         };
-        validate::validate(self.task, &candidate, &Strictness::default()).is_valid()
+        match validate::validate(self.task, &candidate, &Strictness::default()) {
+            Verdict::Valid(report) => Some(report),
+            _ => None,
+        }
     }
 
     fn action_at(&self, place: usize) -> &Action {
@@ -360,14 +456,7 @@ proptest! {
             turns += 1;
             if turns > 200 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        let names: Vec<_> = (0..draft.actions.len()).map(|n| format!("a{n}")).collect();
-        let actions: Vec<Action> = names
-            .iter()
-            .map(|name| {
-                let schema = task.problem().schema(name).expect("as written above");
-                task.instantiate(schema, &[]).expect("as written above")
-            })
-            .collect();
+        let actions = draft.ground(&mut task);
         let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 1_200 };
         let found = twin.finds();
         match &answer {
@@ -375,13 +464,7 @@ proptest! {
                 let verdict =
                     validate_from(&task, &situation, &ours.plan, &Strictness::default());
                 prop_assert!(matches!(verdict, Verdict::Valid(_)));
-                let happenings: usize = ours
-                    .plan
-                    .steps
-                    .iter()
-                    .map(|step| 1 + usize::from(step.duration.is_some()))
-                    .sum();
-                if happenings <= MOST {
+                if happenings(&ours.plan) <= MOST {
                     prop_assert_ne!(found, Some(false), "{}", describe(&answer));
                 }
             }
@@ -392,6 +475,38 @@ proptest! {
                 // Ends of one time that run the store out together are beyond the planner.
                 let is_plain = draft.actions.iter().all(|action| !action.minds);
                 prop_assert!(!is_plain || found != Some(true), "{}", describe(&answer));
+            }
+        }
+    }
+
+    #[test]
+    fn a_search_that_ends_has_found_the_best_metric(
+        draft in thrifty_drafts(),
+        prices in prop::collection::vec((1..5_u8, 0..5_u8, 0..3_u8), 4),
+        metric in 0..METRICS.len(),
+    ) {
+        let mut task = draft.task_with(&prices, METRICS[metric]);
+        let situation = Situation::initial(&task);
+        let mut turns = 0;
+        let answer = plan(&mut task, &situation, &Settings::default(), &mut |_| {
+            turns += 1;
+            if turns > 100 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        let Answer::Plan { found, stopped, .. } = &answer else { return Ok(()) };
+        let verdict = validate_from(&task, &situation, &found.plan, &Strictness::default());
+        let Verdict::Valid(report) = verdict else { panic!("an invalid plan") };
+        prop_assert_eq!(&report.metric(&task), &found.metric);
+        if *stopped != Stopped::Exhausted {
+            return Ok(());
+        }
+        let actions = draft.ground(&mut task);
+        let mut twin = Twin { task: &task, actions, sequence: Vec::new(), budget: 1_500 };
+        if let Some(Some(least)) = twin.least_metric() {
+            let metric = found.metric.clone().expect("there is a metric");
+            let ours = (metric, found.makespan.clone());
+            prop_assert!(ours <= least, "{least:?}, not {ours:?}:\n{}", describe(&answer));
+            if happenings(&found.plan) <= MOST {
+                prop_assert_eq!(ours, least, "{}", describe(&answer));
             }
         }
     }

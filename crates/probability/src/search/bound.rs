@@ -18,7 +18,7 @@ use elbowroom_plan::InstanceId;
 
 use super::assignment;
 use super::nominal::{Nominal, Truth};
-use super::timing::Separations;
+use super::separations::Separations;
 use crate::likelihoods::Flip;
 use crate::model::{Event, Model, Requirement, Semantics};
 use crate::network::PrunedNetwork;

@@ -15,7 +15,8 @@ use elbowroom_plan::{InstanceId, Node};
 use indexmap::IndexMap;
 
 use super::nominal::{Nominal, Truth};
-use super::timing::{Room, Separations};
+use super::room::Room;
+use super::separations::Separations;
 use crate::model::{Model, Requirement, visit_facts};
 use crate::network::{Number, PrunedNetwork, Snapshot};
 
@@ -170,9 +171,10 @@ impl Entry {
             (Some(own), Some(its)) => own.contains(its),
             _ => false,
         };
-        let ratio = ratio(&self.facts, &other.facts, need);
         // A ratio of products of the same factors in another order may be off in the last digits.
-        self.probability * ratio >= other.probability * (1.0 - 1e-12) && has_room
+        has_room
+            && self.probability * ratio(&self.facts, &other.facts, need)
+                >= other.probability * (1.0 - 1e-12)
     }
 }
 

@@ -7,7 +7,7 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use super::bound::{Bound, Outlook};
 use super::memo::Memo;
 use super::nominal::Nominal;
-use super::timing::Timing;
+use super::room::Rooms;
 use super::{Candidates, OrderSearch, Progress};
 use crate::circumstances::Circumstances;
 use crate::model::Model;
@@ -21,8 +21,10 @@ pub(super) struct Run<'s, 'w> {
     has_deadlines: bool,
     network: PrunedNetwork<'s>,
     nominal: Nominal,
-    timing: Timing<'s>,
+    rooms: Rooms<'s>,
     is_used: Vec<bool>,
+    /// For each instance, the one of its kind that is to be used before it.
+    before: Vec<Option<InstanceId>>,
     is_placed: Vec<bool>,
     /// The next of the timed initials that matter.
     next_timed: usize,
@@ -42,7 +44,7 @@ impl<'s, 'w> Run<'s, 'w> {
         search: &'s OrderSearch,
         circumstances: &Circumstances,
         nominal: Nominal,
-        timing: Timing<'s>,
+        rooms: Rooms<'s>,
         watch: &'w mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Self, TooCoupled> {
         let model = &*search.model;
@@ -59,8 +61,9 @@ impl<'s, 'w> Run<'s, 'w> {
             has_deadlines: search.separations.has_deadlines(now),
             network: PrunedNetwork::new(model, circumstances)?,
             nominal,
-            timing,
+            rooms,
             is_used,
+            before: search.symmetry.order(model, circumstances),
             is_placed: vec![false; model.plan().nodes.len()],
             next_timed: timed.take_while(|(_, time)| time <= now).count(),
             memo: Memo::new(model, &search.separations),
@@ -97,7 +100,7 @@ impl<'s, 'w> Run<'s, 'w> {
             if self.push(node)?.is_none() {
                 break;
             }
-            if !self.timing.push(self.model, node, self.timed_before(node)) {
+            if !self.rooms.push(self.model, node, self.timed_before(node)) {
                 self.pop(node);
                 break;
             }
@@ -105,7 +108,7 @@ impl<'s, 'w> Run<'s, 'w> {
         }
         self.consider()?;
         for node in done.into_iter().rev() {
-            self.timing.pop();
+            self.rooms.pop();
             self.pop(node);
         }
         Ok(())
@@ -140,13 +143,13 @@ impl<'s, 'w> Run<'s, 'w> {
             if self.push(node)?.is_none() {
                 continue;
             }
-            let deeper = if self.timing.push(self.model, node, self.timed_before(node)) {
+            let deeper = if self.rooms.push(self.model, node, self.timed_before(node)) {
                 let deeper = if self.is_dominated() {
                     ControlFlow::Continue(())
                 } else {
                     self.explore()?
                 };
-                self.timing.pop();
+                self.rooms.pop();
                 deeper
             } else {
                 ControlFlow::Continue(())
@@ -214,6 +217,10 @@ impl<'s, 'w> Run<'s, 'w> {
         for (id, _) in self.model.plan().instances() {
             let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             let node = if !self.is_used[id.index()] {
+                let before = self.before[id.index()];
+                if before.is_some_and(|before| !self.is_used[before.index()]) {
+                    continue;
+                }
                 start
             } else if start != end && self.network.running().contains(&id) {
                 end
@@ -233,7 +240,7 @@ impl<'s, 'w> Run<'s, 'w> {
         next
     }
 
-    /// Adds a happening to everything but the timing; the bound of all that can follow, unless
+    /// Adds a happening to everything but the rooms; the bound of all that can follow, unless
     /// the happening is impossible or the bound is not good enough.
     fn push(&mut self, node: NodeId) -> Result<Option<Bound>, TooCoupled> {
         let model = self.model;
@@ -304,7 +311,7 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Whether a sequence that has done the same stands at least as well.
     fn is_dominated(&mut self) -> bool {
         let has_timed = self.next_timed < self.search.separations.timed.len();
-        let room = self.timing.room(self.has_deadlines && has_timed);
+        let room = self.rooms.room(self.has_deadlines && has_timed);
         self.memo.is_dominated(
             self.model,
             &self.nominal,

@@ -4,7 +4,7 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
 use super::super::compile::{Change, Snap, Update};
-use super::super::formula::set;
+use super::super::formula::{Numeric, set};
 use super::super::state::State;
 use super::super::symbolic::{self, Moment};
 use super::Stepper;
@@ -21,6 +21,7 @@ impl Stepper<'_> {
     ) -> Option<()> {
         let (mut adds, mut deletes) = (Vec::new(), Vec::new());
         let mut updates: Vec<&Update> = snap.updates.iter().collect();
+        let mut costs: Vec<&Numeric> = snap.cost.iter().collect();
         for effect in &snap.conditional {
             let was_chosen = effect
                 .at_start
@@ -30,7 +31,15 @@ impl Stepper<'_> {
                     Change::Add(fact) => adds.push(*fact),
                     Change::Delete(fact) => deletes.push(*fact),
                     Change::Update(update) => updates.push(update),
+                    Change::Cost(cost) => costs.push(cost),
                 }
+            }
+        }
+        for cost in costs {
+            // Of something that was under way before, the duration may be open. Then its cost is
+            // not counted, but the judge counts it.
+            if let Some(cost) = cost.value(&state.values, duration) {
+                state.cost += cost;
             }
         }
         if state.symbolic.is_some() {

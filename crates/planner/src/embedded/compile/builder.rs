@@ -11,6 +11,7 @@ use elbowroom_num::Rational;
 use super::directions::Shifts;
 use super::eagerness::excludes_itself;
 use super::interference::{Links, Wishes};
+use super::metric::Draft;
 use super::reads::{read_action, visit_changes};
 use super::shortened::full_actions;
 use super::symbols::Symbols;
@@ -33,21 +34,37 @@ pub(crate) enum Failure {
     Stopped,
 }
 
-/// Compiles `grounding`, which is what `task` can reach from `situation`, as long as `goes_on`
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted<'a> {
+    /// Where plans begin.
+    pub(crate) situation: &'a Situation,
+    pub(crate) epsilon: &'a Rational,
+    /// Whether the problem's metric matters.
+    pub(crate) metric: bool,
+}
+
+/// Compiles `grounding`, which is what `task` can reach from the situation, as long as `goes_on`
 /// says so.
 pub(crate) fn compile(
     task: &mut Task,
     grounding: &Grounding,
-    situation: &Situation,
-    epsilon: &Rational,
+    wanted: Wanted<'_>,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Result<Compiled, Failure> {
+    let Wanted {
+        situation, epsilon, ..
+    } = wanted;
     let mut full = full_actions(task, grounding);
     if !goes_on() {
         return Err(Failure::Stopped);
     }
     let mut builder = Builder::new(task);
-    builder.links = Links::new(has_fixed_numbers(grounding, situation));
+    let has_fixed_numbers = has_fixed_numbers(grounding, situation);
+    builder.links = Links::new(has_fixed_numbers);
+    if wanted.metric {
+        builder.metric = Draft::of(builder.task, grounding, situation, has_fixed_numbers);
+    }
     builder.read_conditions(grounding, situation);
     for running in &situation.running {
         check(&running.action).map_err(Failure::Unsupported)?;
@@ -81,6 +98,7 @@ struct Builder<'a> {
     wishes: Vec<Wishes>,
     actions: Vec<Action>,
     over_all: Vec<Condition>,
+    metric: Option<Draft>,
 }
 
 /// The grid for all times and constant durations.
@@ -119,6 +137,7 @@ impl<'a> Builder<'a> {
             wishes: Vec::new(),
             actions: Vec::new(),
             over_all: Vec::new(),
+            metric: None,
         }
     }
 
@@ -138,6 +157,9 @@ impl<'a> Builder<'a> {
         // A value that another fluent's change reads matters if that fluent does.
         loop {
             let before = symbols.fluents.len();
+            if let Some(metric) = &mut self.metric {
+                metric.read(symbols);
+            }
             for action in running.clone().chain(&grounding.actions) {
                 visit_changes(action, &mut |fluent, value| {
                     if symbols.known_fluent(fluent).is_some() {
@@ -265,28 +287,22 @@ impl<'a> Builder<'a> {
             condition: self.symbols.formula(&body.condition),
             ..Snap::default()
         };
+        let mut costs = Vec::new();
         for effect in &body.effects {
-            let change = match &effect.change {
-                ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
-                ModelChange::Delete(fact) => self.symbols.known_fact(*fact).map(Change::Delete),
-                ModelChange::Update {
-                    operator,
-                    fluent,
-                    value,
-                } => self.symbols.known_fluent(*fluent).map(|fluent| {
-                    Change::Update(Update {
-                        fluent,
-                        operator: *operator,
-                        value: self.symbols.numeric(value),
-                    })
-                }),
+            let is_unconditional = effect.guard.is_trivial();
+            if is_unconditional && let Some(cost) = self.cost(&effect.change) {
+                costs.push(cost);
+                continue;
+            }
+            let Some(change) = self.change(&effect.change) else {
+                continue;
             };
-            let Some(change) = change else { continue };
-            if effect.guard.is_trivial() {
+            if is_unconditional {
                 match change {
                     Change::Add(fact) => snap.adds.push(fact),
                     Change::Delete(fact) => snap.deletes.push(fact),
                     Change::Update(update) => snap.updates.push(update),
+                    Change::Cost(_) => {}
                 }
                 continue;
             }
@@ -301,11 +317,51 @@ impl<'a> Builder<'a> {
                 change,
             });
         }
+        if !costs.is_empty() {
+            let sum = ground::Expression::Add(costs);
+            snap.cost = Some(self.symbols.numeric(&sum));
+        }
         // An addition wins over a deletion by the same happening.
         let adds = std::mem::take(&mut snap.adds);
         snap.deletes.retain(|fact| !adds.contains(fact));
         snap.adds = adds;
         snap
+    }
+
+    /// What a change does to the search's numbers, if it does anything.
+    fn change(&mut self, change: &ModelChange) -> Option<Change> {
+        match change {
+            ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
+            ModelChange::Delete(fact) => self.symbols.known_fact(*fact).map(Change::Delete),
+            ModelChange::Update {
+                operator,
+                fluent,
+                value,
+            } => match self.symbols.known_fluent(*fluent) {
+                Some(fluent) => Some(Change::Update(Update {
+                    fluent,
+                    operator: *operator,
+                    value: self.symbols.numeric(value),
+                })),
+                None => {
+                    let cost = self.cost(change)?;
+                    Some(Change::Cost(self.symbols.numeric(&cost)))
+                }
+            },
+        }
+    }
+
+    /// What a change adds to what the metric sums up.
+    fn cost(&self, change: &ModelChange) -> Option<ground::Expression> {
+        let ModelChange::Update {
+            operator,
+            fluent,
+            value,
+        } = change
+        else {
+            return None;
+        };
+        self.metric.as_ref()?.cost(*fluent, *operator, value)
     }
 
     fn durative(

@@ -84,7 +84,12 @@ impl Ends {
         }
         let end = &snaps[action.end as usize];
         let over_all = &action.over_all;
+        let mut reads_numbers = false;
+        if let Some(cost) = &end.cost {
+            cost.visit_fluents(&mut |_| reads_numbers = true);
+        }
         end.condition.is_trivial()
+            && !reads_numbers
             && end.deletes.is_empty()
             && end.updates.is_empty()
             && end.conditional.is_empty()

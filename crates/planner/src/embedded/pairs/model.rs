@@ -257,7 +257,7 @@ impl Model {
             .filter_map(|effect| match effect.change {
                 Change::Add(fact) => Some(Literal::new(fact, true)),
                 Change::Delete(fact) => Some(Literal::new(fact, false)),
-                Change::Update(_) => None,
+                Change::Update(_) | Change::Cost(_) => None,
             });
         self.known(adds.chain(deletes).chain(conditional))
     }

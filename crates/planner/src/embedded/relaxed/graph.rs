@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
 use super::super::formula::Formula;
+use super::super::guide::Guide;
 use super::super::time::{NEVER, Ticks};
 use super::numbers;
 pub(crate) use timetables::Window;
@@ -112,6 +113,18 @@ impl Graph {
         graph.goal = graph.propositions(&compiled.goal);
         graph.index();
         graph
+    }
+
+    /// Lets each step count for what it costs.
+    pub(crate) fn weigh(&mut self, guide: &Guide) {
+        for operator in &mut self.operators {
+            operator.cost = match operator.kind {
+                Kind::Start(action) => guide.start(action),
+                Kind::End(action) => guide.end(action),
+                Kind::Whole(action) => guide.start(action) + guide.end(action),
+                Kind::Timed(_) | Kind::Axiom => operator.cost,
+            };
+        }
     }
 
     /// The proposition that a test is passed.
@@ -292,6 +305,7 @@ impl Graph {
                 Change::Add(fact) => (vec![(2 * fact, 0)], Vec::new()),
                 Change::Delete(fact) => (vec![(2 * fact + 1, 0)], Vec::new()),
                 Change::Update(update) => (Vec::new(), self.gains_of(compiled, &[update])),
+                Change::Cost(_) => continue,
             };
             let extra = self.add(draft.kind, 1, needs, &effects, gains);
             self.operators[extra as usize].is_step = false;

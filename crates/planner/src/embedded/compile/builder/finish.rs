@@ -10,6 +10,7 @@ use super::super::directions::Shifts;
 use super::super::eagerness::{eagerness, readers};
 use super::super::initial::initial;
 use super::super::interference::{Access, Stamps, TimedWishes, Wishes};
+use super::super::metric::only_grows;
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
 use super::super::{Compiled, NONE, Rule, Timed, eager, gaps};
@@ -149,6 +150,11 @@ impl Builder<'_> {
         let now = scale.floor(&situation.time);
         let epsilon = scale.ceil(&Rational::ZERO).0.max(self.epsilon);
         is_exact &= now.1;
+        let metric = self.metric.take();
+        let initial_cost = metric
+            .as_ref()
+            .map_or(Rational::ZERO, |metric| metric.initial_cost(situation));
+        let metric = metric.map(|metric| metric.finish(&mut self.symbols));
         let mut compiled = Compiled {
             scale,
             epsilon,
@@ -167,6 +173,7 @@ impl Builder<'_> {
             stamp_count: stamps.count(),
             timed,
             goal,
+            metric,
             goal_timed,
             strata,
             derived,
@@ -184,7 +191,12 @@ impl Builder<'_> {
         if compiled.is_symbolic {
             compiled.gap = Some("values that depend on when things happen");
         }
+        if let Some(mut metric) = compiled.metric.take() {
+            metric.only_grows = only_grows(&metric, &compiled);
+            compiled.metric = Some(metric);
+        }
         compiled.initial = initial(&mut compiled, situation);
+        compiled.initial.cost = initial_cost;
         compiled
     }
 }

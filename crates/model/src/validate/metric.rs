@@ -1,0 +1,31 @@
+//! What the problem's metric is worth at the end of a plan.
+
+use elbowroom_num::Rational;
+
+use super::Report;
+use crate::Task;
+use crate::problem::{Expression, ObjectId, Term};
+
+impl Report {
+    /// The value of the problem's `:metric`, as the problem writes it: with `maximize`, more is
+    /// better. `total-time` is the makespan.
+    ///
+    /// `None` if the problem has no metric, or one that counts violated preferences, or reads a
+    /// fluent that has no value when the plan is over.
+    pub fn metric(&self, task: &Task) -> Option<Rational> {
+        let expression = task.problem().metric.as_ref()?.expression.as_ref()?;
+        expression.evaluate(&mut |leaf| match leaf {
+            Expression::TotalTime => Some(self.makespan.clone()),
+            Expression::Fluent(fluent) => {
+                let objects = fluent.arguments.iter().map(|term| match term {
+                    Term::Object(object) => Some(*object),
+                    Term::Variable(_) => None,
+                });
+                let objects: Option<Vec<ObjectId>> = objects.collect();
+                let fluent = task.find_fluent(fluent.function, &objects?)?;
+                self.state.values.get(&fluent).cloned()
+            }
+            _ => None,
+        })
+    }
+}

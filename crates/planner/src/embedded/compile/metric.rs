@@ -1,0 +1,317 @@
+//! The problem's metric, in the form in which the search reads it.
+//!
+//! Most metrics are sums of `total-time` and of fluents that nothing else reads, such as
+//! `total-cost`. These fluents are no part of what a state *is*: two states that differ in them
+//! only allow the same plans, and the cheaper one is the better one. So they are added up in
+//! [`State::cost`] and left out of [`State::values`]. Fluents that are read elsewhere, or not only
+//! added to, stay among the values.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::ground::{self, Body, Change as ModelChange, Expression, FluentId};
+use elbowroom_model::problem::{ObjectId, Term, UpdateOperator};
+use elbowroom_model::reachability::Grounding;
+use elbowroom_model::{Situation, Task};
+use elbowroom_num::Rational;
+
+use super::symbols::Symbols;
+use super::{Change, Compiled, Update};
+use crate::embedded::formula::{Linear, Numeric};
+use crate::embedded::state::State;
+
+/// What a plan shall have little of. What is to be maximized is negated here.
+#[derive(Clone, Debug)]
+pub(crate) struct Metric {
+    /// The part that is read off [`State::values`].
+    pub(crate) values: Numeric,
+    /// The weight of `total-time`.
+    pub(crate) time: Rational,
+    /// Whether no step lowers it: then what a state has spent is a bound for all plans that begin
+    /// like this.
+    pub(crate) only_grows: bool,
+}
+
+impl Metric {
+    /// What has been spent in a state, without the time; `None` if that depends on times that are
+    /// not chosen yet.
+    pub(crate) fn spent(&self, state: &State) -> Option<Rational> {
+        Some(self.values.value(&state.values, None)? + &state.cost)
+    }
+
+    /// The weight of a fluent among the values; zero if that is not constant.
+    pub(crate) fn weight(&self, fluent: u32) -> Rational {
+        let Numeric::Linear(linear) = &self.values else {
+            return Rational::ZERO;
+        };
+        let place = linear.terms.binary_search_by_key(&fluent, |term| term.0);
+        place.map_or(Rational::ZERO, |place| linear.terms[place].1.clone())
+    }
+
+    /// How much an update adds to it, if that is the weighted amount itself.
+    pub(crate) fn amount_of(&self, update: &Update) -> Option<Linear> {
+        let weight = self.weight(update.fluent);
+        let Numeric::Linear(value) = &update.value else {
+            return None;
+        };
+        let mut amount = Linear::default();
+        match update.operator {
+            UpdateOperator::Increase => amount.add(&weight, value),
+            UpdateOperator::Decrease => amount.add(&-weight, value),
+            _ => return None,
+        }
+        Some(amount)
+    }
+}
+
+/// The metric while symbols are being numbered.
+#[derive(Debug)]
+pub(super) struct Draft {
+    /// Over the task's fluents, `total-time` in the place of `?duration`.
+    expression: Expression,
+    /// The fluents that are added up in [`State::cost`].
+    summed: BTreeMap<FluentId, Sum>,
+    /// Whether it is a weighted sum.
+    is_linear: bool,
+}
+
+/// A fluent that is added up.
+#[derive(Debug)]
+struct Sum {
+    weight: Rational,
+    /// What is added to it.
+    amounts: Vec<Expression>,
+}
+
+impl Draft {
+    /// The metric of a problem, if it has one that is more than the makespan and has a value
+    /// whatever happens.
+    pub(super) fn of(
+        task: &Task,
+        grounding: &Grounding,
+        situation: &Situation,
+        has_fixed_numbers: bool,
+    ) -> Option<Self> {
+        let metric = task.problem().metric.as_ref()?;
+        let values = &situation.state.values;
+        let mut is_defined = true;
+        let ground = metric.expression.as_ref()?.map_fluents(&mut |fluent| {
+            let objects = fluent.arguments.iter().map(|term| match term {
+                Term::Object(object) => Some(*object),
+                Term::Variable(_) => None,
+            });
+            let objects: Option<Vec<ObjectId>> = objects.collect();
+            let found = objects.and_then(|objects| task.find_fluent(fluent.function, &objects));
+            is_defined &= found.is_some_and(|found| values.contains_key(&found));
+            found.unwrap_or(FluentId(u32::MAX))
+        });
+        if !is_defined {
+            return None;
+        }
+        let changes = Changes::of(&ground, task, grounding, situation);
+        let mut expression = ground.map_leaves(&mut |leaf| match leaf {
+            Expression::TotalTime => Some(Expression::Duration),
+            Expression::Fluent(fluent) if !changes.writes(*fluent) => {
+                values.get(fluent).cloned().map(Expression::Constant)
+            }
+            _ => None,
+        });
+        if metric.maximize {
+            expression = Expression::Negate(Box::new(expression));
+        }
+        let linear = Linear::of(&expression);
+        if let Some(linear) = &linear
+            && linear.terms.is_empty()
+            && !linear.duration.is_negative()
+        {
+            return None;
+        }
+        let is_linear = linear.is_some();
+        let weights = linear.map_or_else(Vec::new, |linear| linear.terms);
+        let summed = weights.into_iter().filter_map(|(fluent, weight)| {
+            let fluent = FluentId(fluent);
+            let amounts = changes.additions_to(fluent, has_fixed_numbers)?.to_vec();
+            Some((fluent, Sum { weight, amounts }))
+        });
+        Some(Self {
+            summed: summed.collect(),
+            expression,
+            is_linear,
+        })
+    }
+
+    /// Numbers what the metric reads. To be called until nothing new is numbered, as other things
+    /// may turn out to read its fluents too.
+    pub(super) fn read(&mut self, symbols: &mut Symbols) {
+        let is_unknown = |fluent: FluentId| symbols.known_fluent(fluent).is_none();
+        self.summed.retain(|&fluent, _| is_unknown(fluent));
+        for amount in self.summed.values().flat_map(|sum| &sum.amounts) {
+            amount.visit_fluents(&mut |read| {
+                symbols.fluent(read);
+            });
+        }
+        let summed = &self.summed;
+        self.expression.visit_fluents(&mut |fluent| {
+            if !summed.contains_key(&fluent) {
+                symbols.fluent(fluent);
+            }
+        });
+    }
+
+    /// What a change of a fluent that is added up costs; `None` if the fluent is none of these.
+    pub(super) fn cost(
+        &self,
+        fluent: FluentId,
+        operator: UpdateOperator,
+        value: &Expression,
+    ) -> Option<Expression> {
+        let weight = &self.summed.get(&fluent)?.weight;
+        let factor = match operator {
+            UpdateOperator::Decrease => -weight,
+            _ => weight.clone(),
+        };
+        let parts = vec![Expression::Constant(factor), value.clone()];
+        Some(Expression::Multiply(parts))
+    }
+
+    /// What has been spent in the beginning on what is added up.
+    pub(super) fn initial_cost(&self, situation: &Situation) -> Rational {
+        let values = &situation.state.values;
+        let costs = self.summed.iter();
+        let costs = costs.filter_map(|(fluent, sum)| Some(&sum.weight * values.get(fluent)?));
+        costs.fold(Rational::ZERO, |sum, cost| sum + cost)
+    }
+
+    /// The finished metric. Whether it only grows is for [`only_grows`] to say.
+    pub(super) fn finish(&self, symbols: &mut Symbols) -> Metric {
+        if !self.is_linear {
+            // Whoever evaluates it does not know the total time.
+            let expression = self.expression.map_leaves(&mut |leaf| match leaf {
+                Expression::Duration => Some(Expression::TotalTime),
+                _ => None,
+            });
+            return Metric {
+                values: symbols.numeric(&expression),
+                time: Rational::ZERO,
+                only_grows: false,
+            };
+        }
+        let rest = self.expression.map_leaves(&mut |leaf| match leaf {
+            Expression::Fluent(fluent) if self.summed.contains_key(fluent) => {
+                Some(Expression::Constant(Rational::ZERO))
+            }
+            _ => None,
+        });
+        let mut values = symbols.numeric(&rest);
+        let mut time = Rational::ZERO;
+        if let Numeric::Linear(linear) = &mut values {
+            time = std::mem::take(&mut linear.duration);
+        }
+        Metric {
+            values,
+            time,
+            only_grows: false,
+        }
+    }
+}
+
+/// Whether no step lowers the metric.
+pub(super) fn only_grows(metric: &Metric, compiled: &Compiled) -> bool {
+    let Numeric::Linear(values) = &metric.values else {
+        return false;
+    };
+    let matters = |fluent: u32| values.terms.iter().any(|term| term.0 == fluent);
+    // What an expression over changing fluents comes to is not followed up.
+    let is_growth = |amount: &Linear| {
+        amount.terms.is_empty() && !amount.constant.is_negative() && !amount.duration.is_negative()
+    };
+    let is_dear = |cost: &Numeric| matches!(cost, Numeric::Linear(cost) if is_growth(cost));
+    let grows = |update: &Update| {
+        !matters(update.fluent) || metric.amount_of(update).is_some_and(|a| is_growth(&a))
+    };
+    !metric.time.is_negative()
+        && compiled.snaps.iter().all(|snap| {
+            snap.cost.iter().all(is_dear)
+                && snap.updates.iter().all(grows)
+                && snap.conditional.iter().all(|effect| match &effect.change {
+                    Change::Update(update) => grows(update),
+                    Change::Cost(cost) => is_dear(cost),
+                    Change::Add(_) | Change::Delete(_) => true,
+                })
+        })
+        && compiled
+            .actions
+            .iter()
+            .all(|action| action.flows.iter().all(|flow| !matters(flow.fluent)))
+        && compiled
+            .timed
+            .iter()
+            .all(|timed| timed.assigns.iter().all(|(fluent, _)| !matters(*fluent)))
+}
+
+/// All that changes the metric's fluents.
+#[derive(Debug, Default)]
+struct Changes {
+    /// For each fluent the amounts that are added or taken away.
+    additions: BTreeMap<FluentId, Vec<Expression>>,
+    /// The fluents that are changed otherwise.
+    others: BTreeSet<FluentId>,
+}
+
+impl Changes {
+    fn of(metric: &Expression, task: &Task, grounding: &Grounding, situation: &Situation) -> Self {
+        let mut changes = Self::default();
+        metric.visit_fluents(&mut |fluent| {
+            changes.additions.insert(fluent, Vec::new());
+        });
+        let running = situation.running.iter().map(|running| &running.action);
+        for action in running.chain(&grounding.actions) {
+            match &action.body {
+                Body::Instantaneous(body) => changes.note_all(&body.effects),
+                Body::Durative(body) => {
+                    changes.note_all(&body.start.effects);
+                    changes.note_all(&body.end.effects);
+                    let moving = body.continuous.iter().map(|effect| effect.fluent);
+                    changes.others.extend(moving);
+                }
+            }
+        }
+        for timed in task.timed() {
+            timed.changes.iter().for_each(|change| changes.note(change));
+        }
+        changes
+    }
+
+    fn note_all(&mut self, effects: &[ground::Effect]) {
+        effects.iter().for_each(|effect| self.note(&effect.change));
+    }
+
+    fn note(&mut self, change: &ModelChange) {
+        let ModelChange::Update {
+            operator,
+            fluent,
+            value,
+        } = change
+        else {
+            return;
+        };
+        if !operator.is_additive() {
+            self.others.insert(*fluent);
+        } else if let Some(amounts) = self.additions.get_mut(fluent) {
+            amounts.push(value.clone());
+        }
+    }
+
+    fn writes(&self, fluent: FluentId) -> bool {
+        let amounts = self.additions.get(&fluent);
+        self.others.contains(&fluent) || amounts.is_some_and(|amounts| !amounts.is_empty())
+    }
+
+    /// The amounts, if the fluent is only added to, by amounts that a state determines.
+    fn additions_to(&self, fluent: FluentId, has_fixed_numbers: bool) -> Option<&[Expression]> {
+        let is_constant = |amount: &Expression| Numeric::of(amount.clone()).as_constant().is_some();
+        let amounts = self.additions.get(&fluent)?;
+        let is_plain = !self.others.contains(&fluent)
+            && (has_fixed_numbers || amounts.iter().all(is_constant));
+        is_plain.then_some(amounts)
+    }
+}

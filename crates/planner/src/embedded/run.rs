@@ -1,0 +1,325 @@
+//! One run of the planner: which search gets how many turns, and what becomes of the plans.
+
+mod improve;
+
+use std::ops::ControlFlow;
+
+use elbowroom_model::validate::Report;
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+
+use super::answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
+use super::apply::Step;
+use super::compile::{self, Compiled, Eagerness};
+use super::extract;
+use super::reasons::{self, Names};
+use super::search::{Aim, Limit, PATIENCE, Search, Style, Turn};
+use super::symmetry::Symmetry;
+
+/// How much work lies between two reports, in operators of estimates: about ten milliseconds.
+const REPORT_WORK: u64 = 2_000_000;
+
+/// How many looked-up pairs lie between two reports at most: some milliseconds.
+const REPORT_LOOKUPS: u64 = 4_000_000;
+
+/// The most turns between two reports where each state is a linear program.
+const REPORT_SYMBOLIC_TURNS: u64 = 8;
+
+/// The most turns between two reports.
+const REPORT_TURNS: u64 = 256;
+
+/// How many states the hasty search may look at before the complete one gets its first turns.
+const HASTE: u64 = 20_000;
+
+/// The same where hasty searches that count resources, and others that do not, take turns.
+const HASTE_WITH_RESOURCES: u64 = 2_048;
+
+/// How many turns the hasty search gets for each one of the complete search.
+const COMPLETE_SHARE: u64 = 10;
+
+pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
+    Answer::NoneFound { stopped, counts }
+}
+
+/// One run.
+pub(super) struct Planner<'a> {
+    pub(super) task: &'a mut Task,
+    pub(super) situation: &'a Situation,
+    pub(super) settings: &'a Settings,
+    pub(super) observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    pub(super) compiled: &'a Compiled,
+    pub(super) symmetry: &'a Symmetry,
+    pub(super) names: &'a Names,
+    pub(super) progress: Progress,
+    pub(super) best: Option<Found>,
+    /// Whether something is used up and filled up.
+    pub(super) has_resources: bool,
+}
+
+impl Planner<'_> {
+    pub(super) fn run(mut self) -> Answer {
+        let compiled = self.compiled;
+        let mut searches: Vec<Search<'_>> = self
+            .styles()
+            .into_iter()
+            .map(|style| Search::new(compiled, self.symmetry, style))
+            .collect();
+        let mut is_over = vec![false; searches.len()];
+        let mut stopped = match self.work(&mut searches[0], PATIENCE) {
+            Outcome::Stop(stopped) => Some(stopped),
+            Outcome::Better | Outcome::BudgetSpent => None,
+            Outcome::Over => {
+                is_over[0] = searches[0].is_incomplete();
+                (!is_over[0]).then_some(Stopped::Exhausted)
+            }
+        };
+        if self.best.is_none()
+            && stopped.is_none_or(|stopped| stopped == Stopped::Exhausted)
+            && compiled.is_relaxation_exact()
+            && let Some(proof) = self.pairs_proof()
+        {
+            let counts = self.progress.counts;
+            return Answer::Unsolvable { proof, counts };
+        }
+        let mut budget = if self.has_resources {
+            HASTE_WITH_RESOURCES
+        } else {
+            HASTE
+        };
+        while stopped.is_none() && !self.is_first_plan_enough() {
+            for (search, is_over) in searches.iter_mut().zip(&mut is_over) {
+                if *is_over {
+                    continue;
+                }
+                match self.work(search, share(search, budget)) {
+                    Outcome::Stop(reason) => stopped = Some(reason),
+                    Outcome::Better | Outcome::BudgetSpent => {}
+                    Outcome::Over if search.is_incomplete() => *is_over = true,
+                    Outcome::Over => stopped = Some(Stopped::Exhausted),
+                }
+                if stopped.is_some() || self.is_first_plan_enough() {
+                    break;
+                }
+            }
+            if !is_over.contains(&false) {
+                stopped = stopped.or(Some(Stopped::Exhausted));
+            }
+            budget = budget.saturating_mul(2);
+        }
+        let is_proof = stopped == Some(Stopped::Exhausted)
+            && compiled.is_exact
+            && compiled.gap.is_none()
+            && searches.iter().any(|search| !search.is_incomplete());
+        let freed: usize = searches.iter().map(|search| search.counts().memory).sum();
+        drop(searches);
+        let stopped = stopped.unwrap_or_else(|| {
+            self.progress.counts.memory -= freed;
+            self.improve()
+        });
+        let counts = self.progress.counts;
+        match self.best {
+            Some(found) => Answer::Plan {
+                found,
+                stopped,
+                counts,
+            },
+            None if is_proof => Answer::Unsolvable {
+                proof: Proof::Exhausted {
+                    states: counts.evaluated,
+                },
+                counts,
+            },
+            None => none_found(stopped, counts),
+        }
+    }
+
+    /// Whether these searches have done their part: better plans are looked for by others.
+    fn is_first_plan_enough(&self) -> bool {
+        self.best.is_some() && self.compiled.metric.is_some()
+    }
+
+    /// The searches that take turns, the complete one last. Where something is used up and filled
+    /// up, estimates that count it find most plans sooner, but not all.
+    fn styles(&self) -> Vec<Style> {
+        let mut hastes = vec![Eagerness::Lends];
+        let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
+        if self.compiled.actions.iter().any(lends) {
+            hastes.push(Eagerness::Free);
+        }
+        let mut styles = Vec::new();
+        for haste in hastes {
+            if self.has_resources {
+                styles.push(Style::hasty(haste).filling_up());
+            }
+            styles.push(Style::hasty(haste));
+        }
+        styles.push(Style::COMPLETE);
+        styles
+    }
+
+    /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.
+    fn pairs_proof(&mut self) -> Option<Proof> {
+        let Self {
+            observe,
+            progress,
+            names,
+            compiled,
+            ..
+        } = self;
+        let mut goes_on = || observe(progress).is_continue();
+        reasons::pairs_proof(names, compiled, &mut goes_on)
+    }
+
+    /// Lets a search look at so many states.
+    fn work(&mut self, search: &mut Search<'_>, budget: u64) -> Outcome {
+        self.progress.phase = if self.best.is_some() {
+            Phase::Improving
+        } else if search.is_hasty() {
+            Phase::Hasty
+        } else {
+            Phase::Complete
+        };
+        self.demand_better(search);
+        let before = (self.progress.counts, search.counts());
+        let most_turns = if self.compiled.is_symbolic {
+            REPORT_SYMBOLIC_TURNS
+        } else {
+            REPORT_TURNS
+        };
+        let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
+        let mut reported = (0, search.lookups());
+        for turn in 1..=budget {
+            match search.turn() {
+                Turn::Over => {
+                    self.count(&before, search);
+                    return Outcome::Over;
+                }
+                Turn::Nothing => {}
+                Turn::Goal(steps) => {
+                    self.count(&before, search);
+                    if let Some(outcome) = self.consider(&steps, search) {
+                        return outcome;
+                    }
+                }
+            }
+            let lookups = search.lookups() - reported.1;
+            if turn - reported.0 >= report_every || lookups >= REPORT_LOOKUPS {
+                reported = (turn, search.lookups());
+                self.count(&before, search);
+                if (self.observe)(&self.progress).is_break() {
+                    return Outcome::Stop(Stopped::Interrupted);
+                }
+                if self.progress.counts.memory > self.settings.max_memory {
+                    return Outcome::Stop(Stopped::OutOfMemory);
+                }
+            }
+        }
+        self.count(&before, search);
+        Outcome::BudgetSpent
+    }
+
+    fn count(&mut self, before: &(Counts, Counts), search: &Search<'_>) {
+        let (counts, start, now) = (&mut self.progress.counts, before.1, search.counts());
+        counts.expanded = before.0.expanded + now.expanded - start.expanded;
+        counts.generated = before.0.generated + now.generated - start.generated;
+        counts.evaluated = before.0.evaluated + now.evaluated - start.evaluated;
+        counts.memory = before.0.memory + now.memory - start.memory;
+    }
+
+    /// Looks at the choices that a search takes for a plan.
+    fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
+        let judged = extract::plan_of(
+            self.task,
+            self.situation,
+            self.compiled,
+            steps,
+            self.settings,
+        );
+        let Some((plan, report)) = judged else {
+            search.has_lost = true;
+            return None;
+        };
+        let found = self.value(plan, &report);
+        let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
+        if self
+            .best
+            .as_ref()
+            .is_some_and(|best| worth(best) <= worth(&found))
+        {
+            return None;
+        }
+        self.progress.best = Some(found.value.clone());
+        self.progress.plan = Some(found.clone());
+        self.best = Some(found);
+        let flow = (self.observe)(&self.progress);
+        self.progress.plan = None;
+        if flow.is_break() {
+            return Some(Outcome::Stop(Stopped::Interrupted));
+        }
+        if self.settings.first_plan_only {
+            return Some(Outcome::Stop(Stopped::FirstPlan));
+        }
+        if self.compiled.metric.is_some() {
+            return Some(Outcome::Better);
+        }
+        self.demand_better(search);
+        None
+    }
+
+    /// From now on only plans count that are better than the best one.
+    fn demand_better(&self, search: &mut Search<'_>) {
+        let Some(best) = &self.best else { return };
+        let (end, _) = self.compiled.scale.floor(&best.makespan);
+        if self.compiled.metric.is_none() {
+            search.set_horizon(end - 1);
+            return;
+        }
+        let may_equal = search.aim() == Aim::Shortest;
+        if may_equal {
+            search.set_horizon(end - 1);
+        }
+        search.set_limit(Limit {
+            value: best.value.clone(),
+            may_equal,
+        });
+    }
+
+    fn value(&self, plan: TimeTriggeredPlan, report: &Report) -> Found {
+        let makespan = report.makespan.clone();
+        let metric = report.metric(self.task);
+        let is_maximized = self
+            .task
+            .problem()
+            .metric
+            .as_ref()
+            .is_some_and(|m| m.maximize);
+        let value = match (&metric, self.settings.objective) {
+            (Some(metric), Objective::Metric) if is_maximized => -metric,
+            (Some(metric), Objective::Metric) => metric.clone(),
+            _ => makespan.clone(),
+        };
+        Found {
+            plan,
+            makespan,
+            metric,
+            value,
+        }
+    }
+}
+
+/// How many turns a search gets of a round.
+fn share(search: &Search<'_>, budget: u64) -> u64 {
+    if search.is_hasty() {
+        budget
+    } else {
+        budget / COMPLETE_SHARE
+    }
+}
+
+/// How a share of a search ended.
+enum Outcome {
+    Stop(Stopped),
+    /// With a better plan, where the metric decides.
+    Better,
+    Over,
+    BudgetSpent,
+}

@@ -1,0 +1,158 @@
+//! What the temporal constraints of a plan's happenings are, whatever their order.
+
+use elbowroom_model::Footprint;
+use elbowroom_model::ground::Body;
+use elbowroom_num::Rational;
+use elbowroom_plan::{LinkKind, Node, NodeId};
+
+use crate::circumstances::Running;
+use crate::model::Model;
+
+/// What the temporal constraints of a plan are, once for all searches.
+#[derive(Clone, Debug)]
+pub(crate) struct Separations {
+    pub(crate) epsilon: Rational,
+    /// Whether two nodes must be `epsilon` apart; symmetric.
+    apart: Vec<Vec<bool>>,
+    /// For each node, those that may not come after it.
+    never_after: Vec<Vec<NodeId>>,
+    /// The timed initials that matter, in order of time.
+    pub(crate) timed: Vec<(NodeId, Rational)>,
+    /// By instance.
+    pub(crate) durations: Vec<(Rational, Option<Rational>)>,
+    pub(crate) starts: Vec<NodeId>,
+    pub(crate) ends: Vec<NodeId>,
+}
+
+impl Separations {
+    pub(crate) fn of(model: &Model, epsilon: &Rational, keeps_interference: bool) -> Self {
+        let (task, plan) = (model.task(), model.plan());
+        let footprint = |node: Node| match node {
+            Node::Zero => Footprint::default(),
+            Node::Start(id) | Node::Instant(id) => {
+                Footprint::of_start(task, &plan.instance(id).action)
+            }
+            Node::End(id) => Footprint::of_end(task, &plan.instance(id).action),
+            Node::Timed(index) => Footprint::of_timed(&task.timed()[index]),
+        };
+        let footprints: Vec<Footprint> = plan.nodes.iter().map(|&node| footprint(node)).collect();
+        let mut apart: Vec<Vec<bool>> = footprints
+            .iter()
+            .map(|one| {
+                footprints
+                    .iter()
+                    .map(|two| one.interferes_with(two))
+                    .collect()
+            })
+            .collect();
+        let mut never_after = vec![Vec::new(); plan.nodes.len()];
+        for link in plan.links.iter().filter(|_| keeps_interference) {
+            if link.kind == LinkKind::Interference {
+                apart[link.from.index()][link.to.index()] = true;
+                apart[link.to.index()][link.from.index()] = true;
+                never_after[link.to.index()].push(link.from);
+            }
+        }
+        let mut read: Vec<Footprint> = vec![Footprint::of_condition(task, task.goal())];
+        for (_, instance) in plan.instances() {
+            if let Body::Durative(body) = &instance.action.body {
+                read.push(Footprint::of_condition(task, &body.over_all));
+                for effect in &body.end.effects {
+                    read.push(Footprint::of_condition(task, &effect.guard.over_all));
+                }
+            }
+        }
+        let is_action = |node: &Node| !matches!(node, Node::Timed(_) | Node::Zero);
+        let matters = |at: usize| {
+            let own = &footprints[at];
+            let actions = plan.nodes.iter().zip(&footprints);
+            read.iter().any(|reader| own.writes_what_is_read_by(reader))
+                || actions
+                    .filter(|(node, _)| is_action(node))
+                    .any(|(_, other)| own.interferes_with(other))
+        };
+        let timed = plan
+            .nodes
+            .iter()
+            .enumerate()
+            .filter_map(|(at, node)| match node {
+                Node::Timed(index) if matters(at) => {
+                    Some((NodeId::from(at), task.timed()[*index].time.clone()))
+                }
+                _ => None,
+            });
+        let ids = || plan.instances().map(|(id, _)| id);
+        Self {
+            epsilon: epsilon.clone(),
+            apart,
+            never_after,
+            timed: timed.collect(),
+            durations: ids().map(|id| plan.duration(id)).collect(),
+            starts: ids().map(|id| model.start(id)).collect(),
+            ends: ids().map(|id| model.end(id)).collect(),
+        }
+    }
+
+    /// Whether two happenings must be `epsilon` apart.
+    pub(crate) fn are_apart(&self, one: NodeId, other: NodeId) -> bool {
+        self.apart[one.index()][other.index()]
+    }
+
+    /// Whether `one` may come before `other`, as far as the plan's links say.
+    pub(crate) fn may_precede(&self, one: NodeId, other: NodeId) -> bool {
+        !self.never_after[one.index()].contains(&other)
+    }
+
+    pub(crate) fn node_count(&self) -> usize {
+        self.apart.len()
+    }
+
+    /// Whether anything must be `epsilon` apart from a happening.
+    pub(crate) fn keeps_distance(&self, node: NodeId) -> bool {
+        self.apart[node.index()].contains(&true)
+    }
+
+    /// By when a happening must be that is to come before the timed initials from `next_timed` on.
+    pub(crate) fn latest_before_timed(&self, node: NodeId, next_timed: usize) -> Option<Rational> {
+        let to_come = self.timed.iter().enumerate().skip(next_timed);
+        let latest = to_come.filter_map(|(index, (timed, time))| {
+            if self.are_apart(*timed, node) {
+                Some(time - &self.epsilon)
+            } else {
+                (index == next_timed).then(|| time.clone())
+            }
+        });
+        latest.min()
+    }
+
+    /// When a timed initial literal is, if it is the next one; those that have passed, or are not
+    /// next, leave no time.
+    pub(crate) fn time_of_next(&self, node: NodeId, next_timed: usize) -> Option<&Rational> {
+        let (next, time) = self.timed.get(next_timed)?;
+        (*next == node).then_some(time)
+    }
+
+    /// When the end of an action under way can be, at the earliest and at the latest. One that is
+    /// overdue has no latest end that could still be kept.
+    pub(crate) fn end_of(&self, running: &Running, now: &Rational) -> (Rational, Option<Rational>) {
+        let (least, greatest) = &self.durations[running.instance.index()];
+        let earliest = (&running.start + least).max(now.clone());
+        let latest = greatest.as_ref().map(|greatest| &running.start + greatest);
+        (earliest, latest.filter(|latest| latest >= now))
+    }
+
+    /// Whether the clock matters, and not only time differences.
+    pub(crate) fn has_deadlines(&self, now: &Rational) -> bool {
+        self.timed.iter().any(|(_, time)| time > now)
+    }
+
+    /// Whether `node` may come after all of these.
+    pub(crate) fn may_follow(&self, node: NodeId, is_placed: &dyn Fn(NodeId) -> bool) -> bool {
+        // `never_after[placed]` holds `node`; the lists are short.
+        !self
+            .never_after
+            .iter()
+            .enumerate()
+            .any(|(at, before)| before.contains(&node) && is_placed(NodeId::from(at)))
+    }
+}
