@@ -71,10 +71,23 @@ fn difference(trace: &str, name: &str) -> Option<u64> {
     document["difference"]["line"].as_u64()
 }
 
+/// The first plan that was made in a run.
+fn first_plan(trace: &str) -> String {
+    let lines = trace.lines().map(serde_json::from_str::<Value>);
+    let mut entries = lines.map(|entry| entry.expect("JSON"));
+    let planned = entries.find(|entry| entry["event"] == "planned");
+    let planned = planned.expect("a plan was made");
+    let steps = planned["plan"].as_array().expect("steps").iter();
+    let words = steps.map(|step| {
+        let decimal = |name: &str| step[name]["decimal"].to_string();
+        let action = step["action"].as_str().expect("a name");
+        format!("{}: {action} [{}]", decimal("start"), decimal("duration"))
+    });
+    words.collect::<Vec<_>>().join("\n")
+}
+
 fn causes(trace: &str) -> Vec<String> {
-    let lines = trace
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line));
+    let lines = trace.lines().map(serde_json::from_str::<Value>);
     let entries = lines.map(|entry| entry.expect("JSON"));
     let causes = entries.filter_map(|entry| Some(entry["reason"]["cause"].as_str()?.to_owned()));
     causes.collect()
@@ -88,24 +101,43 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
     let text = fs::read_to_string(root().join("experiments/table1/problem.pddl")).expect("read");
     let text = text.replace("{early}", "425").replace("{late}", "800");
     let problem = Temporary::new("problem.pddl", &text);
+    let uncertain = |step: u32, mean: u32| {
+        format!(
+            "[[duration]]\naction = \"make-base-{step}\"\n\
+             normal = {{ mean = {mean}, deviation = 70, minimum = 0 }}\n"
+        )
+    };
+    let world = format!(
+        "format = \"elbowroom-world\"\nversion = 1\n{}{}",
+        uncertain(1, 170),
+        uncertain(2, 160)
+    );
+    let world_file = Temporary::new("world.toml", &world);
+    let (name, world) = (problem.name(), world_file.name());
+    let common = [
+        "experiments/table1/domain.pddl",
+        &name,
+        "--world",
+        &world,
+        "--planner-states",
+        "400",
+        "--improve-states",
+        "256",
+        "--seed",
+        "3",
+        "--planning-time",
+        "0",
+    ];
+    // `live` begins with the planner's plan; `live:5` would begin with the likeliest.
+    let hasty = played_back("hasty", &[&common[..], &["--executor", "live"]].concat());
+    let plan = Temporary::new("hasty.plan", &first_plan(&hasty));
     let trace = played_back(
         "live",
         &[
-            "experiments/table1/domain.pddl",
-            &problem.name(),
-            "--world",
-            "experiments/table1/world-2.toml",
-            "--executor",
-            "live:5",
-            "--planner-states",
-            "400",
-            "--improve-states",
-            "256",
-            "--planning-time",
-            "1",
-            "--seed",
-            "3",
-        ],
+            &common[..],
+            &["--executor", "live:5", "--plan", &plan.name()],
+        ]
+        .concat(),
     );
     assert!(causes(&trace).iter().any(|cause| cause == "likelier"));
     // The probabilities are calculated again, not read: in another world they are others.
@@ -116,14 +148,16 @@ fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
 
 #[test]
 fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
-    for executor in ["adaptable", "esterel"] {
-        let mut replans = 0;
+    for executor in ["adaptable", "lookahead", "esterel"] {
+        let (mut replans, mut failed) = (0, 0);
         for seed in ["1", "2", "3", "4"] {
             let trace = played_back(
                 &format!("{executor}-{seed}"),
                 &[
                     DELIVERY[0],
                     DELIVERY[1],
+                    "--plan",
+                    "cases/delivery/plan.plan",
                     "--world",
                     "experiments/clumsy/door.toml",
                     "--likelihoods",
@@ -136,11 +170,12 @@ fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
                     seed,
                 ],
             );
-            let failed = trace.matches("it did not start").count();
-            assert!(failed > 0, "{executor}, {seed}");
+            failed += trace.matches("it did not start").count();
             replans += trace.matches("\"event\":\"planning\"").count();
         }
-        println!("{executor}: {replans}");
+        assert!(failed > 5, "{executor}: {failed}");
+        // `esterel` comes to a locked door in some of them.
+        assert_eq!(replans > 0, executor == "esterel", "{executor}: {replans}");
     }
 }
 

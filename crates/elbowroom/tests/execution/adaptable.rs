@@ -82,6 +82,23 @@ fn an_order_that_misses_its_deadline_is_not_chosen() {
     assert!(is_valid(&scene, &report));
 }
 
+/// The next start is decided when it is known what has become of the one before: after no time, where
+/// that is told at once.
+#[test]
+fn starts_that_are_due_at_once_begin_at_once() {
+    let scene = field(7);
+    let starts = |world: &str| {
+        let report = scene.run("adaptable", &scene.world(world), 1);
+        assert_eq!(report.verdict, Verdict::GoalReached);
+        [times(&report, "photo").0, times(&report, "sample").0]
+    };
+    assert_eq!(starts(""), [Rational::ZERO, Rational::ZERO]);
+    let late = "[[delay]]\naction = \"*\"\nconstant = 0.5\n";
+    let mut late = starts(late);
+    late.sort();
+    assert_eq!(late, [Rational::new(1, 2), Rational::ONE]);
+}
+
 #[test]
 fn what_has_come_about_by_itself_is_skipped() {
     let scene = field(100);

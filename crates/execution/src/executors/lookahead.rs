@@ -230,7 +230,80 @@ fn sets(actions: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_RUNNING, sets};
+    use elbowroom_model::Task;
+    use elbowroom_num::Rational;
+    use elbowroom_pddl::{Source, read_problem};
+    use elbowroom_probability::Likelihoods;
+
+    use super::{Foresight, MOST_RUNNING, sets};
+
+    /// The durations of what can be done by the table, if there is one.
+    fn durations(actions: &str, init: &str) -> Option<Vec<Rational>> {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :numeric-fluents)
+               (:types place) (:predicates (light) (done ?p - place)) (:functions (far ?p - place))
+               {actions})"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects here there - place)
+               (:init (= (far here) 3) (= (far there) 5/2) {init})
+               (:goal (and (done here) (done there))))"
+        );
+        let problem = problem.replace("5/2", "2.5");
+        let source = |text: &str| Source::new("test", text);
+        let (problem, _) = read_problem(&source(&domain), &source(&problem)).unwrap();
+        let certain = Likelihoods::certain();
+        let table = Foresight::default().table(&Task::new(problem), &certain)?;
+        let durations = table.steps().iter().map(|step| step.duration.clone());
+        durations.collect()
+    }
+
+    /// An action at a place: its duration, its condition, and its effect.
+    fn action(name: &str, duration: &str, condition: &str, effect: &str) -> String {
+        format!(
+            "(:durative-action {name} :parameters (?p - place) :duration {duration}
+               :condition {condition} :effect {effect})"
+        )
+    }
+
+    #[test]
+    fn actions_take_as_long_as_they_must() {
+        let look = |duration: &str| action("look", duration, "()", "(at end (done ?p))");
+        let numbers = |text: &str| {
+            let numbers = text.split(' ').map(str::parse::<Rational>);
+            Some(numbers.collect::<Result<Vec<_>, _>>().unwrap())
+        };
+        let of = |duration: &str| durations(&look(duration), "");
+        assert_eq!(of("(= ?duration (far ?p))"), numbers("3 5/2"));
+        assert_eq!(
+            of("(and (>= ?duration 2) (<= ?duration (far ?p)))"),
+            numbers("2 2")
+        );
+        assert_eq!(of("(<= ?duration (far ?p))"), numbers("3 5/2"));
+        assert_eq!(of("()"), None);
+    }
+
+    #[test]
+    fn worlds_in_which_the_clock_matters_have_no_table() {
+        let look = action(
+            "look",
+            "(= ?duration 2)",
+            "(over all (light))",
+            "(at end (done ?p))",
+        );
+        let burn = |effect: &str| {
+            let effect = format!("(and (at start (light)) {effect})");
+            action("burn", "(= ?duration 9)", "()", &effect)
+        };
+        assert!(durations(&look, "(light)").is_some());
+        assert!(durations(&look, "(light) (at 5 (not (light)))").is_none());
+        assert!(durations(&format!("{look}{}", burn("")), "").is_some());
+        // What is to be seen must be seen before the light goes out.
+        let goes_out = burn("(at end (not (light)))");
+        assert!(durations(&format!("{look}{goes_out}"), "").is_none());
+        let numbers = burn("(at end (increase (far ?p) 1))");
+        assert!(durations(&format!("{look}{numbers}"), "").is_none());
+    }
 
     #[test]
     fn sets_are_counted() {
