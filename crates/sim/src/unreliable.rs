@@ -121,6 +121,10 @@ impl<W: World> World for Unreliable<W> {
         self.inner.know(task);
     }
 
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        self.inner.grown()
+    }
+
     fn look(
         &mut self,
         facts: &[FactId],
