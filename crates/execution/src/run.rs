@@ -237,6 +237,7 @@ impl<'a> Run<'a> {
     fn pass(&mut self, until: &Rational) -> Result<(), Stop> {
         let until = until.min(&self.settings.time_limit);
         let passage = self.ports.world.wait(until)?;
+        self.know_what_the_world_mentions();
         self.ports.recorder.record(&Entry::Passed {
             until,
             now: &passage.now,
@@ -251,6 +252,20 @@ impl<'a> Run<'a> {
         moves_on.map_err(|why| Stop::World(WorldError::new(why)))
     }
 
+    /// A fact that no plan has mentioned may still matter to the next one.
+    fn know_what_the_world_mentions(&mut self) {
+        if let Some(task) = self.ports.world.grown() {
+            self.know(task);
+        }
+    }
+
+    /// The table of facts and fluents has grown.
+    fn know(&mut self, task: Arc<Task>) {
+        self.task = task;
+        self.belief.know(Arc::clone(&self.task));
+        self.ports.recorder.know(&self.task);
+    }
+
     /// The executor takes the goal for reached. The world may look; then it is, or it is not.
     fn goal_reached(&mut self) -> Result<(), Stop> {
         let now = self.now.clone();
@@ -258,6 +273,7 @@ impl<'a> Run<'a> {
         let facts: Vec<_> = std::mem::take(&mut footprint.reads).into_iter().collect();
         let fluents: Vec<_> = footprint.reads_fluents.into_iter().collect();
         let observations = self.ports.world.look(&facts, &fluents)?;
+        self.know_what_the_world_mentions();
         self.ports.recorder.record(&Entry::Looked {
             now: &now,
             observations: &observations,

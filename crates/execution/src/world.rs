@@ -52,6 +52,12 @@ pub trait World {
     /// The table of facts and fluents has grown, because a plan mentions new ones. Those known
     /// keep their numbers.
     fn know(&mut self, _task: &Arc<Task>) {}
+
+    /// The table with what the last answer has mentioned for the first time, if it has: that table
+    /// which it knew, and more.
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        None
+    }
 }
 
 /// Time that has passed.

@@ -31,6 +31,7 @@ pub(super) struct ProcessWorld {
     is_deaf: bool,
     names: Names,
     task: Arc<Task>,
+    has_grown: bool,
 }
 
 impl ProcessWorld {
@@ -71,6 +72,7 @@ impl ProcessWorld {
             is_deaf: false,
             names: Names::of(task),
             task: Arc::clone(task),
+            has_grown: false,
         };
         let hello = json!({ "type": "hello", "protocol": "elbowroom-world", "version": 1 });
         match world.tell(&hello) {
@@ -156,13 +158,14 @@ impl ProcessWorld {
         }
     }
 
-    fn read(&self, line: &str) -> Result<Said, String> {
+    fn read(&mut self, line: &str) -> Result<Said, String> {
         let message: Value =
             serde_json::from_str(line).map_err(|error| format!("not JSON: {error}"))?;
         if message.get("type").and_then(Value::as_str) == Some("time") {
             let now = wire::field_number(&message, "now");
             return now.map(Said::Time).map_err(|error| error.message);
         }
+        self.has_grown |= wire::mention(&message, &mut self.names, &mut self.task);
         let observation = wire::read_observation(&message, &self.names);
         observation
             .map(Said::Observation)
@@ -264,5 +267,9 @@ impl World for ProcessWorld {
     fn know(&mut self, task: &Arc<Task>) {
         self.names.learn(task);
         self.task = Arc::clone(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        std::mem::take(&mut self.has_grown).then(|| Arc::clone(&self.task))
     }
 }

@@ -89,6 +89,10 @@ impl World for Realtime<'_> {
     fn know(&mut self, task: &Arc<Task>) {
         self.inner.know(task);
     }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        self.inner.grown()
+    }
 }
 
 /// A planner in such a world.
