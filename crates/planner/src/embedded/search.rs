@@ -12,6 +12,8 @@ mod limit;
 mod queue;
 mod style;
 
+use std::collections::VecDeque;
+
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
 use super::compile::{Compiled, NONE};
@@ -28,6 +30,10 @@ pub(crate) use style::{Aim, Style};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
+
+/// Each turn of that number goes to the successor that has waited longest, in a complete search. So
+/// it does not lose itself where an estimate is good, and endlessly many states are no goal.
+const FAIRNESS: u64 = 8;
 
 /// After how many states the stronger bound is asked about the beginning.
 pub(crate) const PATIENCE: u64 = 64;
@@ -50,6 +56,8 @@ pub(crate) struct Search<'a> {
     known: Map<u64, Vec<u32>>,
     all: Queue,
     preferred: Queue,
+    /// All successors, first come first served, in a search that has to come by everywhere.
+    oldest: VecDeque<(u32, Step)>,
     turns: [i64; 2],
     best_steps: u32,
     /// Whether times are irrelevant but for their distances.
@@ -62,6 +70,8 @@ pub(crate) struct Search<'a> {
     horizon: Ticks,
     /// Whether something was dropped that could have led to a plan.
     pub(crate) has_lost: bool,
+    /// How many successors had their turn.
+    drawn: u64,
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
@@ -132,6 +142,7 @@ impl<'a> Search<'a> {
             known: Map::default(),
             all: Queue::default(),
             preferred: Queue::default(),
+            oldest: VecDeque::new(),
             turns: [0, 0],
             best_steps: u32::MAX,
             is_timeless,
@@ -139,6 +150,7 @@ impl<'a> Search<'a> {
             limit: None,
             horizon: NEVER,
             has_lost: false,
+            drawn: 0,
             expanded: 0,
             generated: 0,
             evaluated: 0,
@@ -205,13 +217,7 @@ impl<'a> Search<'a> {
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
-        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
-        let queue = usize::from(!is_preferred_turn);
-        self.turns[queue] += 1;
-        let entry = match queue {
-            0 => self.preferred.pop(),
-            _ => self.all.pop().or_else(|| self.preferred.pop()),
-        };
+        let entry = self.next_entry();
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
@@ -223,6 +229,24 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         };
         self.visit(parent, step, state)
+    }
+
+    /// Whose turn it is.
+    fn next_entry(&mut self) -> Option<(u32, Step)> {
+        self.drawn += 1;
+        if self.drawn.is_multiple_of(FAIRNESS)
+            && !self.all.is_empty()
+            && let Some(oldest) = self.oldest.pop_front()
+        {
+            return Some(oldest);
+        }
+        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
+        let queue = usize::from(!is_preferred_turn);
+        self.turns[queue] += 1;
+        match queue {
+            0 => self.preferred.pop(),
+            _ => self.all.pop().or_else(|| self.preferred.pop()),
+        }
     }
 
     /// The successor; in haste, one in which what has started is over, if possible.
@@ -352,6 +376,11 @@ impl<'a> Search<'a> {
         for &step in &estimate.applicable {
             self.generated += 1;
             self.all.push(rank, number, step);
+        }
+        if self.style.haste.is_none() {
+            let steps = estimate.applicable.iter();
+            self.oldest.extend(steps.map(|&step| (number, step)));
+            self.memory += 12 * estimate.applicable.len();
         }
     }
 

@@ -9,7 +9,7 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, Task};
 use elbowroom_num::Rational;
 
-use durations::reads_duration;
+pub(super) use durations::reads_duration;
 
 use super::directions::Shifts;
 use super::eagerness::excludes_itself;

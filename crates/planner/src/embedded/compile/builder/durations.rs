@@ -33,7 +33,7 @@ impl Duration {
 }
 
 /// Whether a condition or an effect of the action reads `?duration`.
-pub(super) fn reads_duration(body: &DurativeBody) -> bool {
+pub(in crate::embedded::compile) fn reads_duration(body: &DurativeBody) -> bool {
     let mut reads = false;
     let mut look = |leaf: &ground::Expression| {
         reads |= *leaf == ground::Expression::Duration;
