@@ -50,6 +50,12 @@ fn fixed(bencher: Bencher<'_, '_>, nodes: usize) {
     events(bencher, "fixed:60", nodes);
 }
 
+/// Nothing but orderings.
+#[divan::bench(args = [1_000, 10_000, 100_000])]
+fn esterel(bencher: Bencher<'_, '_>, nodes: usize) {
+    events(bencher, "esterel", nodes);
+}
+
 fn events(bencher: Bencher<'_, '_>, executor: &str, nodes: usize) {
     let mission = mission(nodes / 2, executor == "live");
     let spec: ExecutorSpec = executor.parse().expect("a known executor");

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_model::Step;
-use elbowroom_model::ground::Body;
+use elbowroom_model::ground::{Action, Body};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::search::Progress;
@@ -24,6 +24,13 @@ const MOST_HAPPENINGS: usize = 200_000;
 
 /// An action is given up when it has failed so often in a row that this is how likely that was.
 const TOO_UNLIKELY: f64 = 1e-6;
+
+/// However unlikely it is to start, it is not tried more often than this in a row: where starts take
+/// no time, neither does trying again.
+const MOST_FAILURES: i32 = 1000;
+
+/// So often in a row a failure is put down to a condition that does not hold.
+const MOST_EXPLAINED: i32 = 3;
 
 /// A plan, and how it stands.
 pub(super) struct Rest {
@@ -103,11 +110,19 @@ impl Rest {
                     self.failures.remove(&instance);
                     return None;
                 }
-                let step = &self.steps[instance.index()];
-                if was_let_go || lacks_something(step, start.is_some(), belief) {
+                if was_let_go {
                     return None;
                 }
-                self.failed(instance, ending, likelihoods)
+                let failures = self.failures.entry(instance).or_default();
+                *failures += 1;
+                let failures = *failures;
+                let step = &self.steps[instance.index()];
+                let is_explained =
+                    failures <= MOST_EXPLAINED && lacks_something(step, start.is_some(), belief);
+                if is_explained {
+                    return None;
+                }
+                failed(&step.action, failures, ending, likelihoods)
             }
             // The belief knows it already, and layers are held against the belief.
             News::Fact(_) | News::Value(_) => None,
@@ -116,28 +131,6 @@ impl Rest {
                 Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
             }
         }
-    }
-
-    /// An action is tried again as long as its likelihoods explain that it fails.
-    fn failed(
-        &mut self,
-        instance: InstanceId,
-        ending: &Ending,
-        likelihoods: &Likelihoods,
-    ) -> Option<Reason> {
-        let action = &self.steps[instance.index()].action;
-        let failures = self.failures.entry(instance).or_default();
-        *failures += 1;
-        let success = likelihoods.start(action).unwrap_or(1.0);
-        if (1.0 - success).powi(*failures) >= TOO_UNLIKELY {
-            return None;
-        }
-        let why = match ending {
-            Ending::Failed { why } => why.as_str(),
-            Ending::Succeeded | Ending::Cancelled => "it was cancelled",
-        };
-        let about = format!("{why}; {failures} in a row, and it starts with probability {success}");
-        Some(Reason::new(Cause::Failed).of(&action.name).about(about))
     }
 
     /// An instance's start or end.
@@ -295,6 +288,26 @@ impl Rest {
             reason,
         }
     }
+}
+
+/// Why an action is given up that has failed so often in a row: it is tried again as long as its
+/// likelihoods explain that.
+fn failed(
+    action: &Action,
+    failures: i32,
+    ending: &Ending,
+    likelihoods: &Likelihoods,
+) -> Option<Reason> {
+    let success = likelihoods.start(action).unwrap_or(1.0);
+    if (1.0 - success).powi(failures) >= TOO_UNLIKELY && failures < MOST_FAILURES {
+        return None;
+    }
+    let why = match ending {
+        Ending::Failed { why } => why.as_str(),
+        Ending::Succeeded | Ending::Cancelled => "it was cancelled",
+    };
+    let about = format!("{why}; {failures} in a row, and it starts with probability {success}");
+    Some(Reason::new(Cause::Failed).of(&action.name).about(about))
 }
 
 /// Whether what an action needs is known not to hold: no wonder that it has failed.
