@@ -33,7 +33,7 @@ const BOOST: i64 = 1000;
 
 /// Each turn of that number goes to the successor that has waited longest, in a complete search. So
 /// it does not lose itself where an estimate is good, and endlessly many states are no goal.
-const FAIRNESS: u64 = 8;
+const FAIRNESS: u64 = 32;
 
 /// After how many states the stronger bound is asked about the beginning.
 pub(crate) const PATIENCE: u64 = 64;
@@ -333,14 +333,23 @@ impl<'a> Search<'a> {
             outlook,
             hope: Hope::Unknown,
         });
-        if is_goal {
-            // A state in which the goal holds may still have successors worth looking at: the
-            // judge can refuse the plan.
-            self.expand(number, &estimate);
+        // A state in which the goal holds may still have successors worth looking at: the judge can
+        // refuse the plan, and another one can be better.
+        self.expand(number, &estimate);
+        if is_goal && self.may_be_better(number) {
             return Turn::Goal(self.steps_to(number));
         }
-        self.expand(number, &estimate);
         Turn::Nothing
+    }
+
+    /// Whether the metric of a state in which the goal holds may be within the limit. This is for
+    /// metrics that do not only grow, and spares the judge.
+    fn may_be_better(&self, number: u32) -> bool {
+        let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
+            return true;
+        };
+        let spent = metric.spent(&self.nodes[number as usize].state);
+        !metric.time.is_zero() || spent.is_none_or(|spent| spent <= limit.value)
     }
 
     /// Whether the stronger bound shows that no plan begins like this. It is asked when the first

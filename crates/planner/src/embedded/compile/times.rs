@@ -52,13 +52,13 @@ pub(super) fn is_symbolic(compiled: &Compiled, situation: &Situation) -> bool {
         .iter()
         .zip(running)
         .any(|(action, running)| {
-            let is_chosen = || match running {
-                Some(running) => known_duration(running).is_none(),
-                None => {
-                    let mut bounds = action.duration.bounds.iter();
-                    !bounds.any(|b| b.comparison == Comparison::Equal)
-                        && action.duration.most.as_ref() != Some(&action.duration.least)
+            let is_chosen = || {
+                if let Some(running) = running {
+                    return known_duration(running).is_none();
                 }
+                let mut bounds = action.duration.bounds.iter();
+                !bounds.any(|b| b.comparison == Comparison::Equal)
+                    && action.duration.most.as_ref() != Some(&action.duration.least)
             };
             !action.flows.is_empty() || action.uses_duration && is_chosen()
         })
