@@ -64,6 +64,51 @@ fn options_of_run_that_could_do_nothing_are_refused() {
 }
 
 #[test]
+fn what_nothing_in_the_problem_is_called_cannot_be_left_open() {
+    for (spec, words) in [
+        ("duration drve", "did you mean `drive`?"),
+        ("deadline (at rover moon)", "--vary"),
+    ] {
+        let said = refusal(&[&RUN[..], &["--vary", spec]].concat());
+        assert!(said.contains(words), "{spec}: {said}");
+    }
+    for spec in ["duration drive", "duration n0", "duration n99"] {
+        let output = elbowroom(&[&RUN[..], &["--vary", spec]].concat());
+        assert_ne!(output.status.code(), Some(2), "{spec}: {output:?}");
+    }
+}
+
+#[test]
+fn advice_on_files_is_about_the_file_that_is_missing() {
+    let said = refusal(&[&RUN[..], &["--world", "no.toml"]].concat());
+    assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+    let said = refusal(&["compare", "no.toml"]);
+    assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+    let said = refusal(&["run", "no.pddl", RUN[2]]);
+    assert!(said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+}
+
+#[test]
+fn tables_are_no_wider_than_eighty_columns() {
+    let folder = folder("wide");
+    let more: String = ["b", "c", "d", "e"]
+        .iter()
+        .map(|name| format!("[[column]]\nname = \"{name}\"\nworld = \"world.toml\"\n"))
+        .collect();
+    let more = format!("{more}[[column]]");
+    let changes = [("trials = 6", "trials = 1"), ("[[column]]", more.as_str())];
+    let file = experiment(&folder, &changes);
+    let output = elbowroom(&["compare", &file]);
+    let table = String::from_utf8(output.stdout).expect("text");
+    for name in ["b:", "c:", "d:", "e:", "late:", "replans", "clairvoyant"] {
+        assert!(table.contains(name), "{name}: {table}");
+    }
+    let longest = table.lines().map(|line| line.chars().count()).max();
+    assert!(longest <= Some(80), "{table}");
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
 fn a_trace_is_played_back_as_it_is() {
     for option in [
         ["--executor", "stn"],

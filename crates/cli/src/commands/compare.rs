@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::look::Look;
 use crate::{input, output};
 
 /// Makes an experiment, or a part of it, or puts parts together.
@@ -42,6 +43,7 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     } else {
         merged(&arguments.merge, &experiment)?
     };
+    let width = Look::of_stdout().width;
     // What was computed is shown, whatever becomes of the files.
     let written = match &arguments.output {
         Some(folder) => write(folder, &experiment, &results),
@@ -50,7 +52,7 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     if arguments.json {
         output::print_json(&results.json())?;
     } else {
-        output::print(&results.table(&experiment).plain())?;
+        output::print(&results.table(&experiment).within(width))?;
     }
     written.map(|()| Exit::Yes)
 }
@@ -85,7 +87,7 @@ fn perturbed(
     if arguments.json {
         output::print_json(&results.json())?;
     } else {
-        output::print(&table.plain())?;
+        output::print(&table.within(Look::of_stdout().width))?;
     }
     written.map(|()| Exit::Yes)
 }

@@ -9,7 +9,7 @@ mod trace_file;
 
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, WholeRegion};
+use elbowroom::execute::{Analyst, WholeRegion, check_vary};
 use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
@@ -53,6 +53,9 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     };
     let likelihoods = likelihoods_text(arguments)?;
     let choices = Choices::of(arguments, likelihoods.as_ref(), &task)?;
+    check_vary(&task, &choices.flow.vary).map_err(|error| {
+        Failure::new(error, "`elbowroom help envelope` says what --vary can name")
+    })?;
     who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
