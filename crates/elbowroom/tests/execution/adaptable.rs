@@ -135,7 +135,8 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
     assert_eq!(report.starts, 20 * report.reasons.len());
     // Nor is it tried for ever where next to nothing starts; and trying again takes no time here.
     let hopeless = CHANCES.replace("start = 0.5", "start = 1e-9");
-    let scene = field(100).with_likelihoods(&hopeless);
+    let mut scene = field(100).with_likelihoods(&hopeless);
+    scene.settings.most_replans = 1;
     for executor in ["adaptable", "lookahead"] {
         let report = scene.run(executor, &fails("1"), 1);
         assert_eq!(report.verdict, Verdict::ReplanLimit);

@@ -10,7 +10,9 @@ use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use rustix::process::{
+    Pid, Signal, WaitId, WaitIdOptions, WaitOptions, kill_process_group, waitid, waitpid,
+};
 
 use super::super::clock::Clock;
 use super::{Ended, Ending, Limits, Stream, Usage, Watcher};
@@ -82,6 +84,8 @@ struct Run {
     processes: super::super::processes::Processes,
     is_output_open: bool,
     is_error_open: bool,
+    /// Whether somebody else waits for its end.
+    is_left: bool,
 }
 
 impl Run {
@@ -102,6 +106,7 @@ impl Run {
             processes: super::super::processes::Processes::of(pid, mark),
             is_output_open: child.stdout.is_some(),
             is_error_open: child.stderr.is_some(),
+            is_left: false,
             child,
         };
         // Should this fail, reads may wait for more output; the limits still end them, because
@@ -283,8 +288,15 @@ impl Run {
                     };
                 }
                 Ok(None) if clock.elapsed() < LAST_WAIT => thread::sleep(NEAR_END / 4),
-                // The system holds on to it; there is nothing more to be done.
-                Ok(None) | Err(_) => return Ending::Signalled(Signal::KILL.as_raw()),
+                // It is killed, but the system is slow to let go of it. Nobody need wait for that,
+                // but somebody has to, or it stays in the system's table.
+                Ok(None) => {
+                    let pid = self.pid;
+                    thread::spawn(move || waitpid(Some(pid), WaitOptions::empty()));
+                    self.is_left = true;
+                    return Ending::Signalled(Signal::KILL.as_raw());
+                }
+                Err(_) => return Ending::Signalled(Signal::KILL.as_raw()),
             }
         }
     }
@@ -293,7 +305,9 @@ impl Run {
 /// Should the watcher panic, nothing is left running all the same.
 impl Drop for Run {
     fn drop(&mut self) {
-        if let Ok(None) = self.child.try_wait() {
+        if !self.is_left
+            && let Ok(None) = self.child.try_wait()
+        {
             self.end_all();
             self.reap();
         }
