@@ -11,6 +11,8 @@ pub struct Table {
     pub headings: Vec<String>,
     /// Rows.
     pub rows: Vec<Vec<String>>,
+    /// What the rows mean; only in Markdown, below the table.
+    pub notes: Vec<String>,
 }
 
 impl Table {
@@ -32,6 +34,12 @@ impl Table {
         text.push_str("|\n");
         for row in &self.rows {
             line(&mut text, row);
+        }
+        if !self.notes.is_empty() {
+            text.push('\n');
+        }
+        for note in &self.notes {
+            let _ = writeln!(text, "- {note}");
         }
         text
     }
@@ -175,6 +183,7 @@ mod tests {
             caption: "How often it works".to_owned(),
             headings: headings.map(str::to_owned).to_vec(),
             rows: vec![row.map(str::to_owned).to_vec()],
+            notes: Vec::new(),
         };
         let expected = "How often it works\n\n\
                         who  one: coverage\n     [95 %]\na    1.0 [0.5, 2.0]\n\n\
@@ -190,10 +199,11 @@ mod tests {
             caption: "Two".to_owned(),
             headings: vec!["a".to_owned(), "long".to_owned()],
             rows: vec![vec!["x, y".to_owned(), "1".to_owned()]],
+            notes: vec!["1 is one".to_owned()],
         };
         assert_eq!(
             table.markdown(),
-            "Two\n\n| a    | long |\n| ---- | ---- |\n| x, y | 1    |\n"
+            "Two\n\n| a    | long |\n| ---- | ---- |\n| x, y | 1    |\n\n- 1 is one\n"
         );
         assert_eq!(table.csv(), "a,long\r\n\"x, y\",1\r\n");
         assert_eq!(table.plain(), "Two\n\na     long\nx, y  1\n");

@@ -14,6 +14,10 @@ use elbowroom_sim::{Purpose, WorldModel};
 
 use crate::execute::rewrite::{add_function_of, set_durations};
 
+/// What this is, in one sentence.
+pub(super) const SUMMARY: &str = "The share of trials in which the planner, with the executors' \
+    limits, finds a plan when everything is known in advance, or one of the executors gets there.";
+
 /// Whether a plan reaches the goal when the world of that seed is known in advance.
 pub(super) fn can_reach(
     task: &Task,

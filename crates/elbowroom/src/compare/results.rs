@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::{Report, Verdict};
 use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 use serde::{Deserialize, Serialize};
 
+use super::clairvoyant;
+use super::experiment::CLAIRVOYANT;
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Part};
 
@@ -169,8 +172,25 @@ impl Results {
             ),
             rows: rows.collect(),
             headings,
+            notes: notes(&self.rows),
         }
     }
+}
+
+/// What each row's executor does, as it is registered; each executor once.
+fn notes(rows: &[String]) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    for row in rows {
+        let note = match row.parse::<ExecutorSpec>() {
+            Ok(spec) => format!("`{}`: {}", spec.registered.name, spec.registered.summary),
+            Err(_) if row == CLAIRVOYANT => format!("`{row}`: {}", clairvoyant::SUMMARY),
+            Err(_) => continue,
+        };
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes
 }
 
 impl Partial for Results {

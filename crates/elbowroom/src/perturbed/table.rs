@@ -65,6 +65,7 @@ pub fn table(results: &PerturbedResults) -> Table {
         caption: caption.collect::<Vec<_>>().join("\n"),
         headings: headings.map(str::to_owned).to_vec(),
         rows: rows.iter().map(row).collect(),
+        notes: Vec::new(),
     }
 }
 
