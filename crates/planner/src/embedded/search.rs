@@ -8,15 +8,18 @@
 //! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
 mod doubt;
+mod goals;
+mod known;
 mod limit;
 mod queue;
 mod style;
+mod successors;
 
 use std::collections::VecDeque;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
-use super::compile::{Compiled, NONE};
+use super::compile::Compiled;
 use super::guide::Guide;
 use super::hash::Map;
 use super::relaxed::Relaxed;
@@ -249,54 +252,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The successor; in haste, one in which what has started is over, if possible.
-    fn make(&mut self, parent: u32, step: Step) -> Option<(Step, State)> {
-        let state = &self.nodes[parent as usize].state;
-        if let Step::Start(action) | Step::Whole(action) = step {
-            let data = self.compiled.action(action);
-            let runs_already = || {
-                state
-                    .open
-                    .iter()
-                    .filter(|open| open.action == action)
-                    .count()
-            };
-            if !data.excludes_itself && data.end != NONE {
-                let most = usize::from(self.style.haste.is_none());
-                if runs_already() > most {
-                    self.has_lost = true;
-                    return None;
-                }
-            }
-            let is_whole = self
-                .style
-                .haste
-                .is_some_and(|haste| data.eagerness >= haste);
-            if is_whole && data.end != NONE {
-                let whole = Step::Whole(action);
-                if let Some(next) = self.stepper.apply(state, whole) {
-                    self.has_lost = true;
-                    return Some((whole, next));
-                }
-            }
-        }
-        let step = match step {
-            Step::Whole(action) => Step::Start(action),
-            other => other,
-        };
-        let next = self.stepper.apply(state, step)?;
-        if let Step::Start(action) = step
-            && self.compiled.action(action).only_adds_at_end
-            && state.symbolic.is_none()
-            && self.relaxed.is_end_the_only_way(&next, action)
-        {
-            // No plan is lost: see `compile::eager`.
-            let whole = Step::Whole(action);
-            return Some((whole, self.stepper.apply(state, whole)?));
-        }
-        Some((step, next))
-    }
-
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let latest_end = self.latest_end(&state);
         let is_in_time = latest_end.is_some_and(|latest| state.earliest_end() <= latest);
@@ -342,16 +297,6 @@ impl<'a> Search<'a> {
         Turn::Nothing
     }
 
-    /// Whether the metric of a state in which the goal holds may be within the limit. This is for
-    /// metrics that do not only grow, and spares the judge.
-    fn may_be_better(&self, number: u32) -> bool {
-        let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
-            return true;
-        };
-        let spent = metric.spent(&self.nodes[number as usize].state);
-        !metric.time.is_zero() || spent.is_none_or(|spent| spent <= limit.value)
-    }
-
     /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
     /// successor of a state has its turn.
     fn is_cut(&mut self, number: u32) -> bool {
@@ -371,37 +316,6 @@ impl<'a> Search<'a> {
         is_hopeless
     }
 
-    fn expand(&mut self, number: u32, estimate: &super::relaxed::Estimate) {
-        self.expanded += 1;
-        if estimate.steps < self.best_steps {
-            self.best_steps = estimate.steps;
-            self.turns[0] -= BOOST;
-        }
-        self.memory += 24 * (estimate.preferred.len() + estimate.applicable.len());
-        let rank = self.rank(number, estimate.steps);
-        for &step in &estimate.preferred {
-            self.preferred.push(rank, number, step);
-        }
-        for &step in &estimate.applicable {
-            self.generated += 1;
-            self.all.push(rank, number, step);
-        }
-        if self.style.haste.is_none() {
-            let steps = estimate.applicable.iter();
-            self.oldest.extend(steps.map(|&step| (number, step)));
-            self.memory += 12 * estimate.applicable.len();
-        }
-    }
-
-    /// When the successors of a state have their turn; lower ranks are earlier.
-    fn rank(&self, number: u32, estimate: u32) -> i64 {
-        let estimate = i64::from(estimate);
-        let (Aim::CheapWhole(factor), Some(guide)) = (self.style.aim, &self.guide) else {
-            return estimate;
-        };
-        guide.spent(self.compiled, &self.nodes[number as usize].state) + factor * estimate
-    }
-
     /// The latest time at which a plan may end that begins like this; `None` if there is none.
     fn latest_end(&self, state: &State) -> Option<Ticks> {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
@@ -419,74 +333,5 @@ impl<'a> Search<'a> {
         self.stepper.horizon = horizon;
         self.relaxed.horizon = horizon;
         true
-    }
-
-    /// Whether a state that is at least as good has been looked at.
-    fn is_known(&mut self, hash: u64, state: &State, outlook: Option<&Outlook>) -> bool {
-        let Some(similar) = self.known.get(&hash) else {
-            return false;
-        };
-        let mut variants = 0;
-        for &number in similar {
-            let node = &self.nodes[number as usize];
-            let other = &node.state;
-            if other.is_discretely(state) {
-                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
-                is_no_later &= self.guide.is_none() || other.cost <= state.cost;
-                if self.style.haste.is_some() {
-                    self.has_lost |= is_no_later && !state.network.is_empty();
-                } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
-                    is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
-                }
-                // A goal that waits for a timed initial needs a happening so late.
-                let waits = !self.compiled.goal_timed.is_empty()
-                    && other.earliest_end() < state.earliest_end();
-                if is_no_later && !waits {
-                    return true;
-                }
-                variants += 1;
-            }
-        }
-        if variants >= self.style.variants {
-            self.has_lost = true;
-            return true;
-        }
-        false
-    }
-
-    /// Whether the plan could end here.
-    fn is_goal(&self, state: &State) -> bool {
-        let compiled = self.compiled;
-        if !state.open.is_empty() {
-            return false;
-        }
-        let holds = if state.symbolic.is_some() {
-            let mut stepper = Stepper::new(compiled);
-            stepper.reach_goal(&mut state.clone()).is_some()
-        } else {
-            let mut passes = |test| state.passes(compiled, test, None);
-            compiled.goal.holds(&state.facts, &mut passes)
-        };
-        if !holds {
-            return false;
-        }
-        // What happens by itself before the last happening counts.
-        let end = state.earliest_end();
-        compiled
-            .goal_timed
-            .iter()
-            .filter(|&&timed| timed >= state.timed)
-            .all(|&timed| compiled.timed[timed as usize].time > end)
-    }
-
-    fn steps_to(&self, mut number: u32) -> Vec<Step> {
-        let mut steps = Vec::new();
-        while self.nodes[number as usize].parent != ROOT {
-            let node = &self.nodes[number as usize];
-            steps.push(node.step);
-            number = node.parent;
-        }
-        steps.reverse();
-        steps
     }
 }

@@ -1,0 +1,39 @@
+//! What has been looked at before.
+
+use super::super::state::{Outlook, State};
+use super::Search;
+
+impl Search<'_> {
+    /// Whether a state that is at least as good has been looked at.
+    pub(super) fn is_known(&mut self, hash: u64, state: &State, outlook: Option<&Outlook>) -> bool {
+        let Some(similar) = self.known.get(&hash) else {
+            return false;
+        };
+        let mut variants = 0;
+        for &number in similar {
+            let node = &self.nodes[number as usize];
+            let other = &node.state;
+            if other.is_discretely(state) {
+                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
+                is_no_later &= self.guide.is_none() || other.cost <= state.cost;
+                if self.style.haste.is_some() {
+                    self.has_lost |= is_no_later && !state.network.is_empty();
+                } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
+                    is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
+                }
+                // A goal that waits for a timed initial needs a happening so late.
+                let waits = !self.compiled.goal_timed.is_empty()
+                    && other.earliest_end() < state.earliest_end();
+                if is_no_later && !waits {
+                    return true;
+                }
+                variants += 1;
+            }
+        }
+        if variants >= self.style.variants {
+            self.has_lost = true;
+            return true;
+        }
+        false
+    }
+}
