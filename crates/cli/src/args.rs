@@ -85,7 +85,7 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
     pub(crate) planner: String,
     /// Go on to better plans until so many seconds have passed; without it, the first plan is
-    /// taken
+    /// taken. Better is what the problem's metric says, or else what ends earlier
     #[arg(long, value_name = "S", value_parser = positive)]
     pub(crate) time_limit: Option<Rational>,
     /// Stop at the first plan, also with a time limit

@@ -18,8 +18,8 @@ use elbowroom_model::problem::SchemaId;
 use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::{
-    Bound, Constraint, DecoupledEnvelope, Instance, InstanceId, NodeId, ParametrizedPlan, Reason,
-    StnPlan,
+    Bound, Constraint, DecoupledEnvelope, Instance, InstanceId, NodeId, Parameter, ParameterId,
+    ParameterKind, ParametrizedPlan, Reason, StnPlan,
 };
 
 fn main() {
@@ -39,8 +39,25 @@ fn guarded(bencher: Bencher<'_, '_>, nodes: usize) {
     events(bencher, "guarded", nodes);
 }
 
+/// All durations are left open.
+#[divan::bench(args = [1_000, 10_000, 100_000])]
+fn live(bencher: Bencher<'_, '_>, nodes: usize) {
+    events(bencher, "live", nodes);
+}
+
+#[divan::bench(args = [1_000, 10_000, 100_000])]
+fn fixed(bencher: Bencher<'_, '_>, nodes: usize) {
+    events(bencher, "fixed:60", nodes);
+}
+
+/// Nothing but orderings.
+#[divan::bench(args = [1_000, 10_000, 100_000])]
+fn esterel(bencher: Bencher<'_, '_>, nodes: usize) {
+    events(bencher, "esterel", nodes);
+}
+
 fn events(bencher: Bencher<'_, '_>, executor: &str, nodes: usize) {
-    let mission = mission(nodes / 2);
+    let mission = mission(nodes / 2, executor == "live");
     let spec: ExecutorSpec = executor.parse().expect("a known executor");
     let belief = Progression::new(Arc::clone(&mission.task));
     bencher
@@ -113,7 +130,7 @@ impl Region for Everywhere {
     }
 }
 
-fn mission(count: usize) -> Mission {
+fn mission(count: usize, is_open: bool) -> Mission {
     const ROBOTS: usize = 20;
     let task = Arc::new(Task::new(Problem::default()));
     let instances = (0..count).map(|index| Instance {
@@ -179,11 +196,15 @@ fn mission(count: usize) -> Mission {
         nominal[start(index).index()] = begin;
         nominal[end(index).index()] = finish;
     }
+    let mut plan = ParametrizedPlan::closed(&task, plan);
+    if is_open {
+        leave_durations_open(&mut plan);
+    }
     Mission {
         origin: Rational::ZERO,
         now: Rational::ZERO,
         time_triggered: TimeTriggeredPlan::default(),
-        plan: ParametrizedPlan::closed(&task, plan),
+        plan,
         nominal,
         envelope: Some(DecoupledEnvelope {
             intervals: Vec::new(),
@@ -191,6 +212,27 @@ fn mission(count: usize) -> Mission {
         running: BTreeMap::new(),
         epsilon,
         task,
+    }
+}
+
+/// Makes a parameter of each duration, its shortest one being nominal.
+fn leave_durations_open(plan: &mut ParametrizedPlan) {
+    for constraint in &mut plan.plan.constraints {
+        let (Reason::Duration(instance), Bound::Finite(nominal)) =
+            (constraint.reason.clone(), constraint.lower.clone())
+        else {
+            continue;
+        };
+        let kind = ParameterKind::Duration(instance);
+        let parameter = Bound::Parameter(ParameterId::from(plan.parameters.len()));
+        (constraint.lower, constraint.upper) = (parameter.clone(), parameter);
+        plan.parameters.push(Parameter {
+            name: format!("dur_{}", instance.index()),
+            kind,
+            range: kind.natural_range(&nominal),
+            nominal,
+            weight: Rational::ONE,
+        });
     }
 }
 

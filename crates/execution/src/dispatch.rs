@@ -56,7 +56,13 @@ pub(crate) struct Dispatch {
     ends: Vec<[NodeId; 2]>,
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
+    /// For each instance, the plan's constraints that bound its duration.
+    bounding: Vec<Vec<usize>>,
+    /// What the durations of some instances may be once they run.
+    when_running: BTreeMap<InstanceId, Bounds>,
     progress: Progress,
+    /// Instances that were under way before the plan began: of these it knows the rest.
+    resumed: BTreeSet<InstanceId>,
     /// Starts that have failed and are to be tried again.
     retries: BTreeMap<NodeId, Retry>,
 }
@@ -76,9 +82,12 @@ impl Dispatch {
         let ends = ends_of(&plan);
         let (network, sources) = network(&plan, bounds);
         let mut durations = vec![(None, None); plan.instances.len()];
-        for constraint in &plan.constraints {
+        let mut bounding = vec![Vec::new(); plan.instances.len()];
+        for (index, constraint) in plan.constraints.iter().enumerate() {
             if let Some(id) = duration_of(&plan, constraint) {
-                durations[id.index()] = bounds(constraint);
+                bounding[id.index()].push(index);
+                let known: &mut Bounds = &mut durations[id.index()];
+                *known = both(std::mem::take(known), bounds(constraint));
             }
         }
         let horizon = match sight {
@@ -114,7 +123,14 @@ impl Dispatch {
             sources,
             ends,
             durations,
+            bounding,
+            when_running: BTreeMap::new(),
             progress,
+            resumed: mission
+                .running
+                .keys()
+                .map(|step| InstanceId(step.0))
+                .collect(),
             retries: BTreeMap::new(),
         };
         dispatch.begin(&mission.running);
@@ -157,6 +173,15 @@ impl Dispatch {
         self.ends[id.index()]
     }
 
+    /// What the plan's own bounds on an instance's duration are about.
+    fn duration_in_words(&self, id: InstanceId) -> &'static str {
+        if self.resumed.contains(&id) {
+            "what was left of its duration"
+        } else {
+            "duration"
+        }
+    }
+
     /// When a node happened, on the plan's clock.
     pub(crate) fn happened(&self, node: NodeId) -> Option<&Rational> {
         self.progress.happened[node.index()].as_ref()
@@ -196,6 +221,53 @@ impl Dispatch {
         Some(Planned { earliest, latest })
     }
 
+    /// Once an instance runs, its duration is what the plan leaves open of it and may be anything
+    /// within these bounds.
+    pub(crate) fn leave_open_when_running(&mut self, id: InstanceId, bounds: Bounds) {
+        self.when_running.insert(id, bounds);
+    }
+
+    /// An instance runs: see [`Dispatch::leave_open_when_running`].
+    fn leave_open(&mut self, id: InstanceId) {
+        let Some((lower, upper)) = self.when_running.remove(&id) else {
+            return;
+        };
+        let mut duration = (lower.clone(), upper.clone());
+        for index in &self.bounding[id.index()] {
+            let constraint = &self.plan.constraints[*index];
+            if !is_open(constraint) {
+                duration = both(duration, given(constraint));
+            }
+        }
+        self.durations[id.index()] = duration;
+        for (id, is_upper) in self.open_bounds(id) {
+            let bound = if is_upper {
+                upper.clone()
+            } else {
+                lower.as_ref().map(|lower| -lower)
+            };
+            self.horizon.loosen(id, bound);
+        }
+    }
+
+    /// The network's constraints that come from what the plan leaves open of a duration, and
+    /// whether each is its upper bound.
+    fn open_bounds(&self, id: InstanceId) -> Vec<(elbowroom_stn::ConstraintId, bool)> {
+        let [start, _] = self.ends[id.index()];
+        let start = network_node(start);
+        let network = self.horizon.network();
+        let at_start = network.leaving(start).map(|id| (id, true));
+        let at_start = at_start.chain(network.entering(start).map(|id| (id, false)));
+        let is_own = |(own, _): &(elbowroom_stn::ConstraintId, bool)| {
+            let index = self.sources.get(own.index()).copied().flatten();
+            index.is_some_and(|index| {
+                let is_own = self.bounding[id.index()].contains(&index);
+                is_own && is_open(&self.plan.constraints[index])
+            })
+        };
+        at_start.filter(is_own).collect()
+    }
+
     /// Goes by other bounds from now on; what has happened stays.
     ///
     /// # Errors
@@ -232,6 +304,20 @@ impl Dispatch {
             }
         }
     }
+}
+
+/// What holds if both do.
+fn both(one: Bounds, other: Bounds) -> Bounds {
+    let lower = one.0.into_iter().chain(other.0).max();
+    (lower, one.1.into_iter().chain(other.1).min())
+}
+
+/// Whether a constraint says nothing but what a parameter is.
+fn is_open(constraint: &Constraint) -> bool {
+    matches!(
+        (&constraint.lower, &constraint.upper),
+        (Bound::Parameter(lower), Bound::Parameter(upper)) if lower == upper
+    )
 }
 
 /// The instance whose duration a constraint bounds.

@@ -97,7 +97,7 @@ pub enum News {
         /// When.
         time: Rational,
         /// Amounts measured.
-        measured: Vec<Measured>,
+        measured: Vec<Amount>,
     },
     /// An action has ended.
     Ended {
@@ -108,7 +108,7 @@ pub enum News {
         /// How.
         ending: Ending,
         /// Amounts measured.
-        measured: Vec<Measured>,
+        measured: Vec<Amount>,
     },
     /// A fact is not as believed.
     Fact(FactId),
@@ -126,6 +126,17 @@ pub enum News {
         /// Since when it should have ended.
         since: Rational,
     },
+}
+
+/// An amount that was measured, and what the domain's expression for it reads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Amount {
+    /// What was measured.
+    pub measured: Measured,
+    /// What `?duration` stands for: how long the action took, or, at its start, is planned to take.
+    pub duration: Option<Rational>,
+    /// The fluents in the expression, as they were before.
+    pub values: Vec<(FluentId, Rational)>,
 }
 
 /// What to do, and why.

@@ -1,14 +1,16 @@
 //! The executors: one file each, and one list of them all.
 //!
 //! To add one: a file with its [`Executor`] and its [`Registered`] entry, and a line in
-//! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
+//! [`EXECUTORS`]. The command line, its help, `docs/executors.md` and the captions of reports are
 //! made from that list.
 
 mod adaptable;
+mod chooser;
 mod esterel;
 mod fixed;
 mod guarded;
 mod live;
+mod lookahead;
 mod stn;
 
 use std::fmt;
@@ -17,6 +19,8 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 use elbowroom_probability::Likelihoods;
+
+pub use lookahead::Foresight;
 
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
@@ -31,6 +35,7 @@ pub const EXECUTORS: &[Registered] = &[
     live::REGISTERED,
     esterel::REGISTERED,
     adaptable::REGISTERED,
+    lookahead::REGISTERED,
 ];
 
 /// What there is to know of an executor before there is one.
@@ -61,6 +66,8 @@ pub struct Means {
     /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
     /// look.
     pub odds: Option<Box<dyn Odds>>,
+    /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
+    pub foresight: Foresight,
 }
 
 impl Means {
@@ -78,6 +85,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
             region,
             likelihoods: Arc::new(Likelihoods::certain()),
             odds: None,
+            foresight: Foresight::default(),
         }
     }
 }
@@ -223,6 +231,7 @@ mod tests {
             "live:5",
             "esterel",
             "adaptable",
+            "lookahead",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);

@@ -45,6 +45,13 @@ impl Horizon {
         Self::OneHop(OneHop { network, happened })
     }
 
+    pub(crate) fn network(&self) -> &Network {
+        match self {
+            Self::Whole(windows) => windows.network(),
+            Self::OneHop(one_hop) => &one_hop.network,
+        }
+    }
+
     pub(crate) fn window(&self, node: NodeId) -> Ends {
         match self {
             Self::Whole(windows) => {
@@ -79,6 +86,14 @@ impl Horizon {
                 }
                 Ok(())
             }
+        }
+    }
+
+    /// From now on a constraint demands only `bound`, or nothing. Who looks one hop far goes by
+    /// the bounds that the plan began with.
+    pub(crate) fn loosen(&mut self, id: ConstraintId, bound: Option<Rational>) {
+        if let Self::Whole(windows) = self {
+            windows.loosen(id, bound);
         }
     }
 

@@ -1,21 +1,22 @@
 //! Amounts that were measured, and what they say about a plan's parameters.
 
-use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
+use elbowroom_model::ground::{Action, Body, Change, Effect, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
 
-use crate::event::Measured;
-use crate::executor::{Moment, News};
-use crate::progression::Progression;
+use crate::executor::{Amount, Moment, News};
 
-/// The value that something measured gives to a parameter.
+/// What an amount that was measured says about the parameters in its expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reading {
-    /// The action in whose effect the parameter stands.
+    /// The action in whose effect they stand.
     pub(crate) action: String,
-    pub(crate) parameter: ParameterId,
-    pub(crate) value: Rational,
+    pub(crate) fluent: String,
+    /// The amount as the domain has it, and its change with each parameter; at least one.
+    pub(crate) constant: Rational,
+    pub(crate) slopes: Vec<(ParameterId, Rational)>,
+    pub(crate) observed: Rational,
 }
 
 /// An amount that differs from what the domain says, where no parameter stands.
@@ -34,21 +35,49 @@ pub(crate) struct Amounts {
     pub(crate) deviations: Vec<Deviation>,
 }
 
-/// Reads the amounts in the news. What else an amount's expression mentions is read as it is
-/// believed now.
+impl Reading {
+    /// The one parameter with the value that it must have had.
+    pub(crate) fn value(&self) -> Option<(ParameterId, Rational)> {
+        let [(parameter, slope)] = self.slopes.as_slice() else {
+            return None;
+        };
+        let value = (&self.observed - &self.constant).checked_div(slope)?;
+        Some((*parameter, value))
+    }
+}
+
+/// An amount that was measured in the news, and where.
+pub(crate) struct Place<'n> {
+    pub(crate) instance: InstanceId,
+    pub(crate) is_end: bool,
+    pub(crate) amount: &'n Amount,
+}
+
+/// All amounts that were measured.
+pub(crate) fn places<'n>(news: &'n [News]) -> impl Iterator<Item = Place<'n>> {
+    news.iter().flat_map(|news| {
+        let (step, is_end, measured): (_, _, &'n [Amount]) = match news {
+            News::Started { step, measured, .. } => (step.0, false, measured),
+            News::Ended { step, measured, .. } => (step.0, true, measured),
+            _ => (0, false, &[]),
+        };
+        measured.iter().map(move |amount| Place {
+            instance: InstanceId(step),
+            is_end,
+            amount,
+        })
+    })
+}
+
+/// Reads the amounts in the news.
 pub(crate) fn amounts(plan: &ParametrizedPlan, moment: &Moment<'_>) -> Amounts {
     let mut amounts = Amounts::default();
-    for news in moment.news {
-        let (step, is_end, measured) = match news {
-            News::Started { step, measured, .. } => (step, false, measured),
-            News::Ended { step, measured, .. } => (step, true, measured),
-            _ => continue,
-        };
-        let action = &plan.plan.instance(InstanceId(step.0)).action;
-        for measured in measured {
-            if let Some(value) = expression(action, is_end, measured) {
-                note(plan, action, value, measured, moment.belief, &mut amounts);
-            }
+    for place in places(moment.news) {
+        let action = &plan.plan.instance(place.instance).action;
+        let fluent = place.amount.measured.fluent;
+        if let Some(value) = expression(action, place.is_end, fluent) {
+            let name = moment.belief.task().fluent_name(fluent);
+            note(plan, &place, name, value, &mut amounts);
         }
     }
     amounts
@@ -66,69 +95,88 @@ pub(crate) fn duration_parameters(
 }
 
 /// What the domain, or the plan, says the amount is.
-fn expression<'a>(action: &'a Action, is_end: bool, measured: &Measured) -> Option<&'a Expression> {
+pub(crate) fn expression(action: &Action, is_end: bool, fluent: FluentId) -> Option<&Expression> {
     let effects: &[Effect] = match (&action.body, is_end) {
         (Body::Instantaneous(snap), _) => &snap.effects,
         (Body::Durative(body), false) => &body.start.effects,
         (Body::Durative(body), true) => &body.end.effects,
     };
     effects.iter().find_map(|effect| match &effect.change {
-        Change::Update { fluent, value, .. } if *fluent == measured.fluent => Some(value),
+        Change::Update {
+            fluent: own, value, ..
+        } if *own == fluent => Some(value),
         _ => None,
     })
 }
 
 fn note(
     plan: &ParametrizedPlan,
-    action: &Action,
+    place: &Place<'_>,
+    fluent: String,
     value: &Expression,
-    measured: &Measured,
-    belief: &Progression,
     amounts: &mut Amounts,
 ) {
+    let Place {
+        instance, amount, ..
+    } = place;
+    // How long it took is known.
+    let is_duration = |index: u32| {
+        let parameter = plan.parameters.get(index as usize);
+        parameter.is_some_and(|own| own.kind == ParameterKind::Duration(*instance))
+    };
     let mut open = Vec::new();
-    value.visit_leaves(&mut |leaf| {
-        if let Expression::Unknown(Unknown::Parameter(index)) = leaf {
+    value.visit_leaves(&mut |leaf| match leaf {
+        Expression::Unknown(Unknown::Parameter(index)) if !is_duration(*index) => {
             open.push(ParameterId(*index));
         }
+        _ => {}
     });
+    open.sort_unstable();
     open.dedup();
-    let at = |unknown: &Rational| {
+    // The amount where one parameter is 1, or none, and the others are 0.
+    let at = |one: Option<ParameterId>| {
         value.evaluate(&mut |leaf| match leaf {
-            Expression::Fluent(fluent) => belief.value(*fluent).cloned(),
-            Expression::Unknown(Unknown::Parameter(_)) => Some(unknown.clone()),
+            Expression::Fluent(fluent) => {
+                let mut values = amount.values.iter();
+                let found = values.find(|(own, _)| own == fluent);
+                found.map(|(_, value)| value.clone())
+            }
+            Expression::Duration => amount.duration.clone(),
+            Expression::Unknown(Unknown::Parameter(index)) if is_duration(*index) => {
+                amount.duration.clone()
+            }
+            Expression::Unknown(Unknown::Parameter(index)) => {
+                let is_one = one == Some(ParameterId(*index));
+                Some(if is_one {
+                    Rational::ONE
+                } else {
+                    Rational::ZERO
+                })
+            }
             _ => None,
         })
     };
-    match open.as_slice() {
-        [] => {
-            let Some(expected) = at(&Rational::ZERO).filter(|value| *value != measured.amount)
-            else {
-                return;
-            };
-            amounts.deviations.push(Deviation {
-                action: action.name.clone(),
-                fluent: belief.task().fluent_name(measured.fluent),
-                expected,
-                observed: measured.amount.clone(),
-            });
-        }
-        &[parameter] => {
-            // The amount is affine in the parameter: two points give the line.
-            let (Some(at_zero), Some(at_one)) = (at(&Rational::ZERO), at(&Rational::ONE)) else {
-                return;
-            };
-            let slope = at_one - &at_zero;
-            if let Some(found) = (&measured.amount - &at_zero).checked_div(&slope) {
-                debug_assert!(parameter.index() < plan.parameters.len());
-                amounts.readings.push(Reading {
-                    action: action.name.clone(),
-                    parameter,
-                    value: found,
-                });
-            }
-        }
-        // One amount says nothing definite about several parameters.
-        _ => {}
+    let observed = amount.measured.amount.clone();
+    let Some(constant) = at(None) else { return };
+    // The amount is affine in the parameters: a point for each gives the plane.
+    let slope = |id: &ParameterId| Some((*id, at(Some(*id))? - &constant));
+    let slopes: Vec<(ParameterId, Rational)> = open.iter().filter_map(slope).collect();
+    let slopes: Vec<_> = slopes.into_iter().filter(|(_, by)| !by.is_zero()).collect();
+    let action = plan.plan.instance(*instance).action.name.clone();
+    if !slopes.is_empty() {
+        amounts.readings.push(Reading {
+            action,
+            fluent,
+            constant,
+            slopes,
+            observed,
+        });
+    } else if constant != observed {
+        amounts.deviations.push(Deviation {
+            action,
+            fluent,
+            expected: constant,
+            observed,
+        });
     }
 }

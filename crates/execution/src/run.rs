@@ -292,6 +292,11 @@ impl<'a> Run<'a> {
 
     /// Plans from here; see [`RunningRule`] for what becomes of what is running.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
+        // What deviated may have been the last thing to do.
+        if self.is_goal_certain() {
+            self.news.clear();
+            return self.goal_reached();
+        }
         if reason.cause != Cause::NewPlan {
             self.reasons.push(reason.clone());
             self.replans += 1;

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Condition, FluentId};
+use elbowroom_model::ground::{Body, Condition, Expression, FluentId};
+use elbowroom_model::problem::Unknown;
 use elbowroom_num::{Interval, Rational};
 
 use crate::stn_plan::{InstanceId, StnPlan};
@@ -118,6 +119,47 @@ impl ParametrizedPlan {
             .iter()
             .map(|parameter| parameter.nominal.clone())
             .collect()
+    }
+
+    /// Whether anything that the plan needs depends on numbers. If not, facts and times are all.
+    pub fn reads_numbers(&self, task: &Task) -> bool {
+        let reads = |condition: &Condition| {
+            let mut reads = false;
+            task.visit_fluents_of(condition, &mut |_| reads = true);
+            reads
+        };
+        let mut instances = self.plan.instances.iter();
+        reads(&self.goal)
+            || instances.any(|instance| match &instance.action.body {
+                Body::Instantaneous(snap) => reads(&snap.condition),
+                Body::Durative(body) => {
+                    reads(&body.start.condition)
+                        || reads(&body.over_all)
+                        || reads(&body.end.condition)
+                }
+            })
+    }
+
+    /// Whether how long actions take makes a difference to any number: it stands in an expression,
+    /// or something changes continuously.
+    pub fn durations_move_numbers(&self) -> bool {
+        let is_duration = |leaf: &Expression| match leaf {
+            Expression::Duration => true,
+            Expression::Unknown(Unknown::Parameter(index)) => {
+                let parameter = self.parameters.get(*index as usize);
+                parameter.is_some_and(|own| matches!(own.kind, ParameterKind::Duration(_)))
+            }
+            _ => false,
+        };
+        self.plan.instances.iter().any(|instance| {
+            let body = instance.action.durative();
+            let mut mentions = body.is_some_and(|body| !body.continuous.is_empty());
+            let _ = instance.action.map_leaves(&mut |leaf| {
+                mentions |= is_duration(leaf);
+                None
+            });
+            mentions
+        })
     }
 
     /// The quantity in plain words: `duration of (move a b)`.

@@ -129,6 +129,7 @@ pub fn plan(
         compiled: &compiled,
         progress,
         best: None,
+        has_resources: !relaxed::floors(&compiled).is_empty(),
     }
     .run()
 }

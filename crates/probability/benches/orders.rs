@@ -20,8 +20,8 @@ fn main() {
 }
 
 /// So many lamps to be screwed in, in any order and also at once; some rattle loose more easily
-/// than others.
-fn lamps(count: usize) -> (Model, Circumstances) {
+/// than others, unless they are alike.
+fn lamps(count: usize, are_alike: bool) -> (Model, Circumstances) {
     let domain =
         "(define (domain lamps) (:types lamp) (:predicates (whole ?l - lamp) (lit ?l - lamp))
         (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
@@ -39,6 +39,9 @@ fn lamps(count: usize) -> (Model, Circumstances) {
         let _ = write!(init, " (whole l{lamp})");
         let _ = write!(goal, " (lit l{lamp})");
         let _ = writeln!(plan, "0: (screw l{lamp}) [1]");
+        if are_alike {
+            continue;
+        }
         // Mixed up, so that no simple rule gives the order.
         let breaks = 0.01 + 0.01 * f64::from(u32::try_from(lamp * 7 % count).unwrap_or(0));
         let dims = 0.01 + 0.005 * f64::from(u32::try_from(lamp * 3 % count).unwrap_or(0));
@@ -128,7 +131,13 @@ fn af3(bencher: divan::Bencher<'_, '_>, number: usize) {
 
 #[divan::bench(args = [3, 5, 7, 8, 10])]
 fn lamps_in_any_order(bencher: divan::Bencher<'_, '_>, count: usize) {
-    let (model, initial) = lamps(count);
+    let (model, initial) = lamps(count, false);
+    first_order(bencher, &model, &initial);
+}
+
+#[divan::bench(args = [3, 5, 10])]
+fn lamps_of_one_kind(bencher: divan::Bencher<'_, '_>, count: usize) {
+    let (model, initial) = lamps(count, true);
     first_order(bencher, &model, &initial);
 }
 
@@ -141,7 +150,7 @@ fn rooms_in_a_row(bencher: divan::Bencher<'_, '_>, count: usize) {
 /// The last of twenty happenings pushed, the success probability asked for, and taken back.
 #[divan::bench]
 fn one_step(bencher: divan::Bencher<'_, '_>) {
-    let (model, initial) = lamps(10);
+    let (model, initial) = lamps(10, false);
     let mut network = PrunedNetwork::new(&model, &initial).expect("not coupled");
     for node in 1..20 {
         network.push(NodeId(node)).expect("not coupled");
@@ -157,7 +166,7 @@ fn one_step(bencher: divan::Bencher<'_, '_>) {
 /// The same without the goal: what one node of the search costs.
 #[divan::bench]
 fn one_push_and_pop(bencher: divan::Bencher<'_, '_>) {
-    let (model, initial) = lamps(10);
+    let (model, initial) = lamps(10, false);
     let mut network = PrunedNetwork::new(&model, &initial).expect("not coupled");
     for node in 1..20 {
         network.push(NodeId(node)).expect("not coupled");

@@ -8,7 +8,8 @@
 //! - there is no time for them: durations, their bounds, timed initials and now leave no schedule;
 //! - no way to go on can beat the best order found (a sharper bound than the paper's P(A), see
 //!   `search/bound.rs`);
-//! - another sequence has done the same and stands at least as well (see `search/memo.rs`).
+//! - another sequence has done the same and stands at least as well (see `search/memo.rs`);
+//! - it has a twin with instances that can stand for each other (see `search/symmetry.rs`).
 //!
 //! Unlike the published code this keeps the best order found, starts from the belief as it is now,
 //! and lets actions be done again that were done before.
@@ -21,6 +22,7 @@ mod nominal;
 mod room;
 mod run;
 mod separations;
+mod symmetry;
 mod timing;
 
 use std::ops::ControlFlow;
@@ -39,6 +41,7 @@ use nominal::Nominal;
 use room::Rooms;
 use run::Run;
 use separations::Separations;
+use symmetry::Symmetry;
 use timing::Timing;
 
 /// Which sequences are orders of the plan.
@@ -110,6 +113,7 @@ pub struct OrderSearch {
     model: Arc<Model>,
     settings: SearchSettings,
     separations: Separations,
+    symmetry: Symmetry,
     bounds: Bounds,
     cache: Cache,
     /// Looked at before all others.
@@ -123,6 +127,7 @@ impl OrderSearch {
         let separations = Separations::of(&model, &settings.epsilon, settings.keeps_interference);
         let bounds = Bounds::of(&model, &separations);
         Self {
+            symmetry: Symmetry::of(&model, &separations),
             model,
             settings,
             separations,

@@ -7,8 +7,12 @@ mod twin;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_plan::NodeId;
+use elbowroom_model::Task;
+use elbowroom_model::ground::FactId;
+use elbowroom_plan::{NodeId, PartialOrderPlan};
 use elbowroom_probability::dispatch::patient;
+use elbowroom_probability::likelihoods;
+use elbowroom_probability::search::Found;
 use elbowroom_probability::{
     Candidates, Circumstances, Likelihoods, Model, OrderSearch, PrunedNetwork, SearchSettings,
     Semantics, TotalOrderPlan,
@@ -135,29 +139,93 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
     assert!(hasty > 100, "{hasty} orders were there from the beginning");
 }
 
-/// Twelve things to do, in any order and also at once: where nothing is uncertain, every order is
-/// as likely and as long as the first.
+/// Lamps of one kind to be screwed in, in any order and also at once.
+fn lamps(count: usize) -> (Task, PartialOrderPlan) {
+    let domain = "(define (domain lamps) (:types lamp)
+        (:predicates (whole ?l - lamp) (lit ?l - lamp) (power))
+        (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
+          :condition (and (at start (whole ?l)) (over all (power)) (at end (whole ?l)))
+          :effect (at end (lit ?l))))";
+    let each = |form: &str| -> String {
+        let numbers = (0..count).map(|number| number.to_string());
+        numbers.map(|number| form.replace('#', &number)).collect()
+    };
+    let problem = format!(
+        "(define (problem p) (:domain lamps) (:objects{} - lamp) (:init (power){})
+           (:goal (and{})))",
+        each(" l#"),
+        each(" (whole l#)"),
+        each(" (lit l#)"),
+    );
+    shared::read_task(domain, &problem, &each("0: (screw l#) [1]\n"))
+}
+
+/// Everything about lamps is uncertain.
+fn frail(task: &Task) -> Likelihoods {
+    let text = "format = \"elbowroom-likelihoods\"\nversion = 1
+        [defaults]\nbecomes_true = 0.02\nbecomes_false = 0.03\nstart = 0.8\neffect = 0.9\n";
+    likelihoods::read(text.as_bytes(), task).unwrap()
+}
+
+/// The best order of all, and how many sequences were looked at.
+fn search((task, plan): (Task, PartialOrderPlan), likelihoods: &Likelihoods) -> Found {
+    let initial = Circumstances::initial(&task);
+    let model = Model::new(Arc::new(task), plan, likelihoods, Semantics::Paper).unwrap();
+    let mut search = OrderSearch::new(model, SearchSettings::default());
+    search.best_order(&initial, &mut patient).unwrap()
+}
+
+/// Where nothing is uncertain, every order is as likely and as long as the first.
 #[test]
 fn a_world_where_nothing_is_uncertain_is_not_searched() {
-    let domain = "(define (domain lamps) (:types lamp)
-        (:predicates (whole ?l - lamp) (lit ?l - lamp))
-        (:durative-action screw :parameters (?l - lamp) :duration (= ?duration 1)
-          :condition (over all (whole ?l)) :effect (at end (lit ?l))))";
-    let lamps =
-        |form: &str| -> String { (0..12).map(|l| form.replace('#', &l.to_string())).collect() };
-    let problem = format!(
-        "(define (problem p) (:domain lamps) (:objects{} - lamp) (:init{}) (:goal (and{})))",
-        lamps(" l#"),
-        lamps(" (whole l#)"),
-        lamps(" (lit l#)"),
-    );
-    let (task, plan) = shared::read_task(domain, &problem, &lamps("0: (screw l#) [1]\n"));
-    let initial = Circumstances::initial(&task);
-    let certain = Likelihoods::certain();
-    let model = Model::new(Arc::new(task), plan, &certain, Semantics::Paper).unwrap();
-    let mut search = OrderSearch::new(model, SearchSettings::default());
-    let found = search.best_order(&initial, &mut patient).unwrap();
+    let found = search(lamps(12), &Likelihoods::certain());
     let order = found.order.unwrap();
     assert_eq!((order.probability, order.sequence.len()), (1.0, 24));
     assert!(found.sequences <= 25, "{} sequences", found.sequences);
+}
+
+/// Ten lamps of one kind have ten factorial orders that are equally likely.
+#[test]
+fn many_instances_of_one_kind_are_searched_to_the_end() {
+    let ten = lamps(10);
+    let likelihoods = frail(&ten.0);
+    let found = search(ten, &likelihoods);
+    assert_eq!(found.order.unwrap().sequence.len(), 20);
+    assert!(found.sequences < 2_000, "{} sequences", found.sequences);
+}
+
+/// Of orders that differ by which lamp is which only one is tried, and it is as good as all. So
+/// too when one of the three may be broken.
+#[test]
+fn of_instances_that_can_stand_for_each_other_one_is_tried() {
+    for candidates in [Candidates::Working, Candidates::All] {
+        for broken in [None, Some("(whole l1)")] {
+            // The twin knows what is nominal only of what is certain.
+            if broken.is_some() && candidates == Candidates::Working {
+                continue;
+            }
+            let (task, plan) = lamps(3);
+            let mut circumstances = Circumstances::initial(&task);
+            if let Some(broken) = broken {
+                let count = u32::try_from(task.fact_count()).unwrap();
+                let mut facts = (0..count).map(FactId);
+                let fact = facts.find(|fact| task.fact_name(*fact) == broken);
+                circumstances.belief.set(fact.unwrap(), 0.7);
+            }
+            let case = Case {
+                text: format!("{candidates:?} {broken:?}"),
+                likelihoods: frail(&task),
+                task: Arc::new(task),
+                plan,
+                circumstances,
+            };
+            let settings = SearchSettings {
+                candidates,
+                ..SearchSettings::default()
+            };
+            for semantics in [Semantics::Paper, Semantics::World] {
+                assert!(compare(&case, semantics, settings.clone()).is_long);
+            }
+        }
+    }
 }

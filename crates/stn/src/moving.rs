@@ -1,5 +1,7 @@
 //! Windows that are kept up to date while one time after another becomes known.
 
+mod loosen;
+
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -25,6 +27,10 @@ pub struct MovingWindows<W = Rational> {
     windows: Vec<Window<W>>,
     /// For each node, what its earliest and its latest time come from.
     sources: Vec<[Source; 2]>,
+    /// For each node, the most that limits on itself say of its earliest and its latest time.
+    limits: Vec<[Option<W>; 2]>,
+    /// For each constraint, whether it demands nothing any more.
+    is_lifted: Vec<bool>,
     queue: BinaryHeap<Reverse<(W, NodeId)>>,
 }
 
@@ -89,6 +95,8 @@ impl<W: Weight> MovingWindows<W> {
             sources: nodes()
                 .map(|node| [source(&before, node), source(&after, node)])
                 .collect(),
+            limits: nodes().map(|_| [None, None]).collect(),
+            is_lifted: vec![false; network.network().constraints().len()],
             origin,
             potential: network.schedule().clone(),
             network: network.into_network(),
@@ -96,7 +104,7 @@ impl<W: Weight> MovingWindows<W> {
         }
     }
 
-    /// The constraints, without the limits.
+    /// The constraints, without the limits. Those that were lifted are still among them.
     pub fn network(&self) -> &Network<W> {
         &self.network
     }
@@ -134,7 +142,12 @@ impl<W: Weight> MovingWindows<W> {
                 by: time.minus(latest),
             });
         }
-        if window.earliest.as_ref().is_none_or(|old| time > old) {
+        let is_new = window.earliest.as_ref().is_none_or(|old| time > old);
+        let limit = &mut self.limits[node.index()][WindowEnd::Earliest as usize];
+        if limit.as_ref().is_none_or(|old| time > old) {
+            *limit = Some(time.clone());
+        }
+        if is_new {
             self.spread(Direction::ToRoot, node, time.negated());
         }
         Ok(())
@@ -146,6 +159,10 @@ impl<W: Weight> MovingWindows<W> {
     /// When it cannot; then the windows stay as they were.
     pub fn not_after(&mut self, node: NodeId, time: &W) -> Result<(), OutOfWindow<W>> {
         self.check_earliest(node, time)?;
+        let limit = &mut self.limits[node.index()][WindowEnd::Latest as usize];
+        if limit.as_ref().is_none_or(|old| time < old) {
+            *limit = Some(time.clone());
+        }
         let window = &self.windows[node.index()];
         if window.latest.as_ref().is_none_or(|old| time < old) {
             self.spread(Direction::FromRoot, node, time.clone());
@@ -189,6 +206,11 @@ impl<W: Weight> MovingWindows<W> {
     /// Shortens the distance of one node to `distance`, and with it those of others.
     fn spread(&mut self, direction: Direction, node: NodeId, distance: W) {
         self.shorten(direction, node, distance, Source::Limit);
+        self.settle(direction);
+    }
+
+    /// Hands on the distances of all that are queued.
+    fn settle(&mut self, direction: Direction) {
         while let Some(Reverse((key, node))) = self.queue.pop() {
             let distance = self
                 .distance(direction, node)
@@ -199,6 +221,9 @@ impl<W: Weight> MovingWindows<W> {
             let mut next = self.network.first(node, direction);
             while let Some(id) = next {
                 next = self.network.after(id, direction);
+                if self.is_lifted(id) {
+                    continue;
+                }
                 let constraint = self.network.constraint(id);
                 let far = direction.far_end(constraint);
                 let through = distance.plus(&constraint.bound);
@@ -211,6 +236,10 @@ impl<W: Weight> MovingWindows<W> {
                 }
             }
         }
+    }
+
+    fn is_lifted(&self, id: ConstraintId) -> bool {
+        self.is_lifted[id.index()]
     }
 
     /// The latest time, or the earliest one negated: the length of a shortest path.

@@ -144,6 +144,11 @@ impl<W: Weight> Network<W> {
         id
     }
 
+    /// Changes what a constraint demands.
+    pub(crate) fn set_bound(&mut self, id: ConstraintId, bound: W) {
+        self.constraints[id.index()].bound = bound;
+    }
+
     /// How many nodes there are; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
     pub fn node_count(&self) -> usize {
         self.leaving.node_count()

@@ -157,6 +157,13 @@ impl Direction {
         }
     }
 
+    pub(crate) fn opposite(self) -> Self {
+        match self {
+            Direction::FromRoot => Direction::ToRoot,
+            Direction::ToRoot => Direction::FromRoot,
+        }
+    }
+
     pub(crate) fn key<W: Weight>(self, distance: &W, node: NodeId, schedule: &Schedule<W>) -> W {
         match self {
             Direction::FromRoot => distance.minus(&schedule[node]),

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::testing::consistent_networks;
 use elbowroom_stn::{
-    ConsistentNetwork, Constraint, ConstraintId, MovingWindows, NodeId, WindowEnd,
+    ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
 };
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -76,6 +76,68 @@ proptest! {
             let windows = plain.windows(NodeId(0));
             for (node, window) in windows.iter() {
                 prop_assert_eq!(moving.window(node), window, "{:?} after {:?}", node, limit);
+            }
+            every_end_has_its_grounds(&moving)?;
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    /// Limits and constraints that bind less, mixed: as if both had been so from the beginning.
+    #[test]
+    fn loosened_windows_are_those_of_the_loosened_network(
+        (network, _) in consistent_networks(),
+        steps in limits(),
+        loosened in prop::collection::vec((any::<Index>(), prop::option::of(0..9_i64)), 1..12),
+    ) {
+        let origin = NodeId(0);
+        let consistent = |network: &Network| ConsistentNetwork::try_from(network.clone());
+        let mut plain = network.clone();
+        let mut moving = MovingWindows::new(consistent(&network).expect("consistent"), origin);
+        let mut known = Vec::new();
+        let ids: Vec<ConstraintId> = network.constraint_ids().collect();
+        let mut lifted = Vec::new();
+        for (step, (limit, node, time)) in steps.into_iter().enumerate() {
+            let node = NodeId(u32::try_from(node.index(network.node_count())).expect("few nodes"));
+            let time = Rational::new(time, 2);
+            let answer = match limit {
+                Limit::Fix => moving.fix(node, &time),
+                Limit::NotBefore => moving.not_before(node, &time),
+                Limit::NotAfter => moving.not_after(node, &time),
+            };
+            if answer.is_ok() {
+                known.push((limit, node, time));
+            }
+            if let (Some((which, by)), false) = (loosened.get(step), ids.is_empty()) {
+                let id = ids[which.index(ids.len())];
+                let raised = by.map(|by| &plain.constraint(id).bound + Rational::from(by));
+                moving.loosen(id, raised.clone());
+                match raised {
+                    None => lifted.push(id),
+                    Some(_) if lifted.contains(&id) => {}
+                    Some(raised) => {
+                        let mut changed = Network::with_nodes(plain.node_count());
+                        for other in plain.constraint_ids() {
+                            let mut constraint = plain.constraint(other).clone();
+                            if other == id {
+                                constraint.bound = raised.clone();
+                            }
+                            changed.add(constraint);
+                        }
+                        plain = changed;
+                    }
+                }
+                lifted.sort();
+                lifted.dedup();
+            }
+            let mut rest = consistent(&plain.without(&lifted)).expect("still consistent");
+            for (limit, node, time) in &known {
+                rest = plainly(&rest, *limit, *node, time).expect("it was before");
+            }
+            for (node, window) in rest.windows(origin).iter() {
+                prop_assert_eq!(moving.window(node), window, "{:?} in step {}", node, step);
             }
             every_end_has_its_grounds(&moving)?;
         }

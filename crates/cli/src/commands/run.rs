@@ -10,7 +10,7 @@ mod trace_file;
 use std::sync::Arc;
 
 use elbowroom::execute::{Analyst, WholeRegion, check_vary};
-use elbowroom::execution::executors::{ExecutorSpec, Means};
+use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
 };
@@ -283,6 +283,7 @@ impl Choices {
             }),
             likelihoods: Arc::clone(&self.likelihoods),
             odds: planning.odds,
+            foresight: Foresight::default(),
         });
         let ports = Ports {
             world,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use elbowroom_execution::executors::{ExecutorSpec, Means};
+use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom_execution::run::{self, PlanningTime, Ports, Report, Verdict};
 use elbowroom_execution::{NoRecord, PlanAnswer, Planner, Preparer, World};
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
@@ -47,6 +47,7 @@ struct Common<'a> {
 struct Place {
     world: WorldModel,
     likelihoods: Arc<Likelihoods>,
+    foresight: Foresight,
     preparer: RememberingPreparer<Analyst>,
     /// For executors that look for likelier plans: who makes them, and the same with a memory.
     odds: SharedLikeliest,
@@ -136,6 +137,7 @@ impl Setting<'_> {
         Ok(Place {
             world,
             likelihoods: Arc::new(likelihoods),
+            foresight: Foresight::default(),
             preparer,
             likeliest: RememberingPlanner::new(odds.clone(), PLANS),
             odds,
@@ -187,6 +189,7 @@ impl Setting<'_> {
         let Place {
             world,
             likelihoods,
+            foresight,
             preparer,
             odds,
             likeliest,
@@ -210,6 +213,7 @@ impl Setting<'_> {
             region,
             likelihoods: Arc::clone(likelihoods),
             odds,
+            foresight: foresight.clone(),
         });
         let ports = Ports {
             world,

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use elbowroom_envelope::{Oracle, irr};
 use elbowroom_execution::{Need, Prepared, Preparer, Region};
-use elbowroom_model::ground::{Body, Condition};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
@@ -128,7 +127,7 @@ impl Region for WholeRegion {
         plan: &ParametrizedPlan,
         values: &[Rational],
     ) -> Option<String> {
-        if !reads_numbers(task, plan) {
+        if !plan.reads_numbers(task) {
             // What facts need is in the network, whatever the durations; the executor has it.
             return None;
         }
@@ -148,25 +147,4 @@ impl Region for WholeRegion {
         let envelope = DecoupledEnvelope::point(values);
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
-}
-
-/// Whether anything that a plan needs depends on numbers.
-fn reads_numbers(task: &Task, plan: &ParametrizedPlan) -> bool {
-    let reads = |condition: &Condition| {
-        let mut reads = false;
-        task.visit_fluents_of(condition, &mut |_| reads = true);
-        reads
-    };
-    let instances = plan.plan.instances.iter();
-    reads(&plan.goal)
-        || instances
-            .map(|instance| &instance.action.body)
-            .any(|body| match body {
-                Body::Instantaneous(snap) => reads(&snap.condition),
-                Body::Durative(body) => {
-                    reads(&body.start.condition)
-                        || reads(&body.over_all)
-                        || reads(&body.end.condition)
-                }
-            })
 }

@@ -82,6 +82,23 @@ fn an_order_that_misses_its_deadline_is_not_chosen() {
     assert!(is_valid(&scene, &report));
 }
 
+/// The next start is decided when it is known what has become of the one before: after no time, where
+/// that is told at once.
+#[test]
+fn starts_that_are_due_at_once_begin_at_once() {
+    let scene = field(7);
+    let starts = |world: &str| {
+        let report = scene.run("adaptable", &scene.world(world), 1);
+        assert_eq!(report.verdict, Verdict::GoalReached);
+        [times(&report, "photo").0, times(&report, "sample").0]
+    };
+    assert_eq!(starts(""), [Rational::ZERO, Rational::ZERO]);
+    let late = "[[delay]]\naction = \"*\"\nconstant = 0.5\n";
+    let mut late = starts(late);
+    late.sort();
+    assert_eq!(late, [Rational::new(1, 2), Rational::ONE]);
+}
+
 #[test]
 fn what_has_come_about_by_itself_is_skipped() {
     let scene = field(100);
@@ -116,4 +133,39 @@ fn what_fails_is_tried_again_as_long_as_its_likelihoods_explain_it() {
             .all(|reason| reason.cause == Cause::Failed)
     );
     assert_eq!(report.starts, 20 * report.reasons.len());
+    // Nor is it tried for ever where next to nothing starts; and trying again takes no time here.
+    let hopeless = CHANCES.replace("start = 0.5", "start = 1e-9");
+    let scene = field(100).with_likelihoods(&hopeless);
+    for executor in ["adaptable", "lookahead"] {
+        let report = scene.run(executor, &fails("1"), 1);
+        assert_eq!(report.verdict, Verdict::ReplanLimit);
+        assert_eq!(report.starts, 1000 * report.reasons.len(), "{executor}");
+    }
+}
+
+/// Someone takes the rock away while the command to sample it is on its way: no wonder that it
+/// fails, and no reason to give the plan up, where rocks come back.
+#[test]
+fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
+    let domain = DOMAIN.replace("(over all (rock))", "(at start (rock))");
+    let problem = "(define (problem day) (:domain field) (:init (light) (rock) (photo) (report))
+        (:goal (sample)))";
+    let chances = CHANCES.replace("start = 0.5", "start = 1.0");
+    let plan = Some("0: (take-sample) [3]");
+    let event = |becomes: bool, time: &str| {
+        format!("[[event]]\nfact = \"(rock)\"\nbecomes = {becomes}\nconstant = {time}\n")
+    };
+    let late = "[[delay]]\naction = \"*\"\nconstant = 1\n";
+    let (gone, back) = (event(false, "0.25"), event(true, "0.5"));
+    let run = |world: &str| {
+        let scene = Scene::new(&domain, problem, plan).with_likelihoods(&chances);
+        scene.run("adaptable", &scene.world(world), 1)
+    };
+    // It is back before the action would start.
+    let report = run(&format!("{late}{gone}{back}"));
+    assert_eq!((report.starts, report.replans), (1, 0), "{report:#?}");
+    // It is not; and then there is no order, but that is all that is wrong.
+    let report = run(&format!("{late}{gone}"));
+    assert_eq!(report.verdict, Verdict::Unsolvable);
+    assert_eq!(report.reasons[0].cause, Cause::NoOrder, "{report:#?}");
 }

@@ -67,7 +67,7 @@ fn a_column_says_how_likely_everything_is() {
     let untold = clumsy(&|text| {
         let lines = text.lines();
         let kept = lines.filter(|line| !line.starts_with("likelihoods"));
-        kept.map(|line| format!("{line}\n")).collect()
+        kept.collect::<Vec<_>>().join("\n")
     });
     let untold = untold.expect("a correct test");
     let part = Part {

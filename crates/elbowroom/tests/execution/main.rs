@@ -1,12 +1,14 @@
 //! Whole runs: executors, worlds, planner and envelopes together.
 
 mod adaptable;
+mod amounts;
 mod bad_worlds;
 mod campaigns;
 mod esterel;
 mod guarantee;
 mod handover;
 mod likelier;
+mod lookahead;
 mod others;
 mod reasons;
 mod reports;

@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use crate::shared;
 
 /// The executors of paper 2.
-const BY_LIKELIHOODS: &[&str] = &["adaptable", "esterel"];
+const BY_LIKELIHOODS: &[&str] = &["adaptable", "esterel", "lookahead"];
 
 /// Robot deliveries with batteries and deadlines, and rovers with and without energy.
 const PROBLEMS: &[(&str, &[&str])] = &[

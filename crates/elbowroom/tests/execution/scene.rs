@@ -16,8 +16,15 @@ use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
 /// The executors that there are, one of each.
-pub(crate) const EXECUTORS: &[&str] =
-    &["fixed:30", "stn", "guarded", "live", "esterel", "adaptable"];
+pub(crate) const EXECUTORS: &[&str] = &[
+    "fixed:30",
+    "stn",
+    "guarded",
+    "live",
+    "esterel",
+    "adaptable",
+    "lookahead",
+];
 
 /// A problem with a plan.
 pub(crate) struct Scene {

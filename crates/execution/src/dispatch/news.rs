@@ -61,6 +61,7 @@ impl Dispatch {
         let local = self.local(time);
         let fixed = self.horizon.fix(network_node(start), &local);
         self.progress.happen(&self.plan, start, &local);
+        self.leave_open(id);
         self.progress.ready.remove(&start);
         self.retries.remove(&start);
         if start == end {
@@ -120,7 +121,8 @@ impl Dispatch {
     ) -> Reason {
         let name = self.action(id).name.clone();
         let mut reason = if is_own {
-            let mut reason = Reason::new(Cause::OutsideInterval).about("duration");
+            let about = self.duration_in_words(id);
+            let mut reason = Reason::new(Cause::OutsideInterval).about(about);
             reason.observed = duration;
             reason.allowed = Some(explain::interval(&self.durations[id.index()]));
             reason

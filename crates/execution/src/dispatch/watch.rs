@@ -138,6 +138,9 @@ impl Dispatch {
             let is_own = node == end && self.is_limited_by_duration(id, WindowEnd::Latest);
             let mut reason = if is_own {
                 let mut reason = Reason::new(Cause::Outlived);
+                if self.resumed.contains(&id) {
+                    reason = reason.about(self.duration_in_words(id));
+                }
                 reason.observed = self.happened(start).map(|start| &now - start);
                 reason.allowed = Some(explain::interval(&self.durations[id.index()]));
                 reason

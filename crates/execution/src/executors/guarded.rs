@@ -1,6 +1,6 @@
 //! `guarded`: paper 1's executor DREEX.
 
-use elbowroom_num::Rational;
+use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParameterId};
 
 use super::Registered;
@@ -79,21 +79,58 @@ impl Executor for Guarded {
 }
 
 impl Guard {
-    /// Why a parameter's observed value is not guaranteed to do.
+    /// Why an amount that was measured is not guaranteed to do.
     fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
-        let interval = self.envelope.interval(reading.parameter);
-        if interval.contains(&reading.value) {
+        let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {
+            let name = self.mission.plan.parameter(parameter).name.clone();
+            (name, value, self.envelope.interval(parameter).clone())
+        } else {
+            let about = format!("change of {}", reading.fluent);
+            (about, reading.observed.clone(), self.guaranteed(reading))
+        };
+        if allowed.contains(&observed) {
             return None;
         }
-        let name = &self.mission.plan.parameter(reading.parameter).name;
-        let mut reason = Reason::new(Cause::OutsideInterval).about(name.as_str());
+        let mut reason = Reason::new(Cause::OutsideInterval).about(about);
         reason.action = Some(reading.action.clone());
-        let below = interval.lower.value().map(|lower| lower - &reading.value);
-        let above = interval.upper.value().map(|upper| &reading.value - upper);
+        let below = allowed.lower.value().map(|lower| lower - &observed);
+        let above = allowed.upper.value().map(|upper| &observed - upper);
         reason.by = below.into_iter().chain(above).max();
-        reason.observed = Some(reading.value.clone());
-        reason.allowed = Some(interval.clone());
+        reason.observed = Some(observed);
+        reason.allowed = Some(allowed);
         Some(reason.since(now.clone()))
+    }
+
+    /// The amounts that come about while each of several parameters is in its interval. Which
+    /// values they had is not known, but that they had some of these is all the guarantee asks.
+    fn guaranteed(&self, reading: &Reading) -> Interval {
+        let mut amounts = Interval::point(reading.constant.clone());
+        for (parameter, slope) in &reading.slopes {
+            let interval = self.envelope.interval(*parameter);
+            let (low, high) = (&interval.lower, &interval.upper);
+            let (low, high) = if slope.is_negative() {
+                (high, low)
+            } else {
+                (low, high)
+            };
+            amounts.lower = moved(&amounts.lower, low, slope);
+            amounts.upper = moved(&amounts.upper, high, slope);
+        }
+        amounts
+    }
+}
+
+/// The end of an interval moved by `slope` times another one.
+fn moved(end: &End, by: &End, slope: &Rational) -> End {
+    match (end.value(), by.value()) {
+        (Some(value), Some(by_value)) => {
+            let sum = value + by_value * slope;
+            match (end, by) {
+                (End::Closed(_), End::Closed(_)) => End::Closed(sum),
+                _ => End::Open(sum),
+            }
+        }
+        _ => End::Infinite,
     }
 }
 

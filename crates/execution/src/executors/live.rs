@@ -1,16 +1,22 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
+mod limits;
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{
-    Bound, Constraint, InstanceId, NodeId, ParameterKind, ParametrizedPlan, Valuation,
+    Bound, Constraint, InstanceId, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
 };
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
+use crate::event::Measured;
 use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
 use crate::preparation::{Need, Region};
-use crate::quantities::{amounts, duration_parameters};
+use crate::quantities::{amounts, duration_parameters, places};
 use crate::reason::{Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -48,19 +54,36 @@ struct Rest {
     mission: Mission,
     /// What was observed, and for the rest what is planned.
     values: Valuation,
+    /// The amounts that were observed: by which instance, at its end or its start.
+    amounts: Vec<(InstanceId, bool, Measured)>,
+    /// Whether the plan needs numbers at all, and whether durations move any.
+    reads_numbers: bool,
+    durations_move_numbers: bool,
+    /// How long the actions under way may take, where the numbers limit it.
+    limits: BTreeMap<InstanceId, Rational>,
 }
 
 impl Executor for Live {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        let values = mission.plan.nominal();
-        let bounds = |constraint: &Constraint| nominal_bounds(constraint, &values);
+        let plan = &mission.plan;
+        let values = plan.nominal();
+        let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
+        let bounds = |constraint: &Constraint| bounds(plan, constraint, &values, &runs);
+        let mut dispatch = Dispatch::new(mission, Sight::Whole, &bounds)?;
+        for (parameter, instance) in duration_parameters(plan) {
+            dispatch.leave_open_when_running(instance, range(plan, parameter));
+        }
+        let reads_numbers = plan.reads_numbers(&mission.task);
         let mut rest = Rest {
-            dispatch: Dispatch::new(mission, Sight::Whole, &bounds)?,
+            dispatch,
             mission: mission.clone(),
-            values: values.clone(),
+            amounts: Vec::new(),
+            reads_numbers,
+            durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
+            limits: BTreeMap::new(),
+            values,
         };
-        // With more freedom for what runs already, there still are times that satisfy everything.
-        let _ = rest.rebound();
+        rest.find_limits(&mission.now, self.region.as_mut());
         self.state = Some(rest);
         Ok(())
     }
@@ -79,7 +102,11 @@ impl Executor for Live {
         {
             return replan(reason);
         }
-        rest.dispatch.next(moment)
+        if let Some(reason) = rest.outlived(moment.now) {
+            return replan(reason);
+        }
+        let decided = rest.dispatch.next(moment);
+        rest.waking(decided)
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
@@ -93,22 +120,26 @@ impl Rest {
         if let Some(reason) = self.dispatch.take(moment) {
             return Some(reason);
         }
-        self.observe(moment);
-        if let Err(behind) = self.rebound() {
+        if self.observe(moment)
+            && let Err(behind) = self.rebound()
+        {
             let mut reason = Reason::new(Cause::GuaranteeLost)
                 .about("even if nothing deviates any more, too little time is left");
             reason.behind = behind;
             return Some(Box::new(reason.since(moment.now.clone())));
         }
         // Only ends and amounts can move the rest out of its envelope.
-        let is_end = |news: &News| matches!(news, News::Ended { .. });
-        if !moment.news.iter().any(is_end) {
-            return None;
+        let step = moment.news.iter().find_map(may_matter);
+        if let Some(step) = step.filter(|_| self.reads_numbers) {
+            let (plan, values) = self.remainder(moment.now);
+            if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
+                let action = &self.dispatch.action(InstanceId(step.0)).name;
+                let reason = Reason::new(Cause::GuaranteeLost).of(action).about(why);
+                return Some(Box::new(reason.since(moment.now.clone())));
+            }
         }
-        let (plan, values) = self.remainder(moment.now);
-        let why = region.objection(&self.mission.task, &plan, &values)?;
-        let reason = Reason::new(Cause::GuaranteeLost).about(why);
-        Some(Box::new(reason.since(moment.now.clone())))
+        self.find_limits(moment.now, region);
+        None
     }
 
     /// Why another plan is to be preferred. Asked when an action has ended and nothing is under
@@ -156,23 +187,16 @@ impl Rest {
     /// Goes by the present values: what runs may take as long as it likes, what is to come takes
     /// as long as planned.
     fn rebound(&mut self) -> Result<(), Vec<String>> {
-        let nodes = |id: &InstanceId| self.dispatch.nodes_of(*id);
-        let running: Vec<[NodeId; 2]> = self.dispatch.running().iter().map(nodes).collect();
+        let running = self.dispatch.running().clone();
+        let runs = |instance: InstanceId| running.contains(&instance);
         let (plan, values) = (&self.mission.plan, &self.values);
-        let bounds = |constraint: &Constraint| -> Bounds {
-            match &constraint.lower {
-                Bound::Parameter(id) if running.contains(&[constraint.from, constraint.to]) => {
-                    let range = &plan.parameter(*id).range;
-                    (range.lower.value().cloned(), range.upper.value().cloned())
-                }
-                _ => nominal_bounds(constraint, values),
-            }
-        };
+        let bounds = |constraint: &Constraint| bounds(plan, constraint, values, &runs);
         self.dispatch.rebound(&bounds)
     }
 
-    /// Puts observed values in place of planned ones.
-    fn observe(&mut self, moment: &Moment<'_>) {
+    /// Puts observed values in place of planned ones. Whether other times follow from them than
+    /// from what has happened.
+    fn observe(&mut self, moment: &Moment<'_>) -> bool {
         for (parameter, instance) in duration_parameters(&self.mission.plan) {
             let [start, end] = self.dispatch.nodes_of(instance);
             let happened = |node| self.dispatch.happened(node);
@@ -180,9 +204,22 @@ impl Rest {
                 self.values[parameter.index()] = end - start;
             }
         }
-        for reading in amounts(&self.mission.plan, moment).readings {
-            self.values[reading.parameter.index()] = reading.value;
+        for place in places(moment.news) {
+            let measured = place.amount.measured.clone();
+            self.amounts.push((place.instance, place.is_end, measured));
         }
+        let mut moves_times = false;
+        for reading in amounts(&self.mission.plan, moment).readings {
+            // Of one amount in which several stand nobody knows which it was.
+            if let Some((parameter, value)) = reading.value() {
+                let bound = Bound::Parameter(parameter);
+                let mut constraints = self.mission.plan.plan.constraints.iter();
+                moves_times |= self.values[parameter.index()] != value
+                    && constraints.any(|own| own.lower == bound || own.upper == bound);
+                self.values[parameter.index()] = value;
+            }
+        }
+        moves_times
     }
 
     /// The plan with what has happened fixed and the rest not before now, and the values at which
@@ -191,6 +228,10 @@ impl Rest {
         let mut plan = self.mission.plan.clone();
         let mut values = self.values.clone();
         let now = self.dispatch.local(now);
+        for (instance, is_end, measured) in &self.amounts {
+            let action = &mut plan.plan.instances[instance.index()].action;
+            set_amount(action, *is_end, measured);
+        }
         let nodes: Vec<_> = plan.plan.nodes().skip(1).collect();
         for (node, what) in nodes {
             let (lower, upper) = match (self.dispatch.happened(node), what) {
@@ -222,12 +263,54 @@ impl Rest {
     }
 }
 
-/// Every parameter has its value.
-fn nominal_bounds(constraint: &Constraint, values: &[Rational]) -> Bounds {
+/// The bounds of a parameter's values.
+fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
+    let range = &plan.parameter(parameter).range;
+    (range.lower.value().cloned(), range.upper.value().cloned())
+}
+
+/// What runs may take as long as it likes, and every other parameter has its value.
+fn bounds(
+    plan: &ParametrizedPlan,
+    constraint: &Constraint,
+    values: &[Rational],
+    runs: &dyn Fn(InstanceId) -> bool,
+) -> Bounds {
+    if let Bound::Parameter(parameter) = &constraint.lower
+        && let ParameterKind::Duration(instance) = plan.parameter(*parameter).kind
+        && runs(instance)
+    {
+        return range(plan, *parameter);
+    }
     let value = |bound: &Bound| match bound {
         Bound::Infinite => None,
         Bound::Finite(value) => Some(value.clone()),
         Bound::Parameter(id) => Some(values[id.index()].clone()),
     };
     (value(&constraint.lower), value(&constraint.upper))
+}
+
+/// The step whose news can move the rest of a plan out of its envelope.
+fn may_matter(news: &News) -> Option<StepId> {
+    match news {
+        News::Ended { step, .. } => Some(*step),
+        News::Started { step, measured, .. } => (!measured.is_empty()).then_some(*step),
+        _ => None,
+    }
+}
+
+/// Puts the amount that was measured in place of what the domain says.
+fn set_amount(action: &mut Action, is_end: bool, measured: &Measured) {
+    let effects: &mut [Effect] = match &mut action.body {
+        Body::Instantaneous(snap) => &mut snap.effects,
+        Body::Durative(body) if is_end => &mut body.end.effects,
+        Body::Durative(body) => &mut body.start.effects,
+    };
+    for effect in effects {
+        if let Change::Update { fluent, value, .. } = &mut effect.change
+            && *fluent == measured.fluent
+        {
+            *value = Expression::Constant(measured.amount.clone());
+        }
+    }
 }

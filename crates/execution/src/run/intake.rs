@@ -1,11 +1,12 @@
 //! Taking in what the world reports: each report once, and no report against reason.
 
-use elbowroom_model::ground::{Body, Change};
+use elbowroom_model::ground::{Action, Body, Change, Expression};
 use elbowroom_num::Rational;
 
 use super::{Run, Stop};
 use crate::event::{Ending, Event, Measured, Observation, Ticket};
-use crate::executor::{News, Planned};
+use crate::executor::{Amount, News, Planned};
+use crate::quantities;
 use crate::record::Entry;
 
 /// What is wrong with a report that is not taken at its word.
@@ -100,6 +101,7 @@ impl Run<'_> {
         let (action, step) = (entry.action.clone(), entry.step);
         let planned = entry.planned.clone().unwrap_or_default();
         self.believe_until(time);
+        let amounts = self.amounts(&action, false, Some(&planned), measured);
         // An effect that cannot be computed leaves its fluent as it was.
         let _ = self.belief.start(ticket, &action, &planned, measured);
         self.account.note_start(ticket, time, measured);
@@ -107,7 +109,7 @@ impl Run<'_> {
             Some(step) => self.news.push(News::Started {
                 step,
                 time: time.clone(),
-                measured: measured.to_vec(),
+                measured: amounts,
             }),
             None => self.tell_effects(ticket, false),
         }
@@ -143,7 +145,12 @@ impl Run<'_> {
         }
         let step = self.account.get(ticket).and_then(|entry| entry.step);
         self.believe_until(&time);
+        let mut amounts = Vec::new();
         if *ending == Ending::Succeeded {
+            if let Some(underway) = self.belief.running().get(&ticket) {
+                let (action, took) = (underway.action.clone(), &time - &underway.start);
+                amounts = self.amounts(&action, true, Some(&took), measured);
+            }
             let _ = self.belief.end(ticket, measured);
         } else {
             self.belief.stop(ticket);
@@ -162,7 +169,7 @@ impl Run<'_> {
                 step,
                 time,
                 ending: ending.clone(),
-                measured: measured.to_vec(),
+                measured: amounts,
             }),
             None if *ending == Ending::Succeeded => self.tell_effects(ticket, true),
             None => {}
@@ -172,6 +179,33 @@ impl Run<'_> {
             () if is_too_early => Some("its time is before its start; taken as then"),
             () => None,
         }
+    }
+
+    /// What was measured, with what the domain reads for it; to be asked before it takes effect.
+    fn amounts(
+        &self,
+        action: &Action,
+        is_end: bool,
+        duration: Option<&Rational>,
+        measured: &[Measured],
+    ) -> Vec<Amount> {
+        let amount = |measured: &Measured| {
+            let mut values = Vec::new();
+            if let Some(expression) = quantities::expression(action, is_end, measured.fluent) {
+                expression.visit_leaves(&mut |leaf| {
+                    if let Expression::Fluent(fluent) = leaf {
+                        let value = self.belief.value(*fluent);
+                        values.extend(value.map(|value| (*fluent, value.clone())));
+                    }
+                });
+            }
+            Amount {
+                measured: measured.clone(),
+                duration: duration.cloned(),
+                values,
+            }
+        };
+        measured.iter().map(amount).collect()
     }
 
     /// Two reports exclude each other: nobody knows what the action's end has done.

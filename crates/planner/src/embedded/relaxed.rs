@@ -11,9 +11,11 @@
 mod deadlines;
 mod graph;
 mod numbers;
+mod plan;
+mod resources;
 
 use super::apply::Step;
-use super::compile::{Compiled, Eagerness, NONE};
+use super::compile::{Compiled, Eagerness};
 use super::formula::Literal;
 use super::guide::Guide;
 use super::network::SETTLED;
@@ -23,6 +25,8 @@ use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
 use graph::Kind;
+use resources::Resources;
+pub(crate) use resources::floors;
 
 /// Beyond this, costs are all alike.
 const MOST: u32 = 1 << 15;
@@ -70,6 +74,7 @@ pub(crate) struct Relaxed<'a> {
     buckets: Vec<Vec<u32>>,
     applicable: Vec<u32>,
     deadlines: Deadlines,
+    resources: Resources,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
 }
@@ -81,6 +86,7 @@ impl<'a> Relaxed<'a> {
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
+            resources: Resources::default(),
             cost: vec![UNREACHED; propositions],
             achiever: vec![NO_OPERATOR; propositions],
             repetitions: vec![1; propositions],
@@ -100,6 +106,11 @@ impl<'a> Relaxed<'a> {
     /// From now on a step counts for what it costs, not for one.
     pub(crate) fn weigh(&mut self, guide: &Guide) {
         self.graph.weigh(guide);
+    }
+
+    /// From now on, what a relaxed plan uses up is counted, and filled up.
+    pub(crate) fn count_resources(&mut self) {
+        self.resources = Resources::of(self.compiled, &self.graph);
     }
 
     /// The number of operators.
@@ -328,79 +339,6 @@ impl<'a> Relaxed<'a> {
             buckets[cost as usize].push(proposition);
         }
     }
-
-    /// Counts the steps of a relaxed plan, and notes its first steps.
-    fn extract(&mut self, state: &State, estimate: &mut Estimate) {
-        let mut wanted: Vec<u32> = self.graph.goal.clone();
-        let mut used: Vec<u32> = Vec::new();
-        let mut touched: Vec<u32> = Vec::new();
-        for open in &state.open {
-            let end = self.graph.end_of[open.action as usize];
-            Self::use_operator(&mut self.is_used, &mut used, end);
-            let needs = self.graph.operators[end as usize].preconditions.clone();
-            wanted.extend_from_slice(&self.graph.preconditions[needs]);
-        }
-        while let Some(proposition) = wanted.pop() {
-            let index = proposition as usize;
-            if self.cost[index] == 0 || std::mem::replace(&mut self.is_wanted[index], true) {
-                continue;
-            }
-            touched.push(proposition);
-            let operator = self.achiever[index];
-            let data = &self.graph.operators[operator as usize];
-            estimate.steps += (self.repetitions[index] - 1) * data.cost;
-            if Self::use_operator(&mut self.is_used, &mut used, operator) {
-                wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
-                if let Kind::Start(action) = data.kind {
-                    // What starts must end.
-                    let end = self.graph.end_of[action as usize];
-                    if end != NONE
-                        && self.missing[end as usize] == 0
-                        && Self::use_operator(&mut self.is_used, &mut used, end)
-                    {
-                        let needs = self.graph.operators[end as usize].preconditions.clone();
-                        wanted.extend_from_slice(&self.graph.preconditions[needs]);
-                    }
-                }
-            }
-        }
-        for &operator in &used {
-            let data = &self.graph.operators[operator as usize];
-            estimate.steps += data.cost;
-            self.is_used[operator as usize] = false;
-            let is_next = self.operator_cost[operator as usize] == data.cost;
-            if is_next || matches!(data.kind, Kind::Timed(_)) {
-                push_steps(data.kind, state, &mut estimate.preferred);
-            }
-        }
-        for proposition in touched {
-            self.is_wanted[proposition as usize] = false;
-        }
-        estimate.preferred.sort_unstable();
-        estimate.preferred.dedup();
-    }
-
-    fn use_operator(is_used: &mut [bool], used: &mut Vec<u32>, operator: u32) -> bool {
-        let is_new = !std::mem::replace(&mut is_used[operator as usize], true);
-        if is_new {
-            used.push(operator);
-        }
-        is_new
-    }
-
-    fn list_applicable(&mut self, state: &State, estimate: &mut Estimate) {
-        for &operator in &self.applicable {
-            let kind = self.graph.operators[operator as usize].kind;
-            if !matches!(kind, Kind::Timed(_)) {
-                push_steps(kind, state, &mut estimate.applicable);
-            }
-        }
-        if (state.timed as usize) < self.compiled.timed.len() {
-            estimate.applicable.push(Step::Timed);
-        }
-        estimate.applicable.sort_unstable();
-        estimate.applicable.dedup();
-    }
 }
 
 /// When the literal of a timetable last becomes false.
@@ -418,21 +356,4 @@ fn depends_on_times(compiled: &Compiled, test: u32, state: &State) -> bool {
     let difference = &compiled.tests[test as usize].difference;
     difference.visit_fluents(&mut |fluent| depends |= symbolic.governs(fluent));
     depends
-}
-
-/// The steps that an operator stands for.
-fn push_steps(kind: Kind, state: &State, steps: &mut Vec<Step>) {
-    match kind {
-        Kind::Start(action) => steps.push(Step::Start(action)),
-        Kind::Whole(action) => steps.push(Step::Whole(action)),
-        Kind::End(action) => {
-            for (place, open) in (0..).zip(&state.open) {
-                if open.action == action {
-                    steps.push(Step::End(place));
-                }
-            }
-        }
-        Kind::Timed(_) => steps.push(Step::Timed),
-        Kind::Axiom => {}
-    }
 }

@@ -30,8 +30,11 @@ const REPORT_TURNS: u64 = 256;
 /// How many states the hasty search may look at before the complete one gets its first turns.
 const HASTE: u64 = 20_000;
 
+/// The same where hasty searches that count resources, and others that do not, take turns.
+const HASTE_WITH_RESOURCES: u64 = 2_048;
+
 /// How many turns the hasty search gets for each one of the complete search.
-const COMPLETE_SHARE: u64 = 10;
+const COMPLETE_SHARE: u64 = 8;
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound { stopped, counts }
@@ -48,6 +51,8 @@ pub(super) struct Planner<'a> {
     pub(super) names: &'a Names,
     pub(super) progress: Progress,
     pub(super) best: Option<Found>,
+    /// Whether something is used up and filled up.
+    pub(super) has_resources: bool,
 }
 
 impl Planner<'_> {
@@ -75,7 +80,11 @@ impl Planner<'_> {
             let counts = self.progress.counts;
             return Answer::Unsolvable { proof, counts };
         }
-        let mut budget = HASTE;
+        let mut budget = if self.has_resources {
+            HASTE_WITH_RESOURCES
+        } else {
+            HASTE
+        };
         while stopped.is_none() && !self.is_first_plan_enough() {
             for (search, is_over) in searches.iter_mut().zip(&mut is_over) {
                 if *is_over {
@@ -128,12 +137,20 @@ impl Planner<'_> {
         self.best.is_some() && self.compiled.metric.is_some()
     }
 
-    /// The searches that take turns, the complete one last.
+    /// The searches that take turns, the complete one last. Where something is used up and filled
+    /// up, estimates that count it find most plans sooner, but not all.
     fn styles(&self) -> Vec<Style> {
-        let mut styles = vec![Style::hasty(Eagerness::Lends)];
+        let mut hastes = vec![Eagerness::Lends];
         let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
         if self.compiled.actions.iter().any(lends) {
-            styles.push(Style::hasty(Eagerness::Free));
+            hastes.push(Eagerness::Free);
+        }
+        let mut styles = Vec::new();
+        for haste in hastes {
+            if self.has_resources {
+                styles.push(Style::hasty(haste).filling_up());
+            }
+            styles.push(Style::hasty(haste));
         }
         styles.push(Style::COMPLETE);
         styles

@@ -81,6 +81,7 @@ impl Judge<'_, '_> {
         let situation = self.request.situation;
         match validate_from(self.request.task, situation, &plan, &settings) {
             Verdict::Valid(report) => Ok(Found {
+                metric: report.metric(self.request.task),
                 makespan: report.makespan,
                 plan,
                 repaired: repaired.cloned(),

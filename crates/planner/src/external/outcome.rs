@@ -16,6 +16,8 @@ pub struct Found {
     pub plan: TimeTriggeredPlan,
     /// When its last action ends.
     pub makespan: Rational,
+    /// The value of the problem's metric, if it has one that can be evaluated.
+    pub metric: Option<Rational>,
     /// What the judge had to object to in the planner's own times, if they had to be repaired.
     pub repaired: Option<String>,
 }

@@ -10,6 +10,7 @@
 mod cancellation;
 mod features;
 mod metric;
+mod resources;
 mod situations;
 mod twin;
 mod world;

@@ -23,6 +23,8 @@ pub(super) struct Run<'s, 'w> {
     nominal: Nominal,
     rooms: Rooms<'s>,
     is_used: Vec<bool>,
+    /// For each instance, the one of its kind that is to be used before it.
+    before: Vec<Option<InstanceId>>,
     is_placed: Vec<bool>,
     /// The next of the timed initials that matter.
     next_timed: usize,
@@ -61,6 +63,7 @@ impl<'s, 'w> Run<'s, 'w> {
             nominal,
             rooms,
             is_used,
+            before: search.symmetry.order(model, circumstances),
             is_placed: vec![false; model.plan().nodes.len()],
             next_timed: timed.take_while(|(_, time)| time <= now).count(),
             memo: Memo::new(model, &search.separations),
@@ -214,6 +217,10 @@ impl<'s, 'w> Run<'s, 'w> {
         for (id, _) in self.model.plan().instances() {
             let (start, end) = (separations.starts[id.index()], separations.ends[id.index()]);
             let node = if !self.is_used[id.index()] {
+                let before = self.before[id.index()];
+                if before.is_some_and(|before| !self.is_used[before.index()]) {
+                    continue;
+                }
                 start
             } else if start != end && self.network.running().contains(&id) {
                 end

@@ -98,6 +98,15 @@ impl Separations {
         self.apart[one.index()][other.index()]
     }
 
+    /// Whether `one` may come before `other`, as far as the plan's links say.
+    pub(crate) fn may_precede(&self, one: NodeId, other: NodeId) -> bool {
+        !self.never_after[one.index()].contains(&other)
+    }
+
+    pub(crate) fn node_count(&self) -> usize {
+        self.apart.len()
+    }
+
     /// Whether anything must be `epsilon` apart from a happening.
     pub(crate) fn keeps_distance(&self, node: NodeId) -> bool {
         self.apart[node.index()].contains(&true)

@@ -1,5 +1,6 @@
 //! What came of it, for people and for programs.
 
+use std::fmt::Write as _;
 use std::time::Duration;
 
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -10,7 +11,7 @@ use serde_json::{Value, json};
 use crate::args::PlanArgs;
 use crate::exit::{Answer, Exit};
 use crate::look::{HINT, styled};
-use crate::{json, output};
+use crate::{json, number, output};
 
 /// An answer, and how it was found.
 pub(super) struct Conclusion {
@@ -34,6 +35,8 @@ pub(super) enum Found {
     Plan {
         plan: TimeTriggeredPlan,
         makespan: Rational,
+        /// The value of the problem's metric, if it has one.
+        metric: Option<Rational>,
         /// What the judge had to object to in the planner's own times, if they were repaired.
         repaired: Option<String>,
     },
@@ -62,23 +65,43 @@ pub(super) fn print(task: &Task, arguments: &PlanArgs, conclusion: &Conclusion) 
             styled(HINT, "note"),
         ));
     }
-    if let (Found::Plan { plan, .. }, Some(path)) = (&conclusion.answer, &arguments.output) {
-        output::write_file(path, &write_plan(task, plan))?;
+    if let (Some(text), Some(path)) = (text(task, &conclusion.answer), &arguments.output) {
+        output::write_file(path, &text)?;
     }
     if arguments.json {
         output::print_json(&document(task, conclusion))?;
         return Ok(exit);
     }
     match &conclusion.answer {
-        Found::Plan { plan, .. } if arguments.output.is_none() => {
-            output::print(&write_plan(task, plan))?;
+        Found::Plan { .. } => {
+            if let (Some(text), None) = (text(task, &conclusion.answer), &arguments.output) {
+                output::print(&text)?;
+            }
         }
-        Found::Plan { .. } => {}
         Found::NoPlan { reason } | Found::Nothing { reason } => {
             output::print(&format!("{reason}\n"))?;
         }
     }
     Ok(exit)
+}
+
+/// The plan as text, with a last line, a comment, that says what it is worth where that is not
+/// simply when it ends.
+fn text(task: &Task, answer: &Found) -> Option<String> {
+    let Found::Plan {
+        plan,
+        makespan,
+        metric,
+        ..
+    } = answer
+    else {
+        return None;
+    };
+    let mut text = write_plan(task, plan);
+    if let Some(metric) = metric.as_ref().filter(|metric| *metric != makespan) {
+        let _ = writeln!(text, "; metric {}", number::nearest(metric));
+    }
+    Some(text)
 }
 
 /// See `docs/formats/plan-json.md`.
@@ -94,10 +117,12 @@ fn document(task: &Task, conclusion: &Conclusion) -> Value {
         Found::Plan {
             plan,
             makespan,
+            metric,
             repaired,
         } => {
             document["answer"] = json!("plan");
             document["makespan"] = json::number(makespan);
+            document["metric"] = json!(metric.as_ref().map(json::number));
             document["repaired"] = json!(repaired);
             document["steps"] = steps(plan);
             document["plan"] = json!(write_plan(task, plan));

@@ -32,7 +32,7 @@ pub(super) fn run(mut subject: Subject<'_>) -> Answer {
         let elapsed = clock.elapsed();
         if let Some(found) = &progress.plan {
             // The planner itself ends at the first plan if it is to.
-            let _ = watch.plan(&found.makespan, elapsed);
+            let _ = watch.plan(&found.makespan, found.metric.as_ref(), elapsed);
         }
         let states = progress.counts.evaluated;
         let what = || counted(usize::try_from(states).unwrap_or(usize::MAX), "state");
@@ -51,6 +51,7 @@ pub(super) fn run(mut subject: Subject<'_>) -> Answer {
             let answer = Found::Plan {
                 plan: found.plan,
                 makespan: found.makespan,
+                metric: found.metric,
                 repaired: None,
             };
             (answer, stop(stopped, &watch), counts)

@@ -62,7 +62,9 @@ fn observe(watch: &mut Watch, event: &Event<'_>) -> ControlFlow<()> {
         Event::Running { elapsed, memory } => {
             watch.show(*elapsed, || format!("{} MB", memory >> 20))
         }
-        Event::Plan { found, elapsed } => watch.plan(&found.makespan, *elapsed),
+        Event::Plan { found, elapsed } => {
+            watch.plan(&found.makespan, found.metric.as_ref(), *elapsed)
+        }
         Event::Refused { .. } => ControlFlow::Continue(()),
     }
 }
@@ -75,6 +77,7 @@ fn conclude(planner: &Planner, report: Report, is_cancelled: bool) -> Result<Con
         Outcome::Plan(found) => Found::Plan {
             plan: found.plan,
             makespan: found.makespan,
+            metric: found.metric,
             repaired: found.repaired,
         },
         Outcome::Unsolvable { .. } => Found::NoPlan { reason: in_words },

@@ -20,7 +20,13 @@ pub(super) struct Watch {
     stops_at_first: bool,
     plans: usize,
     first: Option<Duration>,
-    best: Option<Rational>,
+    best: Option<Worth>,
+}
+
+/// What the last plan is worth.
+struct Worth {
+    makespan: Rational,
+    metric: Option<Rational>,
 }
 
 impl Watch {
@@ -68,10 +74,18 @@ impl Watch {
     }
 
     /// A plan has come. Says whether to go on.
-    pub(super) fn plan(&mut self, makespan: &Rational, elapsed: Duration) -> ControlFlow<()> {
+    pub(super) fn plan(
+        &mut self,
+        makespan: &Rational,
+        metric: Option<&Rational>,
+        elapsed: Duration,
+    ) -> ControlFlow<()> {
         self.plans += 1;
         self.first.get_or_insert(elapsed);
-        self.best = Some(makespan.clone());
+        self.best = Some(Worth {
+            makespan: makespan.clone(),
+            metric: metric.filter(|metric| *metric != makespan).cloned(),
+        });
         if self.stops_at_first {
             return ControlFlow::Break(());
         }
@@ -89,7 +103,11 @@ impl Watch {
         self.line.show(elapsed, || {
             let mut line = format!("{}, {}", what(), counted(plans, "plan"));
             if let Some(best) = best {
-                let _ = write!(line, ", the last ends at {}", number::nearest(best));
+                let makespan = number::nearest(&best.makespan);
+                let _ = write!(line, ", the last ends at {makespan}");
+                if let Some(metric) = &best.metric {
+                    let _ = write!(line, ", metric {}", number::nearest(metric));
+                }
             }
             let _ = match limit {
                 Some(limit) => write!(

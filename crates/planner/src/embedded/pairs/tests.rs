@@ -10,7 +10,7 @@ use proptest::prelude::*;
 
 use super::Pairs;
 use crate::embedded::apply::{Step, Stepper};
-use crate::embedded::compile::{Compiled, compile};
+use crate::embedded::compile::{Compiled, Wanted, compile};
 use crate::embedded::state::State;
 use crate::embedded::time::{NEVER, Ticks};
 
@@ -188,7 +188,8 @@ proptest! {
             panic!("a small task");
         };
         let epsilon = Rational::new(1, 1000);
-        let compiled = compile(&mut task, &grounding, &situation, &epsilon, &mut || true).expect("plain");
+        let wanted = Wanted { situation: &situation, epsilon: &epsilon, metric: false };
+        let compiled = compile(&mut task, &grounding, wanted, &mut || true).expect("plain");
         let mut pairs = Pairs::of(&compiled).expect("small");
         let mut budget = 3_000;
         earliest_end(&compiled, &mut pairs, &compiled.initial, MOST, &mut budget);

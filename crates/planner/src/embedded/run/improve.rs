@@ -25,7 +25,10 @@ impl Planner<'_> {
         let styles = self.styles();
         let mut entrants = Vec::new();
         for aim in [Aim::CheapRest, Aim::CheapWhole(3), Aim::CheapWhole(1)] {
-            let hasty = styles.iter().filter(|style| style.haste.is_some());
+            // One of each haste will do.
+            let hasty = styles
+                .iter()
+                .filter(|style| style.haste.is_some() && style.fills_up == self.has_resources);
             entrants.extend(hasty.map(|style| style.towards(aim)));
         }
         entrants.push(Style::COMPLETE.towards(Aim::CheapWhole(1)));

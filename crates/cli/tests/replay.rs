@@ -1,0 +1,206 @@
+//! Stored runs are played back to the same decisions, whoever decided.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn elbowroom(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .args(arguments)
+        .output()
+        .expect("the command can be started")
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A file that is removed when nobody needs it any more.
+struct Temporary(PathBuf);
+
+impl Temporary {
+    fn new(name: &str, text: &str) -> Self {
+        let name = format!("elbowroom-{}-replay-{name}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        fs::write(&path, text).expect("written");
+        Self(path)
+    }
+
+    fn name(&self) -> String {
+        self.0.display().to_string()
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+/// Makes a run, plays it back, and returns the trace.
+fn played_back(name: &str, arguments: &[&str]) -> String {
+    let trace = Temporary::new(&format!("{name}.jsonl"), "");
+    let made = elbowroom(&[&["run", "--trace", &trace.name()], arguments].concat());
+    assert!(
+        matches!(made.status.code(), Some(0 | 1)),
+        "{name}: {made:?}"
+    );
+    let text = fs::read_to_string(&trace.0).expect("a trace");
+    let replay = elbowroom(&["run", "--json", "--replay", &trace.name()]);
+    assert_eq!(replay.status.code(), Some(0), "{name}: {replay:?}");
+    let document: Value = serde_json::from_slice(&replay.stdout).expect("a document");
+    assert_eq!(document["agrees"], true, "{name}");
+    assert_eq!(document["complete"], true, "{name}");
+    // All lines but the header are entries.
+    assert_eq!(document["entries"], text.lines().count() - 1, "{name}");
+    text
+}
+
+/// Whether a replay of this trace differs, and where.
+fn difference(trace: &str, name: &str) -> Option<u64> {
+    let file = Temporary::new(name, trace);
+    let replay = elbowroom(&["run", "--json", "--replay", &file.name()]);
+    assert!(
+        matches!(replay.status.code(), Some(0 | 1)),
+        "{name}: {replay:?}"
+    );
+    let document: Value = serde_json::from_slice(&replay.stdout).expect("a document");
+    document["difference"]["line"].as_u64()
+}
+
+/// The first plan that was made in a run.
+fn first_plan(trace: &str) -> String {
+    let lines = trace.lines().map(serde_json::from_str::<Value>);
+    let mut entries = lines.map(|entry| entry.expect("JSON"));
+    let planned = entries.find(|entry| entry["event"] == "planned");
+    let planned = planned.expect("a plan was made");
+    let steps = planned["plan"].as_array().expect("steps").iter();
+    let words = steps.map(|step| {
+        let decimal = |name: &str| step[name]["decimal"].to_string();
+        let action = step["action"].as_str().expect("a name");
+        format!("{}: {action} [{}]", decimal("start"), decimal("duration"))
+    });
+    words.collect::<Vec<_>>().join("\n")
+}
+
+fn causes(trace: &str) -> Vec<String> {
+    let lines = trace.lines().map(serde_json::from_str::<Value>);
+    let entries = lines.map(|entry| entry.expect("JSON"));
+    let causes = entries.filter_map(|entry| Some(entry["reason"]["cause"].as_str()?.to_owned()));
+    causes.collect()
+}
+
+const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
+
+/// Two orders, the nearer of which has next to no time to spare: `live:5` drops it.
+#[test]
+fn a_run_in_which_a_plan_was_given_up_for_a_likelier_one() {
+    let text = fs::read_to_string(root().join("experiments/table1/problem.pddl")).expect("read");
+    let text = text.replace("{early}", "425").replace("{late}", "800");
+    let problem = Temporary::new("problem.pddl", &text);
+    let uncertain = |step: u32, mean: u32| {
+        format!(
+            "[[duration]]\naction = \"make-base-{step}\"\n\
+             normal = {{ mean = {mean}, deviation = 70, minimum = 0 }}\n"
+        )
+    };
+    let world = format!(
+        "format = \"elbowroom-world\"\nversion = 1\n{}{}",
+        uncertain(1, 170),
+        uncertain(2, 160)
+    );
+    let world_file = Temporary::new("world.toml", &world);
+    let (name, world) = (problem.name(), world_file.name());
+    let common = [
+        "experiments/table1/domain.pddl",
+        &name,
+        "--world",
+        &world,
+        "--planner-states",
+        "400",
+        "--improve-states",
+        "256",
+        "--seed",
+        "3",
+        "--planning-time",
+        "0",
+    ];
+    // `live` begins with the planner's plan; `live:5` would begin with the likeliest.
+    let hasty = played_back("hasty", &[&common[..], &["--executor", "live"]].concat());
+    let plan = Temporary::new("hasty.plan", &first_plan(&hasty));
+    let trace = played_back(
+        "live",
+        &[
+            &common[..],
+            &["--executor", "live:5", "--plan", &plan.name()],
+        ]
+        .concat(),
+    );
+    assert!(causes(&trace).iter().any(|cause| cause == "likelier"));
+    // The probabilities are calculated again, not read: in another world they are others.
+    let steady = trace.replacen("deviation = 70", "deviation = 1", 10);
+    assert_ne!(steady, trace);
+    assert!(difference(&steady, "steady.jsonl").is_some());
+}
+
+#[test]
+fn runs_by_likelihoods_in_which_starts_fail_and_the_door_locks() {
+    for executor in ["adaptable", "lookahead", "esterel"] {
+        let (mut replans, mut failed) = (0, 0);
+        for seed in ["1", "2", "3", "4"] {
+            let trace = played_back(
+                &format!("{executor}-{seed}"),
+                &[
+                    DELIVERY[0],
+                    DELIVERY[1],
+                    "--plan",
+                    "cases/delivery/plan.plan",
+                    "--world",
+                    "experiments/clumsy/door.toml",
+                    "--likelihoods",
+                    "experiments/clumsy/door-locks.toml",
+                    "--executor",
+                    executor,
+                    "--running",
+                    "keep",
+                    "--seed",
+                    seed,
+                ],
+            );
+            failed += trace.matches("it did not start").count();
+            replans += trace.matches("\"event\":\"planning\"").count();
+        }
+        assert!(failed > 5, "{executor}: {failed}");
+        // `esterel` comes to a locked door in some of them.
+        assert_eq!(replans > 0, executor == "esterel", "{executor}: {replans}");
+    }
+}
+
+/// Likelihoods are part of the record: with others the same observations lead to other decisions.
+#[test]
+fn likelihoods_are_kept_in_the_trace() {
+    let trace = played_back(
+        "likelihoods",
+        &[
+            DELIVERY[0],
+            DELIVERY[1],
+            "--world",
+            "experiments/clumsy/door.toml",
+            "--likelihoods",
+            "experiments/clumsy/door-locks.toml",
+            "--executor",
+            "adaptable",
+            "--seed",
+            "1",
+        ],
+    );
+    let certain = trace.replacen("becomes_false = 0.1", "becomes_false = 0.0", 1);
+    assert_ne!(certain, trace);
+    assert!(difference(&certain, "certain.jsonl").is_some());
+    let other = trace.replacen("\"executor\":\"adaptable\"", "\"executor\":\"esterel\"", 1);
+    assert_ne!(other, trace);
+    assert!(difference(&other, "other.jsonl").is_some());
+}

@@ -1,0 +1,138 @@
+//! Amounts that are measured, and durations that move numbers.
+
+use elbowroom::execution::Cause;
+use elbowroom::execution::run::Verdict;
+use elbowroom::num::Rational;
+
+use crate::scene::Scene;
+
+/// Ten sites more, and nothing about time: only how much a survey takes of the battery.
+const DOMAIN: &str = "(define (domain sites)
+    (:requirements :typing :durative-actions :fluents) (:types site)
+    (:predicates (idle) (surveyed ?s - site)) (:functions (charge))
+    (:durative-action survey :parameters (?s - site) :duration (= ?duration 20)
+      :condition (and (at start (idle)) (at end (>= (charge) 30)))
+      :effect (and (at start (not (idle))) (at end (decrease (charge) 30))
+                   (at end (surveyed ?s)) (at end (idle))))
+    (:durative-action warm-up :parameters (?s - site) :duration (= ?duration 20)
+      :condition (and (at start (idle)) (at start (>= (charge) 30)))
+      :effect (and (at start (not (idle))) (at start (decrease (charge) 30))
+                   (at end (surveyed ?s)) (at end (idle))))
+    (:durative-action recharge :parameters () :duration (= ?duration 10)
+      :condition (at start (idle))
+      :effect (and (at start (not (idle))) (at end (idle)) (at end (assign (charge) 80)))))";
+const PROBLEM: &str = "(define (problem p) (:domain sites) (:objects a b - site)
+    (:init (idle) (= (charge) 80)) (:goal (and (surveyed a) (surveyed b))))";
+
+/// A survey takes 90 of the battery in place of 40. The domain says `(* (draw ?r) ?duration)`.
+#[test]
+fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
+    let scene = Scene::case("battery");
+    let model =
+        scene.world("[[amount]]\naction = \"survey\"\nfluent = \"charge\"\nconstant = 90\n");
+    for executor in ["fixed:0", "stn", "guarded", "live", "adaptable"] {
+        let report = scene.run(executor, &model, 0);
+        // Known at the first survey's end, before the next one begins.
+        let since = report.reasons[0].since.clone();
+        assert_eq!(since, Some(Rational::from(20)), "{executor}: {report:#?}");
+    }
+    // More of it because it took longer is no deviation.
+    let model = scene.world("[[duration]]\naction = \"recharge\"\nconstant = 10.5\n");
+    let report = scene.run("fixed:10", &model, 0);
+    assert_eq!(report.replans, 0, "{:?}", report.reasons);
+}
+
+/// Nobody left the amounts open, and yet they are measured: 60 for each in place of 30.
+#[test]
+fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
+    for (plan, known) in [
+        ("0: (survey a) [20]\n20.001: (survey b) [20]", 20),
+        // Measured at the start, known at the start.
+        ("0: (warm-up a) [20]\n20.001: (warm-up b) [20]", 0),
+    ] {
+        let scene = Scene::new(DOMAIN, PROBLEM, Some(plan));
+        let model = scene.world("[[amount]]\naction = \"*\"\nfluent = \"charge\"\nconstant = 60\n");
+        for executor in ["guarded", "live"] {
+            let report = scene.run(executor, &model, 0);
+            let since = report.reasons[0].since.clone();
+            assert_eq!(
+                since,
+                Some(Rational::from(known)),
+                "{executor}: {report:#?}"
+            );
+        }
+    }
+}
+
+/// While a tank is filled its level rises: after 20 it runs over. A survey of 25 leaves too little in
+/// the battery for the next one.
+#[test]
+fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
+    for (case, world, limit) in [
+        (
+            "tank",
+            "[[duration]]\naction = \"fill\"\nconstant = 300\n",
+            20,
+        ),
+        (
+            "battery",
+            "[[duration]]\naction = \"survey\"\nconstant = 60\n",
+            25,
+        ),
+    ] {
+        let scene = Scene::case(case);
+        let report = scene.run("live", &scene.world(world), 0);
+        let reason = &report.reasons[0];
+        assert_eq!(reason.cause, Cause::Outlived, "{case}: {report:#?}");
+        let upper = reason
+            .allowed
+            .as_ref()
+            .and_then(|allowed| allowed.upper.value());
+        let upper = upper.expect("a limit");
+        // As near below the limit as ε.
+        let (limit, epsilon) = (Rational::from(limit), Rational::new(1, 1000));
+        assert!(
+            *upper <= limit && *upper >= &limit - &epsilon,
+            "{case}: {upper}"
+        );
+        let noticed = reason.since.clone().expect("a time") + &epsilon + &epsilon;
+        assert!(report.time <= noticed, "{case}: {report:#?}");
+    }
+}
+
+/// The last action deviates, and there is nothing left to be planned.
+#[test]
+fn a_goal_that_is_reached_needs_no_new_plan() {
+    let problem = PROBLEM.replace(" (surveyed b)", "");
+    let mut scene = Scene::new(DOMAIN, &problem, Some("0: (survey a) [20]"));
+    scene.settings.most_replans = 0;
+    let model = scene.world("[[amount]]\naction = \"*\"\nfluent = \"charge\"\nconstant = 60\n");
+    let report = scene.run("fixed:0", &model, 0);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    assert_eq!(
+        (report.replans, report.reasons.len()),
+        (0, 0),
+        "{report:#?}"
+    );
+}
+
+/// A duration is bounded from below by one constraint and from above by another; a reason shows
+/// both.
+#[test]
+fn a_reason_shows_all_that_bounds_a_duration() {
+    let scene = Scene::case("delivery");
+    let model = scene.world("[[duration]]\naction = \"drive\"\nconstant = 12\n");
+    for executor in ["stn", "fixed:10"] {
+        let report = scene.run(executor, &model, 0);
+        let allowed = report
+            .reasons
+            .iter()
+            .find_map(|reason| reason.allowed.clone());
+        let allowed = allowed.expect("an interval");
+        let bounds = (allowed.lower.value(), allowed.upper.value());
+        assert!(
+            matches!(bounds, (Some(lower), Some(upper)) if lower.is_positive() && lower <= upper),
+            "{executor}: {allowed}"
+        );
+    }
+}

@@ -1,0 +1,332 @@
+//! A plan being executed by its orders, or all that can be done by a table: [`Rest`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_model::Step;
+use elbowroom_model::ground::{Action, Body};
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_probability::search::Progress;
+use elbowroom_probability::{Choice, Circumstances, Likelihoods, NextHappening, Running};
+
+use super::super::chooser::Chooser;
+use crate::dispatch::replan;
+use crate::event::Ending;
+use crate::executor::{Decided, Decision, Mission, Moment, News, Order, Planned, StepId};
+use crate::progression::Progression;
+use crate::reason::{Cause, Reason};
+
+/// A search looks at so many happenings at most, sequences times the plan's length; then the best
+/// order so far is taken. Plans of some twenty happenings are searched to the end.
+const MOST_HAPPENINGS: usize = 200_000;
+
+/// An action is given up when it has failed so often in a row that this is how likely that was.
+const TOO_UNLIKELY: f64 = 1e-6;
+
+/// However unlikely it is to start, it is not tried more often than this in a row: where starts take
+/// no time, neither does trying again.
+const MOST_FAILURES: i32 = 1000;
+
+/// So often in a row a failure is put down to a condition that does not hold.
+const MOST_EXPLAINED: i32 = 3;
+
+/// A plan, and how it stands.
+pub(super) struct Rest {
+    mission: Mission,
+    /// The plan's steps in the order of the model's instances.
+    steps: Vec<Step>,
+    chooser: Chooser,
+    /// What was told to start and has not ended, and when it has started, on the plan's clock.
+    under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
+    /// Starts and ends that have been observed lately, on the plan's clock.
+    recent: Vec<(NodeId, Rational)>,
+    /// How often each instance has failed in a row.
+    failures: BTreeMap<InstanceId, i32>,
+    /// What was told to stop and has not.
+    let_go: BTreeSet<StepId>,
+    /// The number of the next order.
+    next_step: u32,
+}
+
+impl Rest {
+    /// A plan that has just been taken up: `steps` are the actions in the order of the model's
+    /// instances.
+    pub(super) fn new(mission: &Mission, chooser: Chooser, steps: Vec<Step>) -> Self {
+        let running = mission.running.keys();
+        let under_way = running.map(|&step| (step, (InstanceId(step.0), Some(Rational::ZERO))));
+        Self {
+            under_way: under_way.collect(),
+            next_step: u32::try_from(steps.len()).unwrap_or(u32::MAX),
+            steps,
+            chooser,
+            let_go: BTreeSet::new(),
+            mission: mission.clone(),
+            recent: Vec::new(),
+            failures: BTreeMap::new(),
+        }
+    }
+
+    /// What is under way ends by its duration; when the rest happens is decided then.
+    pub(super) fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        let (instance, start) = self.under_way.get(&step)?;
+        let start = start.as_ref().filter(|_| is_end)?;
+        let (least, greatest) = self.chooser.search().model().plan().duration(*instance);
+        Some(Planned {
+            earliest: Some(self.world(&(start + least))),
+            latest: greatest.map(|greatest| self.world(&(start + greatest))),
+        })
+    }
+
+    /// Takes note of what is new; why the plan has to be given up, if it has to.
+    pub(super) fn learn(
+        &mut self,
+        news: &News,
+        belief: &Progression,
+        likelihoods: &Likelihoods,
+    ) -> Option<Reason> {
+        match news {
+            News::Started { step, time, .. } => {
+                let local = time - &self.mission.origin;
+                let (instance, start) = self.under_way.get_mut(step)?;
+                let instance = *instance;
+                *start = Some(local.clone());
+                self.recent.push((self.node(instance, false), local));
+                if self.steps[instance.index()].duration.is_none() {
+                    self.under_way.remove(step);
+                    self.failures.remove(&instance);
+                }
+                None
+            }
+            News::Ended {
+                step, ending, time, ..
+            } => {
+                let (instance, start) = self.under_way.remove(step)?;
+                let local = time - &self.mission.origin;
+                self.recent.push((self.node(instance, true), local));
+                let was_let_go = self.let_go.remove(step);
+                if *ending == Ending::Succeeded {
+                    self.failures.remove(&instance);
+                    return None;
+                }
+                if was_let_go {
+                    return None;
+                }
+                let failures = self.failures.entry(instance).or_default();
+                *failures += 1;
+                let failures = *failures;
+                let step = &self.steps[instance.index()];
+                let is_explained =
+                    failures <= MOST_EXPLAINED && lacks_something(step, start.is_some(), belief);
+                if is_explained {
+                    return None;
+                }
+                failed(&step.action, failures, ending, likelihoods)
+            }
+            // The belief knows it already, and layers are held against the belief.
+            News::Fact(_) | News::Value(_) => None,
+            News::Contradiction { action } => Some(Reason::new(Cause::Contradiction).of(action)),
+            News::Silence { action, since } => {
+                Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
+            }
+        }
+    }
+
+    /// An instance's start or end.
+    fn node(&self, instance: InstanceId, is_end: bool) -> NodeId {
+        let model = self.chooser.search().model();
+        if is_end {
+            model.end(instance)
+        } else {
+            model.start(instance)
+        }
+    }
+
+    /// What has happened so lately that what interferes with it has to wait.
+    fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
+        let epsilon = &self.mission.epsilon;
+        self.recent.retain(|(_, time)| time + epsilon > *now);
+        let model = self.chooser.search().model();
+        let nodes = model.plan().nodes.iter().enumerate();
+        let timed = nodes.filter_map(|(at, node)| match node {
+            Node::Timed(index) => {
+                Some((NodeId::from(at), model.task().timed()[*index].time.clone()))
+            }
+            _ => None,
+        });
+        let is_recent = |(_, time): &(NodeId, Rational)| time <= now && time + epsilon > *now;
+        let mut lately: Vec<_> = timed.filter(is_recent).collect();
+        lately.extend(self.recent.iter().cloned());
+        lately.sort_by(|a, b| a.1.cmp(&b.1));
+        lately
+    }
+
+    /// What to do now.
+    pub(super) fn next(&mut self, moment: &Moment<'_>) -> Decided {
+        if !self.let_go.is_empty() {
+            return wait(None, "what was told to stop has stopped");
+        }
+        if self.under_way.values().any(|(_, start)| start.is_none()) {
+            return wait(None, "what was told to start has started");
+        }
+        let now = moment.now - &self.mission.origin;
+        let mut circumstances = Circumstances::observed(now.clone(), &moment.belief.state());
+        let mut running: Vec<Running> = self
+            .under_way
+            .values()
+            .map(|(instance, start)| Running {
+                instance: *instance,
+                start: start.clone().unwrap_or_default(),
+            })
+            .collect();
+        running.sort_by(|a, b| (&a.start, a.instance).cmp(&(&b.start, b.instance)));
+        circumstances.running = running;
+        circumstances.recent = self.lately(&now);
+        let length = self.chooser.search().model().plan().nodes.len();
+        let mut most = |progress: &Progress| {
+            if progress.sequences * length > MOST_HAPPENINGS {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        match self.chooser.choose(&circumstances, &mut most) {
+            Err(coupled) => replan(Reason::new(Cause::NoOrder).about(coupled.to_string())),
+            Ok(Choice::GoalReached) => Decided {
+                decision: Decision::GoalReached,
+                reason: Reason::new(Cause::GoalReached),
+            },
+            Ok(Choice::Next(next)) => self.carry_on(&next, &now),
+            Ok(Choice::Replan) if self.awaits_ends(&now) => {
+                // What is under way is ended before a plan is given up: a robot that is let go
+                // between two places is at neither. And it may change what can be done.
+                let until = self.first_overdue().map(|time| self.world(&time));
+                wait(until, "what is under way has ended")
+            }
+            Ok(Choice::Abandon(instance)) => self.let_go(instance),
+            Ok(Choice::Replan) => replan(Reason::new(Cause::NoOrder).since(moment.now.clone())),
+        }
+    }
+
+    /// Stops an action whose end is not worth waiting for.
+    fn let_go(&mut self, instance: InstanceId) -> Decided {
+        let is_it = |(step, (under_way, _)): (&StepId, &(InstanceId, Option<Rational>))| {
+            (*under_way == instance).then_some(*step)
+        };
+        let steps: Vec<StepId> = self.under_way.iter().filter_map(is_it).collect();
+        self.let_go.extend(&steps);
+        let name = &self.steps[instance.index()].action.name;
+        Decided {
+            decision: Decision::Cancel(steps),
+            reason: Reason::new(Cause::Likelier)
+                .of(name)
+                .about(format!("one that does not wait for the end of {name}")),
+        }
+    }
+
+    /// Whether something is under way, and nothing overdue.
+    fn awaits_ends(&self, now: &Rational) -> bool {
+        let is_overdue = self.first_overdue().is_some_and(|time| time <= *now);
+        !self.under_way.is_empty() && !is_overdue
+    }
+
+    /// When the first of the actions under way is later than it can be.
+    fn first_overdue(&self) -> Option<Rational> {
+        let plan = self.chooser.search().model().plan();
+        let ends = self.under_way.values().filter_map(|(instance, start)| {
+            let latest = plan.duration(*instance).1?;
+            Some(start.as_ref()? + latest + &self.mission.epsilon)
+        });
+        ends.min()
+    }
+
+    /// A time of the plan by the world's clock.
+    fn world(&self, time: &Rational) -> Rational {
+        time + &self.mission.origin
+    }
+
+    fn carry_on(&mut self, next: &NextHappening, now: &Rational) -> Decided {
+        let origin = &self.mission.origin;
+        let world = |time: &Rational| time + origin;
+        let node = self.chooser.search().model().plan().nodes[next.node.index()];
+        let (Node::Start(instance) | Node::Instant(instance)) = node else {
+            // An end, or timed initials: it comes when it comes. When it is too late for the order,
+            // another one is looked for.
+            let late = next
+                .slot
+                .latest
+                .as_ref()
+                .map(|latest| latest + &self.mission.epsilon);
+            let until = late.filter(|late| late > now);
+            return wait(
+                until.map(|until| world(&until)),
+                "what is next in the order has happened",
+            );
+        };
+        if next.slot.earliest > *now {
+            return wait(Some(world(&next.slot.earliest)), "the order's next start");
+        }
+        let step = StepId(self.next_step);
+        self.next_step = self.next_step.saturating_add(1);
+        let planned = &self.steps[instance.index()];
+        let order = Order {
+            step,
+            action: Arc::new(planned.action.clone()),
+            duration: planned.duration.clone(),
+            planned: Planned {
+                earliest: Some(world(&next.slot.earliest)),
+                latest: next.slot.latest.as_ref().map(world),
+            },
+        };
+        let name = &planned.action.name;
+        let about = self.chooser.words(next);
+        let reason = Reason::new(Cause::Due).of(name).about(about);
+        self.under_way.insert(step, (instance, None));
+        Decided {
+            decision: Decision::Start(vec![order]),
+            reason,
+        }
+    }
+}
+
+/// Why an action is given up that has failed so often in a row: it is tried again as long as its
+/// likelihoods explain that.
+fn failed(
+    action: &Action,
+    failures: i32,
+    ending: &Ending,
+    likelihoods: &Likelihoods,
+) -> Option<Reason> {
+    let success = likelihoods.start(action).unwrap_or(1.0);
+    if (1.0 - success).powi(failures) >= TOO_UNLIKELY && failures < MOST_FAILURES {
+        return None;
+    }
+    let why = match ending {
+        Ending::Failed { why } => why.as_str(),
+        Ending::Succeeded | Ending::Cancelled => "it was cancelled",
+    };
+    let about = format!("{why}; {failures} in a row, and it starts with probability {success}");
+    Some(Reason::new(Cause::Failed).of(&action.name).about(about))
+}
+
+/// Whether what an action needs is known not to hold: no wonder that it has failed.
+fn lacks_something(step: &Step, has_started: bool, belief: &Progression) -> bool {
+    let needs = match &step.action.body {
+        Body::Instantaneous(snap) => vec![&snap.condition],
+        Body::Durative(body) if has_started => vec![&body.over_all, &body.end.condition],
+        Body::Durative(body) => vec![&body.start.condition],
+    };
+    let duration = step.duration.as_ref();
+    let mut held = needs
+        .into_iter()
+        .map(|needed| belief.holds(needed, duration));
+    held.any(|holds| holds == Ok(false))
+}
+
+fn wait(until: Option<Rational>, why: &str) -> Decided {
+    Decided {
+        decision: Decision::Wait { until },
+        reason: Reason::new(Cause::NothingDue).about(why),
+    }
+}

@@ -1,0 +1,69 @@
+//! Who chooses the next happening of a plan, or of everything that can be done: [`Chooser`].
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_probability::search::Progress;
+use elbowroom_probability::{
+    Choice, Circumstances, LayerDispatch, NextHappening, OrderSearch, TooCoupled,
+};
+
+use super::lookahead::Table;
+
+/// Who chooses the next happening.
+pub(super) enum Chooser {
+    /// Orders of the plan's happenings, and their layers.
+    Orders(Box<LayerDispatch>),
+    /// What is best in a small world.
+    Table {
+        table: Arc<Table>,
+        search: Box<OrderSearch>,
+        /// The value of the state in which was chosen last.
+        value: f64,
+    },
+}
+
+impl Chooser {
+    /// The model whose happenings are chosen, with its times.
+    pub(super) fn search(&self) -> &OrderSearch {
+        match self {
+            Self::Orders(dispatch) => dispatch.search(),
+            Self::Table { search, .. } => search,
+        }
+    }
+
+    /// What is next. `watch` can cut a search short.
+    pub(super) fn choose(
+        &mut self,
+        circumstances: &Circumstances,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Choice, TooCoupled> {
+        match self {
+            Self::Orders(dispatch) => dispatch.choose(circumstances, watch),
+            Self::Table {
+                table,
+                search,
+                value,
+            } => {
+                *value = table.value(circumstances);
+                Ok(table.choose(search, circumstances))
+            }
+        }
+    }
+
+    /// Why this is next, in words.
+    pub(super) fn words(&self, next: &NextHappening) -> String {
+        match self {
+            Self::Table { value, .. } => {
+                format!("best of all that can be done (P = {value:.4} from here)")
+            }
+            Self::Orders(dispatch) if next.is_new_order => {
+                let probability = dispatch.order().map_or(0.0, |order| order.probability);
+                format!(
+                    "first of the order most likely to succeed (P = {probability:.4} from here)"
+                )
+            }
+            Self::Orders(_) => "next after the lattermost layer that fits".to_owned(),
+        }
+    }
+}

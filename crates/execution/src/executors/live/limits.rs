@@ -1,0 +1,125 @@
+//! How long actions under way may take before the numbers of the rest of the plan no longer do.
+
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::InstanceId;
+
+use super::{Rest, range};
+use crate::executor::{Decided, Decision};
+use crate::preparation::Region;
+use crate::quantities::duration_parameters;
+use crate::reason::{Cause, Reason};
+
+impl Rest {
+    /// Finds out how long each action under way may take, as far as numbers depend on it.
+    pub(super) fn find_limits(&mut self, now: &Rational, region: &mut dyn Region) {
+        self.limits.clear();
+        if !self.durations_move_numbers || self.dispatch.running().is_empty() {
+            return;
+        }
+        let (plan, values) = self.remainder(now);
+        for (parameter, instance) in duration_parameters(&self.mission.plan) {
+            if !self.dispatch.running().contains(&instance) {
+                continue;
+            }
+            let mut tried = values.clone();
+            let mut does = |duration: &Rational| {
+                tried[parameter.index()].clone_from(duration);
+                region
+                    .objection(&self.mission.task, &plan, &tried)
+                    .is_none()
+            };
+            let least = &values[parameter.index()];
+            let (_, most) = range(&self.mission.plan, parameter);
+            let limit = greatest(least, most.as_ref(), &self.mission.epsilon, &mut does);
+            if let Some(limit) = limit {
+                self.limits.insert(instance, limit);
+            }
+        }
+    }
+
+    /// When an action under way reaches its limit, on the plan's clock.
+    fn limit_of(&self, instance: InstanceId, limit: &Rational) -> Option<Rational> {
+        let [start, end] = self.dispatch.nodes_of(instance);
+        let start = self.dispatch.happened(start)?;
+        let has_ended = self.dispatch.happened(end).is_some();
+        (!has_ended).then(|| start + limit)
+    }
+
+    /// An action under way that has taken longer than the numbers permit.
+    pub(super) fn outlived(&self, now: &Rational) -> Option<Reason> {
+        let local = self.dispatch.local(now);
+        let mut limits = self.limits.iter();
+        limits.find_map(|(instance, limit)| {
+            let time = self.limit_of(*instance, limit)?;
+            if time >= local {
+                return None;
+            }
+            let action = &self.dispatch.action(*instance).name;
+            let about = "after more than that, what the rest of the plan does to numbers fails";
+            let mut reason = Reason::new(Cause::Outlived).of(action).about(about);
+            reason.observed = Some(&local - &time + limit);
+            reason.allowed = Some(Interval::closed(Rational::ZERO, limit.clone()));
+            reason.by = Some(&local - &time);
+            Some(reason.since(self.dispatch.world(&time)))
+        })
+    }
+
+    /// Has what waits wake up when an action reaches its limit.
+    pub(super) fn waking(&self, decided: Decided) -> Decided {
+        let Decision::Wait { until } = &decided.decision else {
+            return decided;
+        };
+        let limits = self.limits.iter();
+        let times = limits.filter_map(|(instance, limit)| {
+            let time = self.limit_of(*instance, limit)?;
+            Some(self.dispatch.world(&time) + &self.mission.epsilon)
+        });
+        let until = times.chain(until.clone()).min();
+        Decided {
+            decision: Decision::Wait { until },
+            ..decided
+        }
+    }
+}
+
+/// No duration is looked at that is longer by more than this many times.
+const FAR: i64 = 1_000_000;
+
+/// The greatest duration that does, up to `epsilon`; `None` if all up to `most` do, or all that
+/// anybody waits for. `least` does. Where conditions are alternatives there may be others beyond
+/// a gap; what is found ends before the gap.
+fn greatest(
+    least: &Rational,
+    most: Option<&Rational>,
+    epsilon: &Rational,
+    does: &mut dyn FnMut(&Rational) -> bool,
+) -> Option<Rational> {
+    let unit = least.clone().max(Rational::ONE);
+    let far = least + &unit * Rational::from(FAR);
+    let far = most.map_or(far.clone(), |most| most.clone().min(far));
+    if far <= *least || does(&far) {
+        return None;
+    }
+    let two = Rational::from(2);
+    let mut good = least.clone();
+    let mut bad = far;
+    let mut step = unit;
+    while &good + &step < bad {
+        let next = &good + &step;
+        if does(&next) {
+            good = next;
+            step *= &two;
+        } else {
+            bad = next;
+        }
+    }
+    while &bad - &good > *epsilon {
+        let middle = (&good + &bad) / &two;
+        if does(&middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    Some(good)
+}

@@ -1,0 +1,5 @@
+(define (problem evening)
+  (:domain house)
+  (:init (whole))
+  (:goal (fetched))
+  (:metric minimize (total-time)))
