@@ -91,10 +91,9 @@ fn advice_on_files_is_about_the_file_that_is_missing() {
 #[test]
 fn tables_are_no_wider_than_eighty_columns() {
     let folder = folder("wide");
-    let more: String = ["b", "c", "d", "e"]
-        .iter()
+    let more = ["b", "c", "d", "e"]
         .map(|name| format!("[[column]]\nname = \"{name}\"\nworld = \"world.toml\"\n"))
-        .collect();
+        .concat();
     let more = format!("{more}[[column]]");
     let changes = [("trials = 6", "trials = 1"), ("[[column]]", more.as_str())];
     let file = experiment(&folder, &changes);
