@@ -91,10 +91,9 @@ fn advice_on_files_is_about_the_file_that_is_missing() {
 #[test]
 fn tables_are_no_wider_than_eighty_columns() {
     let folder = folder("wide");
-    let more: String = ["b", "c", "d", "e"]
-        .iter()
+    let more = ["b", "c", "d", "e"]
         .map(|name| format!("[[column]]\nname = \"{name}\"\nworld = \"world.toml\"\n"))
-        .collect();
+        .concat();
     let more = format!("{more}[[column]]");
     let changes = [("trials = 6", "trials = 1"), ("[[column]]", more.as_str())];
     let file = experiment(&folder, &changes);
@@ -204,6 +203,12 @@ fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
     }
     let file = experiment(&folder, &[]);
     assert!(refusal(&["compare", &file, "--trials", "0"]).contains("0 is not in 1.."));
+    // So are those in perturbed worlds.
+    let text = fs::read_to_string(root().join("experiments/olisipo_sf3.toml")).expect("there");
+    let is_list = |line: &&str| line.starts_with("executors =");
+    let executors = text.lines().find(is_list).expect("executors");
+    fs::write(&file, text.replace(executors, "executors = []")).expect("written");
+    assert!(refusal(&["compare", &file]).contains("nothing to make"));
     // A problem without blanks is named as such.
     let file = experiment(
         &folder,

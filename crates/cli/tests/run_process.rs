@@ -160,7 +160,6 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
 /// A world like `examples/world.py`, but for what it says first in its first answer.
 fn example_that_says(name: &str, first: &str) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no python3");
         return None;
     }
     let example = fs::read_to_string(root().join("examples/world.py")).expect("the example");
@@ -187,6 +186,7 @@ fn every_fact_of_the_problem_may_be_reported() {
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
         let Some((output, trace)) = example_that_says(name, &first) else {
+            eprintln!("skipped: there is no python3");
             return;
         };
         assert!(output.status.success(), "{fact}: {output:?}");
@@ -207,6 +207,7 @@ fn every_fact_of_the_problem_may_be_reported() {
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
         let Some((output, trace)) = example_that_says("no-fact", &first) else {
+            eprintln!("skipped: there is no python3");
             return;
         };
         assert_eq!(output.status.code(), Some(2), "{fact}: {output:?}");
@@ -221,6 +222,7 @@ fn what_a_world_says_is_shown_tame_and_wrapped() {
     let first =
         format!(r#"{{"type":"ended","ticket":0,"outcome":"failed","why":"{why}","time":0}}"#);
     let Some((output, trace)) = example_that_says("rude", &first) else {
+        eprintln!("skipped: there is no python3");
         return;
     };
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -252,13 +254,13 @@ fn a_run_whose_world_fails_leaves_its_document() {
 /// taken at its word.
 #[test]
 fn planning_takes_time_on_a_wall_clock() {
-    let planner = temporary("planner");
+    let script = temporary("planner");
     let plan = root()
         .join("cases/delivery/plan.plan")
         .display()
         .to_string();
-    fs::write(&planner, format!("sleep 0.2; cat {plan}\n")).expect("written");
-    let command = format!("sh {planner} {{domain}} {{problem}}");
+    fs::write(&script, format!("sleep 0.2; cat {plan}\n")).expect("written");
+    let command = format!("sh {script} {{domain}} {{problem}}");
     let took = |options: &[&str]| {
         let trace = temporary("wall-clock.jsonl");
         let run = ["run", DELIVERY[0], DELIVERY[1], "--planner", &command];
@@ -279,7 +281,7 @@ fn planning_takes_time_on_a_wall_clock() {
     assert!((stated - 3.0).abs() < 1e-9, "{stated}");
     let otherwise = took(&[]);
     assert!(otherwise.abs() < 1e-9, "{otherwise}");
-    fs::remove_file(planner).expect("the planner is there");
+    fs::remove_file(script).expect("the planner is there");
 }
 
 #[test]

@@ -236,6 +236,11 @@ impl PerturbedExperiment {
                 read.version
             )));
         }
+        if read.trials == 0 || read.worlds.is_empty() || read.executors.is_empty() {
+            return Err(PerturbedError::other(
+                "there is nothing to make; write at least one of `trials`, `worlds` and `executors`",
+            ));
+        }
         if read.worlds.contains(&WorldKind::AsPublished) && read.perturbation.is_none() {
             return Err(PerturbedError::other(
                 "the world as published needs [perturbation], with `achieved` and `needed`",

@@ -106,24 +106,9 @@ impl Reader<'_> {
             return Ok(rule);
         }
         Err(self.wrong(
-            &self.place(section),
+            &section.get_ref().place().unwrap_or_else(|| section.span()),
             "time is never negative; correct the number, or give a `minimum`",
         ))
-    }
-
-    /// Where the distribution of a section stands.
-    fn place(&self, section: &Spanned<Section>) -> Range<usize> {
-        let given = section.get_ref();
-        let places = [
-            given.constant.as_ref().map(Spanned::span),
-            given.values.as_ref().map(Spanned::span),
-            given.normal.as_ref().map(Spanned::span),
-            given.lognormal.as_ref().map(Spanned::span),
-            given.uniform.as_ref().map(Spanned::span),
-            given.triangular.as_ref().map(Spanned::span),
-        ];
-        let mut places = places.into_iter().flatten();
-        places.next().unwrap_or_else(|| section.span())
     }
 
     fn amount(&self, section: &Spanned<Section>) -> Read<Amount> {
@@ -386,7 +371,7 @@ impl Reader<'_> {
         };
         if given.late.is_none() && given.is_distributed() {
             return Err(self.wrong(
-                &self.place(section),
+                &section.get_ref().place().unwrap_or_else(|| section.span()),
                 "`late` is missing: how likely it is that a report comes so late",
             ));
         }

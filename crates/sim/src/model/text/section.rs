@@ -64,7 +64,7 @@ pub(super) struct Shape {
     pub(super) maximum: Option<Spanned<f64>>,
 }
 
-/// The keys that say how a quantity is distributed.
+/// The keys that say how a quantity is distributed: the distributions, then their limits.
 const DISTRIBUTION: &[&str] = &[
     "constant",
     "normal",
@@ -132,5 +132,14 @@ impl Section {
     pub(super) fn is_distributed(&self) -> bool {
         let mut given = self.given().into_iter();
         given.any(|(key, _)| DISTRIBUTION.contains(&key))
+    }
+
+    /// Where its distribution stands.
+    pub(super) fn place(&self) -> Option<Range<usize>> {
+        let is_limit = |key: &str| key == "minimum" || key == "maximum";
+        let mut given = self.given().into_iter();
+        given
+            .find(|(key, _)| DISTRIBUTION.contains(key) && !is_limit(key))
+            .map(|(_, span)| span)
     }
 }
