@@ -4,26 +4,28 @@ longer than planned. docs/formats/world-protocol.md describes the messages."""
 import json
 import sys
 
-now, ends = 0.0, {}  # the time, and for each running action when it will have ended
+now, ends, news = 0.0, {}, []  # the time, when each running action ends, and what to report
 
-def say(**message):
-    print(json.dumps(message), flush=True)
+def report(**message):
+    news.append(dict(message, time=now))
 
 def start(ticket, action, duration):
-    say(type="started", ticket=ticket, time=now)
+    report(type="started", ticket=ticket)
     if duration is not None:  # an instantaneous action is over when it has started
         ends[ticket] = now + 1.1 * duration["decimal"]
 
 def cancel(ticket):
     if ends.pop(ticket, None) is not None:
-        say(type="ended", ticket=ticket, outcome="cancelled", time=now)
+        report(type="ended", ticket=ticket, outcome="cancelled")
 
 def wait(until):  # until something happens, but not beyond `until`
     global now
     ticket = min(ends, key=ends.get, default=None)
+    if news:  # what a command led to is reported at once
+        return
     if ticket is not None and ends[ticket] <= until:
         now = max(now, ends.pop(ticket))
-        say(type="ended", ticket=ticket, outcome="succeeded", time=now)
+        report(type="ended", ticket=ticket, outcome="succeeded")
     else:
         now = max(now, until)
 
@@ -34,8 +36,9 @@ for message in map(json.loads, sys.stdin):
         cancel(message["ticket"])
     elif message["type"] == "wait":
         wait(message["until"]["decimal"])
-        say(type="time", now=now)
-    elif message["type"] == "look":  # this world has nothing to add
-        say(type="time", now=now)
+    if message["type"] in ("wait", "look"):  # this world sees no more than what it reports
+        for answer in news + [{"type": "time", "now": now}]:
+            print(json.dumps(answer), flush=True)
+        news.clear()
     elif message["type"] == "stop":
         break

@@ -223,8 +223,9 @@ pub(crate) struct RunArgs {
     /// A program that is the world, and talks JSON Lines (docs/formats/world-protocol.md)
     #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
     pub(crate) world_process: Option<String>,
-    /// How long to wait for each word of that program, in seconds
+    /// How long that program may take over each answer, in seconds
     #[arg(long, value_name = "S", default_value = "3600", value_parser = positive)]
+    #[arg(requires = "world_process")]
     pub(crate) answer_within: Rational,
     /// Who decides
     #[arg(long, value_name = "NAME", default_value = "guarded")]
@@ -234,7 +235,12 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) likelihoods: Option<PathBuf>,
     /// Which of the possible trajectories of the world to take
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        conflicts_with = "world_process"
+    )]
     pub(crate) seed: u64,
     /// What to leave open, see `elbowroom help envelope`; by default all durations
     #[arg(long, value_name = "SPEC")]
@@ -245,23 +251,26 @@ pub(crate) struct RunArgs {
     /// What becomes of running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Cancel)]
     pub(crate) running: RunningChoice,
-    /// How long making a plan takes in the world: `measured`, or always so many seconds
-    #[arg(long, value_name = "measured|S", default_value = "0")]
-    pub(crate) planning_time: String,
+    /// How long making a plan takes in the world: `measured`, or always so many seconds; by default
+    /// 0, and with --realtime `measured`
+    #[arg(long, value_name = "measured|S")]
+    pub(crate) planning_time: Option<String>,
     /// How often a new plan may be made
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(crate) max_replans: usize,
     /// When the run ends in any case, in the world's seconds
     #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive)]
     pub(crate) time_limit: Rational,
-    /// Let so many seconds of the world pass in one second
-    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    /// Let so many seconds of the world pass in one second (0.000001 to 1000000000); measured
+    /// planning times are multiplied by that. A process is its own clock
+    #[arg(long, value_name = "FACTOR", value_parser = factor, conflicts_with = "world_process")]
     pub(crate) realtime: Option<Rational>,
     /// Write the record of the run there (docs/formats/trace.md)
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) trace: Option<PathBuf>,
     /// Play a stored trace back, and say whether it comes to the same decisions
-    #[arg(long, value_name = "TRACE", conflicts_with_all = ["domain", "world", "plan", "realtime"])]
+    /// (everything else is in the trace)
+    #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
     pub(crate) replay: Option<PathBuf>,
     /// How far apart interfering happenings must be
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
@@ -271,13 +280,39 @@ pub(crate) struct RunArgs {
     pub(crate) json: bool,
 }
 
+/// What a stored trace says, and the command line cannot change.
+const IN_THE_TRACE: &[&str] = &[
+    "domain",
+    "problem",
+    "plan",
+    "planner",
+    "planner_time",
+    "planner_states",
+    "improve_states",
+    "world",
+    "world_process",
+    "answer_within",
+    "executor",
+    "likelihoods",
+    "seed",
+    "vary",
+    "precision",
+    "running",
+    "planning_time",
+    "max_replans",
+    "time_limit",
+    "realtime",
+    "trace",
+    "epsilon",
+];
+
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
     /// The experiment (docs/formats/experiment.md)
     #[arg(value_name = "EXPERIMENT.toml")]
     pub(crate) experiment: PathBuf,
     /// How many trials of each problem; by default as many as the experiment says
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) trials: Option<u64>,
     /// How many threads; 0 is as many as there are processors
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -384,6 +419,15 @@ fn positive(text: &str) -> Result<Rational, String> {
     } else {
         Err("it must be greater than 0".to_owned())
     }
+}
+
+fn factor(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    // Beyond that, a world stands still for years, or there is no clock to speak of.
+    if value < Rational::new(1, 1_000_000) || value > Rational::from(1_000_000_000) {
+        return Err("it must lie between 0.000001 and 1000000000".to_owned());
+    }
+    Ok(value)
 }
 
 fn positive_or_zero(text: &str) -> Result<Rational, String> {

@@ -133,7 +133,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
                 path.display(),
                 plain(error)
             ),
-            advice(path, error),
+            advice(path, what, error),
         )
     };
     let size = fs::metadata(path).map_err(|error| refused(&error))?.len();
@@ -148,7 +148,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
 }
 
 /// What to do about a file that cannot be read.
-fn advice(path: &Path, error: &io::Error) -> String {
+fn advice(path: &Path, what: &str, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {
             let parent = path
@@ -159,7 +159,12 @@ fn advice(path: &Path, error: &io::Error) -> String {
                     format!("there is no folder {}", folder.display())
                 }
                 _ => similar_file(path).map_or_else(
-                    || "check the path; the order is DOMAIN PROBLEM PLAN".to_owned(),
+                    || match what {
+                        "domain" | "problem" | "plan" => {
+                            "check the path; the order is DOMAIN PROBLEM PLAN".to_owned()
+                        }
+                        _ => "check the path".to_owned(),
+                    },
                     |name| format!("did you mean {name}?"),
                 ),
             }

@@ -18,6 +18,7 @@ mod number;
 mod output;
 mod progress;
 mod table;
+mod wrap;
 
 use std::process::ExitCode;
 

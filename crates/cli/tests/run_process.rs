@@ -49,14 +49,247 @@ fn the_example_world_delivers_the_parcel() {
     fs::remove_file(trace).expect("the trace is there");
 }
 
+/// What a command leads to is told in the next answer, at once. The example once let all the
+/// patience with a cancelled action pass instead: 600 seconds.
 #[test]
-fn a_world_that_is_no_world_ends_the_run_with_a_message() {
+fn the_example_world_reports_a_cancel_at_once() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        eprintln!("skipped: there is no python3");
+        return;
+    }
+    let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--json"];
+    run.extend(["--executor", "fixed:0", "--max-replans", "3"]);
+    run.extend(["--world-process", "python3 examples/world.py"]);
+    let output = elbowroom(&run);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a document");
+    let cancelled = |step: &&serde_json::Value| step["outcome"] == "cancelled";
+    let executed = report["executed"].as_array().expect("steps");
+    assert!(executed.iter().find(cancelled).is_some(), "{report:#}");
+    let time = report["time"]["decimal"].as_f64().expect("a time");
+    assert!(time < 60.0, "{report:#}");
+}
+
+/// A run in a world that is this shell script, which has `seconds` for each answer.
+fn in_shell(name: &str, script: &str, seconds: &str) -> Output {
+    let file = temporary(name);
+    fs::write(&file, script).expect("a temporary file can be written");
+    let command = format!("sh {file}");
+    let [domain, problem] = DELIVERY;
+    let mut run = vec!["run", domain, problem, "--world-process", &command];
+    run.extend(["--answer-within", seconds]);
+    let output = elbowroom(&run);
+    fs::remove_file(file).expect("the script is there");
+    output
+}
+
+/// Answers every question with the lines of `$1`.
+fn answering(lines: &str) -> String {
+    format!(
+        "while read -r line; do case \"$line\" in *\\\"wait\\\"*|*\\\"look\\\"*) echo '{lines}';; esac; \
+         done\n"
+    )
+}
+
+#[test]
+fn every_way_to_be_no_world_ends_the_run_and_is_named() {
+    let fact = r#"{"type":"fact","fact":"(at rover depot)","becomes":true,"time":0}"#;
+    let zero = r#"{"type":"time","now":0}"#;
+    let cases = [
+        ("still", answering(zero), "30", "its clock stands still"),
+        (
+            "chatty",
+            answering(&format!("{fact}\n{zero}")),
+            "30",
+            "its clock stands still",
+        ),
+        // Valid lines, and no end of them.
+        (
+            "babbler",
+            format!("exec yes '{fact}'\n"),
+            "30",
+            "more than 16 MB",
+        ),
+        (
+            "endless",
+            "head -c 3000000 /dev/zero | tr '\\0' x; exec sleep 60\n".to_owned(),
+            "30",
+            "without a line feed",
+        ),
+        // Says something all the time, but never what time it is.
+        (
+            "slow",
+            format!("while echo '{fact}'; do sleep 0.2; done\n"),
+            "1",
+            "has not ended its answer",
+        ),
+        (
+            "deaf",
+            format!("while echo '{zero}'; do sleep 0.001; done\n"),
+            "1",
+            "has not read",
+        ),
+        (
+            "silent",
+            "exec sleep 60\n".to_owned(),
+            "1",
+            "has not ended its answer",
+        ),
+        (
+            "dead",
+            "read line; exit 3\n".to_owned(),
+            "30",
+            "exit status: 3",
+        ),
+        (
+            "killed",
+            "read line; kill -9 $$\n".to_owned(),
+            "30",
+            "signal: 9",
+        ),
+        ("rude", answering("hello"), "30", "it said `hello`"),
+    ];
+    for (name, script, seconds, message) in cases {
+        let output = in_shell(name, &script, seconds);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{name}: {output:?}");
+        assert!(text.contains(message), "{name}: {text}");
+        assert!(text.contains("help: "), "{name}: {text}");
+    }
+}
+
+/// A world like `examples/world.py`, but for what it says first in its first answer.
+fn example_that_says(name: &str, first: &str) -> Option<(Output, String)> {
+    if Command::new("python3").arg("--version").output().is_err() {
+        eprintln!("skipped: there is no python3");
+        return None;
+    }
+    let example = fs::read_to_string(root().join("examples/world.py")).expect("the example");
+    let begins = "now, ends, news = 0.0, {}, []";
+    assert!(example.contains(begins), "{example}");
+    // JSON's way to write a text is also Python's.
+    let first = serde_json::to_string(first).expect("a text");
+    let first = format!("now, ends, news = 0.0, {{}}, [json.loads({first})]");
+    let (file, trace) = (temporary(name), temporary(&format!("{name}.jsonl")));
+    fs::write(&file, example.replace(begins, &first)).expect("written");
+    let command = format!("python3 {file}");
+    let run = ["run", DELIVERY[0], DELIVERY[1], "--world-process", &command];
+    let output = elbowroom(&[&run[..], &["--trace", &trace]].concat());
+    fs::remove_file(file).expect("the script is there");
+    Some((output, trace))
+}
+
+/// A robot cannot know which facts actions mention: `(lies parcel depot)` is one that none does.
+#[test]
+fn every_fact_of_the_problem_may_be_reported() {
+    for (name, fact, truth) in [
+        ("never-true", "(lies parcel depot)", "false"),
+        ("now-true", "(LIES parcel depot)", "true"),
+    ] {
+        let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
+        let Some((output, trace)) = example_that_says(name, &first) else {
+            return;
+        };
+        assert!(output.status.success(), "{fact}: {output:?}");
+        let entries = fs::read_to_string(&trace).expect("a trace");
+        assert!(
+            entries.contains(r#""fact":"(lies parcel depot)""#),
+            "{entries}"
+        );
+        let replayed = elbowroom(&["run", "--replay", &trace]);
+        assert!(replayed.status.success(), "{replayed:?}");
+        fs::remove_file(trace).expect("the trace is there");
+    }
+    for fact in [
+        "(lies parcel moon)",
+        "(lies depot parcel)",
+        "(lies parcel)",
+        "(flies rover)",
+    ] {
+        let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
+        let Some((output, trace)) = example_that_says("no-fact", &first) else {
+            return;
+        };
+        assert_eq!(output.status.code(), Some(2), "{fact}: {output:?}");
+        fs::remove_file(trace).expect("the trace is there");
+    }
+}
+
+/// What other programs say cannot move the cursor, and lines stay within eighty columns.
+#[test]
+fn what_a_world_says_is_shown_tame_and_wrapped() {
+    let why = format!(r"line\n\u001b[2J {}", "word ".repeat(60));
+    let first =
+        format!(r#"{{"type":"ended","ticket":0,"outcome":"failed","why":"{why}","time":0}}"#);
+    let Some((output, trace)) = example_that_says("rude", &first) else {
+        return;
+    };
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains(r"line\n\u{1b}[2J"), "{text}");
+    let longest = text.lines().map(|line| line.chars().count()).max();
+    assert!(longest <= Some(80), "{text}");
+    fs::remove_file(trace).expect("the trace is there");
+}
+
+/// A run that had begun has done something: its document says what, also when the world failed.
+#[test]
+fn a_run_whose_world_fails_leaves_its_document() {
+    let file = temporary("dies");
+    // It answers the first question, so that it has been started beyond doubt.
+    let script = "while read -r line; do case \"$line\" in *wait*) exit 3;; esac; done\n";
+    fs::write(&file, script).expect("written");
+    let command = format!("sh {file}");
+    let [domain, problem] = DELIVERY;
+    let mut run = vec!["run", domain, problem, "--json"];
+    run.extend(["--world-process", &command]);
+    let output = elbowroom(&run);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a document");
+    assert_eq!(report["verdict"], "world-failed");
+    fs::remove_file(file).expect("the script is there");
+}
+
+/// On a wall clock, planning takes as long as it takes, times the factor; a number of seconds is
+/// taken at its word.
+#[test]
+fn planning_takes_time_on_a_wall_clock() {
+    let planner = temporary("planner");
+    let plan = root()
+        .join("cases/delivery/plan.plan")
+        .display()
+        .to_string();
+    fs::write(&planner, format!("sleep 0.2; cat {plan}\n")).expect("written");
+    let command = format!("sh {planner} {{domain}} {{problem}}");
+    let took = |options: &[&str]| {
+        let trace = temporary("wall-clock.jsonl");
+        let run = ["run", DELIVERY[0], DELIVERY[1], "--planner", &command];
+        let output = elbowroom(&[&run[..], &["--trace", &trace], options].concat());
+        let text = fs::read_to_string(&trace).expect("a trace");
+        let mut entries = text
+            .lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).expect("JSON"));
+        let planned = entries.find(|entry| entry["event"] == "planned");
+        let planned = planned.unwrap_or_else(|| panic!("no plan was made: {output:?}"));
+        fs::remove_file(trace).expect("the trace is there");
+        planned["took"]["decimal"].as_f64().expect("a number")
+    };
+    // There is no time for so much planning; whether the parcel is delivered is not the question.
+    let measured = took(&["--realtime", "1000"]);
+    assert!(measured >= 200.0, "{measured}");
+    let stated = took(&["--realtime", "1000", "--planning-time", "3"]);
+    assert!((stated - 3.0).abs() < 1e-9, "{stated}");
+    let otherwise = took(&[]);
+    assert!(otherwise.abs() < 1e-9, "{otherwise}");
+    fs::remove_file(planner).expect("the planner is there");
+}
+
+#[test]
+fn a_world_that_cannot_be_started_ends_the_run_with_a_message() {
     for (command, message) in [
         ("no-such-program", "cannot start the world"),
         // Whether it is noticed when telling or when listening is a matter of chance.
-        ("true", "the world "),
-        ("echo hello", "the world "),
-        ("yes hello", "the world said `hello`"),
+        ("true", "has ended (exit status: 0)"),
+        ("echo hello", ""),
+        ("yes hello", "it said `hello`"),
     ] {
         let run = ["run", DELIVERY[0], DELIVERY[1], "--world-process", command];
         let output = elbowroom(&run);
@@ -79,7 +312,10 @@ fn a_world_that_does_not_answer_is_not_waited_for_for_ever() {
     ];
     let output = elbowroom(&run);
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(text.contains("has not answered in time"), "{text}");
+    assert!(
+        text.contains("has not ended its answer with `time` within 0.3 s"),
+        "{text}"
+    );
 }
 
 /// `kill -9` in the middle of a run leaves a trace that can be played back as far as it goes.

@@ -9,6 +9,7 @@ mod likeliest;
 mod memory;
 mod planners;
 pub(crate) mod rewrite;
+mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
 #[cfg(feature = "external")]
@@ -16,3 +17,4 @@ pub use external::External;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
+pub use vary::check_vary;

@@ -1,7 +1,7 @@
 //! The executors: one file each, and one list of them all.
 //!
 //! To add one: a file with its [`Executor`] and its [`Registered`] entry, and a line in
-//! [`EXECUTORS`]. The command line, its help, the documentation and the captions of reports are
+//! [`EXECUTORS`]. The command line, its help, `docs/executors.md` and the captions of reports are
 //! made from that list.
 
 mod adaptable;

@@ -13,6 +13,7 @@
 //! | a success after a cancel | the success counts: the action was faster |
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
+//! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
 //! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
 //!
@@ -22,6 +23,7 @@
 mod account;
 mod handover;
 mod intake;
+mod progress;
 mod settings;
 
 use std::sync::Arc;
@@ -40,6 +42,7 @@ use crate::progression::Progression;
 use crate::reason::{Cause, Reason};
 use crate::record::{Entry, Recorder};
 use crate::world::{World, WorldError};
+use progress::Progress;
 
 /// What a run needs.
 pub struct Ports<'a> {
@@ -63,9 +66,12 @@ pub struct Run<'a> {
     ports: Ports<'a>,
     settings: &'a RunSettings,
     now: Rational,
+    progress: Progress,
     belief: Progression,
     /// What was started, and what became of it.
     account: Account,
+    /// How many steps the present plan has.
+    steps: usize,
     news: Vec<News>,
     replans: usize,
     reasons: Vec<Reason>,
@@ -87,7 +93,8 @@ impl From<WorldError> for Stop {
 
 /// Executes a plan, or, without one, first makes one.
 ///
-/// Always returns: every wait has an end, and so has the run ([`RunSettings::time_limit`]).
+/// Always returns if the ports do: the run has an end ([`RunSettings::time_limit`]), and a world
+/// whose clock does not come forward to it is broken ([`Verdict::WorldFailed`]).
 pub fn run<'a>(
     task: Arc<Task>,
     first: Option<&TimeTriggeredPlan>,
@@ -107,10 +114,12 @@ impl<'a> Run<'a> {
         Self {
             belief: Progression::new(Arc::clone(&task)),
             account: Account::default(),
+            steps: 0,
             task,
             ports,
             settings,
             now: Rational::ZERO,
+            progress: Progress::default(),
             news: Vec::new(),
             replans: 0,
             reasons: Vec::new(),
@@ -228,6 +237,7 @@ impl<'a> Run<'a> {
     fn pass(&mut self, until: &Rational) -> Result<(), Stop> {
         let until = until.min(&self.settings.time_limit);
         let passage = self.ports.world.wait(until)?;
+        self.know_what_the_world_mentions();
         self.ports.recorder.record(&Entry::Passed {
             until,
             now: &passage.now,
@@ -238,7 +248,22 @@ impl<'a> Run<'a> {
         if self.now >= self.settings.time_limit {
             return Err(Stop::Over(Verdict::TimeLimit));
         }
-        Ok(())
+        let moves_on = self.progress.note(&self.now, self.steps);
+        moves_on.map_err(|why| Stop::World(WorldError::new(why)))
+    }
+
+    /// A fact that no plan has mentioned may still matter to the next one.
+    fn know_what_the_world_mentions(&mut self) {
+        if let Some(task) = self.ports.world.grown() {
+            self.know(task);
+        }
+    }
+
+    /// The table of facts and fluents has grown.
+    fn know(&mut self, task: Arc<Task>) {
+        self.task = task;
+        self.belief.know(Arc::clone(&self.task));
+        self.ports.recorder.know(&self.task);
     }
 
     /// The executor takes the goal for reached. The world may look; then it is, or it is not.
@@ -248,6 +273,7 @@ impl<'a> Run<'a> {
         let facts: Vec<_> = std::mem::take(&mut footprint.reads).into_iter().collect();
         let fluents: Vec<_> = footprint.reads_fluents.into_iter().collect();
         let observations = self.ports.world.look(&facts, &fluents)?;
+        self.know_what_the_world_mentions();
         self.ports.recorder.record(&Entry::Looked {
             now: &now,
             observations: &observations,
@@ -297,6 +323,7 @@ impl<'a> Run<'a> {
             Err(why) => return Err(Stop::Over(Verdict::NoPlan { why })),
         };
         self.account.begin_plan(&mission.running);
+        self.steps = mission.time_triggered.steps.len();
         self.news.clear();
         self.ports.recorder.record(&Entry::Mission(&mission));
         if let Err(reason) = self.ports.executor.adopt(&mission) {

@@ -18,7 +18,8 @@ use crate::event::{Command, Observation};
 /// - A start that is refused is an `Ended` with a failure, at once.
 /// - Each [`Command::Cancel`] of a running action is answered by an `Ended`; if the action had
 ///   ended before the command came, that `Ended` is the answer.
-/// - Time never goes back.
+/// - Time never goes back, and it goes on: a wait in which nothing happens ends at the time that
+///   was asked for. Many answers without time passing are the sign of a broken world.
 ///
 /// Worlds break contracts. What happens then is defined in [`Run`](crate::run::Run): nothing
 /// hangs, and no report is believed twice.
@@ -51,6 +52,12 @@ pub trait World {
     /// The table of facts and fluents has grown, because a plan mentions new ones. Those known
     /// keep their numbers.
     fn know(&mut self, _task: &Arc<Task>) {}
+
+    /// The table with what the last answer has mentioned for the first time, if it has: that table
+    /// which it knew, and more.
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        None
+    }
 }
 
 /// Time that has passed.

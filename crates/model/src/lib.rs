@@ -26,6 +26,7 @@ pub mod ground;
 mod hash;
 mod instantiate;
 mod interference;
+mod mention;
 mod plan;
 pub mod problem;
 pub mod reachability;

@@ -61,6 +61,55 @@ impl Table {
         text
     }
 
+    /// For a terminal of `width` columns: headings are broken between words, and columns that do not
+    /// fit follow below, each time after the first one.
+    pub fn within(&self, width: usize) -> String {
+        let longest_word = |heading: &String| {
+            let words = heading.split(' ').map(|word| word.chars().count());
+            words.max().unwrap_or(0)
+        };
+        let of_cells = |column: usize| {
+            let cells = self.rows.iter().filter_map(|row| row.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let headings = self.headings.iter().enumerate();
+        let widths: Vec<usize> = headings
+            .map(|(column, heading)| of_cells(column).max(longest_word(heading)))
+            .collect();
+        let mut text = String::new();
+        for line in self.caption.lines() {
+            let _ = writeln!(text, "{}", broken(line, width).join("\n"));
+        }
+        for columns in blocks(&widths, width) {
+            text.push('\n');
+            self.write_block(&mut text, &columns, &widths);
+        }
+        text
+    }
+
+    /// Some columns, with their headings.
+    fn write_block(&self, text: &mut String, columns: &[usize], widths: &[usize]) {
+        let heading = |column: &usize| broken(&self.headings[*column], widths[*column]);
+        let headings: Vec<Vec<String>> = columns.iter().map(heading).collect();
+        let height = headings.iter().map(Vec::len).max().unwrap_or(0);
+        let lines = (0..height).map(|line| {
+            let part = |heading: &Vec<String>| heading.get(line).cloned().unwrap_or_default();
+            headings.iter().map(part).collect()
+        });
+        let rows = self.rows.iter().map(|row| {
+            let cell = |column: &usize| row.get(*column).cloned().unwrap_or_default();
+            columns.iter().map(cell).collect::<Vec<String>>()
+        });
+        for cells in lines.chain(rows) {
+            let mut line = String::new();
+            for (cell, column) in cells.iter().zip(columns) {
+                let pad = widths[*column].saturating_sub(cell.chars().count());
+                let _ = write!(line, "{cell}{}  ", " ".repeat(pad));
+            }
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+    }
+
     fn widths(&self) -> Vec<usize> {
         let width = |column: usize| {
             let rows = std::iter::once(&self.headings).chain(&self.rows);
@@ -70,6 +119,40 @@ impl Table {
         };
         (0..self.headings.len()).map(width).collect()
     }
+}
+
+/// Which columns stand side by side: the first one, and as many others as fit, but at least one.
+fn blocks(widths: &[usize], width: usize) -> Vec<Vec<usize>> {
+    let Some(&first) = widths.first() else {
+        return Vec::new();
+    };
+    let mut blocks = Vec::new();
+    let (mut block, mut used) = (vec![0], first);
+    for (column, own) in widths.iter().enumerate().skip(1) {
+        if block.len() > 1 && used + 2 + own > width {
+            blocks.push(std::mem::replace(&mut block, vec![0]));
+            used = first;
+        }
+        block.push(column);
+        used += 2 + own;
+    }
+    blocks.push(block);
+    blocks
+}
+
+/// The words in lines that are no longer than `width`, where words are not.
+fn broken(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ') {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 fn quoted(cell: &str) -> String {
@@ -83,6 +166,23 @@ fn quoted(cell: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::Table;
+
+    #[test]
+    fn wide_tables_are_broken_and_lose_nothing() {
+        let headings = ["who", "one: coverage [95 %]", "two: coverage [95 %]"];
+        let row = ["a", "1.0 [0.5, 2.0]", "3.0 [2.5, 4.0]"];
+        let table = Table {
+            caption: "How often it works".to_owned(),
+            headings: headings.map(str::to_owned).to_vec(),
+            rows: vec![row.map(str::to_owned).to_vec()],
+        };
+        let expected = "How often it works\n\n\
+                        who  one: coverage\n     [95 %]\na    1.0 [0.5, 2.0]\n\n\
+                        who  two: coverage\n     [95 %]\na    3.0 [2.5, 4.0]\n";
+        assert_eq!(table.within(20), expected);
+        let all = table.within(80);
+        assert!(all.contains("one: coverage   two: coverage\n"), "{all}");
+    }
 
     #[test]
     fn cells_line_up_and_commas_are_quoted() {

@@ -3,6 +3,8 @@
 //! Numbers are written as `{"exact": "1393/2", "decimal": 696.5}`, and read as that, as a number,
 //! or as a text.
 
+use std::sync::Arc;
+
 use elbowroom_execution::{Command, Ending, Event, Measured, Observation, Ticket};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -126,6 +128,31 @@ pub fn observation(task: &Task, observation: &Observation) -> Value {
     };
     message["time"] = number(&observation.time);
     message
+}
+
+/// Enters what an observation mentions in the table, if the problem has it and nothing has mentioned
+/// it before; whether the table has grown. Who watches the world cannot know what plans mention.
+pub fn mention(message: &Value, names: &mut Names, task: &mut Arc<Task>) -> bool {
+    let text = |name: &str| message.get(name).and_then(Value::as_str);
+    let before = (task.fact_count(), task.fluent_count());
+    match text("type") {
+        Some("fact") => {
+            if let Some(name) = text("fact").filter(|name| names.fact(name).is_none()) {
+                Arc::make_mut(task).mention_fact(name);
+            }
+        }
+        Some("value") => {
+            if let Some(name) = text("fluent").filter(|name| names.fluent(name).is_none()) {
+                Arc::make_mut(task).mention_fluent(name);
+            }
+        }
+        _ => {}
+    }
+    let has_grown = (task.fact_count(), task.fluent_count()) != before;
+    if has_grown {
+        names.learn(task);
+    }
+    has_grown
 }
 
 /// Reads an observation.

@@ -142,15 +142,24 @@ impl Distribution {
     }
 }
 
-/// The nearest multiple of `resolution`.
+/// The nearest multiple of `resolution`; the value itself where the resolution is so fine that
+/// the value has more steps than a float can count one by one.
 pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     let steps = (value / resolution.to_f64()).round();
-    // Beyond that, 64 bits no longer count single steps, and nobody means such a number.
-    let bounded = steps.clamp(-9e15, 9e15);
+    if steps.abs() > MOST_STEPS
+        && let Ok(exact) = value.to_string().parse()
+    {
+        return exact;
+    }
+    // Only what is no number at all is left to be bounded.
+    let bounded = steps.clamp(-MOST_STEPS, MOST_STEPS);
     #[allow(clippy::cast_possible_truncation, reason = "just bounded, and whole")]
     let steps = bounded as i64;
     Rational::from(steps) * resolution
 }
+
+/// Beyond that, floats no longer count single steps (2⁵³ is a little more).
+const MOST_STEPS: f64 = 9e15;
 
 #[cfg(test)]
 mod tests {
@@ -238,5 +247,10 @@ mod tests {
         assert_eq!(rounded(2.000_49, &thousandth), Rational::from(2));
         assert_eq!(rounded(-1.5, &thousandth), Rational::new(-3, 2));
         assert!(rounded(1e300, &thousandth).is_positive());
+        assert!(rounded(f64::INFINITY, &thousandth).is_positive());
+        // A resolution finer than a float can count once made nine seconds of twelve.
+        let fine = Rational::new(1, 1_000_000_000_000_000);
+        assert_eq!(rounded(12.0, &fine), Rational::from(12));
+        assert_eq!(rounded(-12.5, &fine), Rational::new(-25, 2));
     }
 }

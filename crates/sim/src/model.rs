@@ -106,7 +106,7 @@ pub struct Reports {
     /// It comes late.
     pub late: f64,
     /// By how much.
-    pub lateness: Distribution,
+    pub lateness: Rule,
     /// Before or after it comes one that says the opposite.
     pub contradicted: f64,
 }
@@ -199,6 +199,37 @@ impl Rule {
         }
         rounded(value, resolution)
     }
+
+    /// Whether a number that somebody wrote down is negative, or all that can be drawn is. A
+    /// distribution that reaches below 0 is none of these: there, 0 is meant.
+    fn means_negative(&self) -> bool {
+        let cut = |value: f64| {
+            let value = self.minimum.map_or(value, |minimum| value.max(minimum));
+            self.maximum.map_or(value, |maximum| value.min(maximum))
+        };
+        match &self.distribution {
+            Distribution::Constant(value) => cut(*value) < 0.0,
+            Distribution::Empirical(values) => values.iter().any(|value| cut(*value) < 0.0),
+            Distribution::Uniform { to, .. } | Distribution::Triangular { to, .. } => {
+                cut(*to) < 0.0
+            }
+            Distribution::Normal { .. } | Distribution::LogNormal { .. } => {
+                self.maximum.is_some_and(|maximum| maximum < 0.0)
+            }
+        }
+    }
+}
+
+impl From<Distribution> for Rule {
+    /// Neither cut nor scaled.
+    fn from(distribution: Distribution) -> Self {
+        Self {
+            distribution,
+            minimum: None,
+            maximum: None,
+            is_relative: false,
+        }
+    }
 }
 
 impl Default for Reports {
@@ -208,7 +239,7 @@ impl Default for Reports {
             lost: 0.0,
             duplicated: 0.0,
             late: 0.0,
-            lateness: Distribution::Constant(0.0),
+            lateness: Distribution::Constant(0.0).into(),
             contradicted: 0.0,
         }
     }

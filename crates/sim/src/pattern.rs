@@ -63,6 +63,12 @@ impl ActionPattern {
         })
     }
 
+    /// Whether something of that name may be meant, whatever its objects.
+    pub(crate) fn may_match(&self, name: &str) -> bool {
+        let mine = self.name.as_deref();
+        mine.is_none_or(|mine| mine.eq_ignore_ascii_case(name))
+    }
+
     /// Whether a ground name, `(name object …)`, is meant.
     pub fn matches(&self, ground: &str) -> bool {
         let Some(name) = &self.name else {

@@ -12,7 +12,7 @@ use elbowroom_num::Rational;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::draw::{Purpose, keyed, rounded};
+use crate::draw::{Purpose, keyed};
 use crate::model::Reports;
 
 /// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
@@ -56,8 +56,9 @@ impl<W: World> Unreliable<W> {
     fn send(&mut self, observation: Observation) {
         let mut arrival = self.now.clone();
         if self.chance(self.reports.late) {
-            let lateness = self.reports.lateness.draw(&mut self.rng);
-            arrival += &rounded(lateness, &self.resolution).max(Rational::ZERO);
+            let rule = &self.reports.lateness;
+            let lateness = rule.draw(&Rational::ZERO, &self.resolution, &mut self.rng);
+            arrival += &lateness.max(Rational::ZERO);
         }
         self.coming.insert((arrival, self.count), observation);
         self.count += 1;
@@ -118,6 +119,10 @@ impl<W: World> World for Unreliable<W> {
 
     fn know(&mut self, task: &Arc<Task>) {
         self.inner.know(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        self.inner.grown()
     }
 
     fn look(

@@ -6,11 +6,13 @@ use elbowroom_sim::WorldModel;
 
 fn problem() -> Problem {
     let domain = "(define (domain post) (:requirements :typing :durative-actions :fluents)
-        (:types place) (:predicates (at ?p - place)) (:functions (charge))
+        (:types place) (:predicates (at ?p - place)) (:functions (charge) (level))
         (:durative-action go :parameters (?p - place) :duration (= ?duration 5)
-          :condition () :effect (and (at end (at ?p)) (at end (decrease (charge) 2)))))";
+          :condition () :effect (and (at end (at ?p)) (at end (decrease (charge) 2))))
+        (:durative-action fill :parameters () :duration (= ?duration 5)
+          :condition () :effect (increase (level) (* #t 2))))";
     let problem = "(define (problem p) (:domain post) (:objects a b - place)
-        (:init (= (charge) 9)) (:goal (at b)))";
+        (:init (= (charge) 9) (= (level) 0)) (:goal (at b)))";
     let read = read_problem(
         &Source::new("domain", domain),
         &Source::new("problem", problem),
@@ -108,6 +110,129 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
         assert_eq!(found, line, "{sections}: {message}");
         assert!(message.contains(words), "{sections}: {message}");
     }
+}
+
+/// What a section has and cannot use was once ignored: each line is the one that says too much.
+#[test]
+fn nothing_in_a_file_is_ignored() {
+    let cases = [
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nprobability = 0.5\n",
+            6,
+            "`probability`",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nfluent = \"charge\"\n",
+            6,
+            "`fluent`",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nwhen = \"end\"\n",
+            6,
+            "`when`",
+        ),
+        (
+            "[[delay]]\naction = \"go\"\nconstant = 1\nrelative = true\n",
+            6,
+            "`relative`",
+        ),
+        (
+            "[[failure]]\naction = \"go\"\nprobability = 1\nnormal = { mean = 1, deviation = 1 }\n",
+            6,
+            "`normal`",
+        ),
+        (
+            "[[event]]\nfact = \"(at a)\"\nbecomes = true\nconstant = 1\nrelative = true\n",
+            7,
+            "`relative`",
+        ),
+        (
+            "[reports]\nlate = 1\nconstant = 1\nrelative = true\n",
+            6,
+            "`relative`",
+        ),
+        (
+            "[reports]\nlate = 1\nconstant = 1\naction = \"go\"\n",
+            6,
+            "`action`",
+        ),
+        (
+            "[reports]\nlost = 1\nconstant = 1\n",
+            5,
+            "`late` is missing",
+        ),
+        (
+            "[[amount]]\naction = \"fill\"\nfluent = \"charge\"\nconstant = 1\n",
+            5,
+            "no such fluent",
+        ),
+        (
+            "[[amount]]\naction = \"*\"\nfluent = \"level\"\nconstant = 1\n",
+            5,
+            "only continuously",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nminimum = 30\nmaximum = 20\n",
+            7,
+            "less than `minimum`",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = 1\nminimum = nan\n",
+            6,
+            "finite",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nuniform = { from = 1, to = 2, minimum = 1 }\nminimum = 0\n",
+            5,
+            "once",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nconstant = -5\n",
+            5,
+            "never negative",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nvalues = [3, -5]\n",
+            5,
+            "never negative",
+        ),
+        (
+            "[[delay]]\naction = \"go\"\nuniform = { from = -3, to = -1 }\n",
+            5,
+            "never negative",
+        ),
+        (
+            "[[event]]\nfact = \"(at a)\"\nbecomes = true\nconstant = -1\n",
+            6,
+            "never negative",
+        ),
+        (
+            "[[event]]\nfact = \"(at a)\"\nbecomes = \"no\"\nconstant = 1\n",
+            5,
+            "write true or false",
+        ),
+        (
+            "[[duration]]\naction = \"go\"\nvalues = [1, \"a\"]\n",
+            5,
+            "expected a number",
+        ),
+    ];
+    for (sections, line, words) in cases {
+        let (found, message) = mistake(sections);
+        assert_eq!(found, line, "{sections}: {message}");
+        assert!(message.contains(words), "{sections}: {message}");
+    }
+}
+
+#[test]
+fn the_limits_of_late_reports_count() {
+    let text = "format = \"elbowroom-world\"\nversion = 1\n[reports]\nlate = 1\n\
+        uniform = { from = 0, to = 10 }\nminimum = 20\nmaximum = 20\n";
+    let model = WorldModel::read(text, &problem()).expect("a correct file");
+    let mut rng = elbowroom_sim::draw::keyed(0, "", 0, elbowroom_sim::Purpose::Report);
+    let lateness = &model.reports.lateness;
+    let drawn = lateness.draw(&0.into(), &model.resolution, &mut rng);
+    assert_eq!(drawn, 20.into());
 }
 
 #[test]

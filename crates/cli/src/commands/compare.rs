@@ -6,11 +6,13 @@ use std::sync::Mutex;
 
 use elbowroom::compare::{self, Experiment, Part, Results};
 use elbowroom::perturbed::{self, PerturbedExperiment, PerturbedResults};
+use elbowroom::report::table::Table;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::look::Look;
 use crate::{input, output};
 
 /// Makes an experiment, or a part of it, or puts parts together.
@@ -27,6 +29,10 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
         fs::read_to_string(&path)
             .map_err(|error| format!("cannot read {}: {}", path.display(), output::plain(&error)))
     };
+    // Who cannot write there learns it before hours of trials, not after.
+    if let Some(folder) = &arguments.output {
+        make_folder(folder)?;
+    }
     if PerturbedExperiment::is_one(text.text()) {
         return perturbed(arguments, &name, text.text(), &file);
     }
@@ -35,17 +41,20 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     let results = if arguments.merge.is_empty() {
         make(arguments, &experiment)?
     } else {
-        merged(&arguments.merge)?
+        merged(&arguments.merge, &experiment)?
     };
-    if let Some(folder) = &arguments.output {
-        write(folder, &experiment, &results)?;
-    }
+    let width = Look::of_stdout().width;
+    // What was computed is shown, whatever becomes of the files.
+    let written = match &arguments.output {
+        Some(folder) => write(folder, &experiment, &results),
+        None => Ok(()),
+    };
     if arguments.json {
         output::print_json(&results.json())?;
     } else {
-        output::print(&results.table(&experiment).plain())?;
+        output::print(&results.table(&experiment).within(width))?;
     }
-    Ok(Exit::Yes)
+    written.map(|()| Exit::Yes)
 }
 
 /// An experiment in worlds without time.
@@ -71,23 +80,32 @@ fn perturbed(
         merged_perturbed(&arguments.merge, &experiment)?
     };
     let table = perturbed::table(&results);
-    if let Some(folder) = &arguments.output {
-        make_folder(folder)?;
-        let write = |name: &str, text: &str| output::write_file(&folder.join(name), text);
-        write("results.json", &format!("{:#}\n", results.json()))?;
-        write("table.md", &table.markdown())?;
-        write("table.csv", &table.csv())?;
-        for (name, plot) in perturbed::plots(&results) {
-            let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
-            write(&format!("{name}.svg"), &svg)?;
-        }
-    }
+    let written = match &arguments.output {
+        Some(folder) => write_perturbed(folder, &results, &table),
+        None => Ok(()),
+    };
     if arguments.json {
         output::print_json(&results.json())?;
     } else {
-        output::print(&table.plain())?;
+        output::print(&table.within(Look::of_stdout().width))?;
     }
-    Ok(Exit::Yes)
+    written.map(|()| Exit::Yes)
+}
+
+fn write_perturbed(
+    folder: &Path,
+    results: &PerturbedResults,
+    table: &Table,
+) -> Result<(), Failure> {
+    let write = |name: &str, text: &str| output::write_file(&folder.join(name), text);
+    write("results.json", &format!("{:#}\n", results.json()))?;
+    write("table.md", &table.markdown())?;
+    write("table.csv", &table.csv())?;
+    for (name, plot) in perturbed::plots(results) {
+        let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
+        write(&format!("{name}.svg"), &svg)?;
+    }
+    Ok(())
 }
 
 fn merged_perturbed(
@@ -100,14 +118,18 @@ fn merged_perturbed(
         let wrong = |error| Failure::new(format!("{}: {error}", path.display()), "");
         let part = PerturbedResults::read(text.text()).map_err(wrong)?;
         if !part.are_of(experiment) {
-            return Err(Failure::new(
-                format!("{} is not of this experiment", path.display()),
-                "give the results of its parts, made from the same files",
-            ));
+            return Err(of_another(path));
         }
         parts.push(part);
     }
     PerturbedResults::merged(&parts).map_err(|error| Failure::new(error, ""))
+}
+
+fn of_another(path: &Path) -> Failure {
+    Failure::new(
+        format!("{} is not of this experiment", path.display()),
+        "give the results of its parts, made from the same files",
+    )
 }
 
 fn make(arguments: &CompareArgs, experiment: &Experiment) -> Result<Results, Failure> {
@@ -144,18 +166,21 @@ fn make(arguments: &CompareArgs, experiment: &Experiment) -> Result<Results, Fai
     results.map_err(|error| Failure::new(error, ""))
 }
 
-fn merged(paths: &[PathBuf]) -> Result<Results, Failure> {
+fn merged(paths: &[PathBuf], experiment: &Experiment) -> Result<Results, Failure> {
     let mut parts = Vec::new();
     for path in paths {
         let text = input::source(path, "results")?;
-        let part = Results::read(text.text());
-        parts.push(part.map_err(|error| Failure::new(format!("{}: {error}", path.display()), ""))?);
+        let wrong = |error| Failure::new(format!("{}: {error}", path.display()), "");
+        let part = Results::read(text.text()).map_err(wrong)?;
+        if !part.are_of(experiment) {
+            return Err(of_another(path));
+        }
+        parts.push(part);
     }
     Results::merged(&parts).map_err(|error| Failure::new(error, ""))
 }
 
 fn write(folder: &Path, experiment: &Experiment, results: &Results) -> Result<(), Failure> {
-    make_folder(folder)?;
     let table = results.table(experiment);
     output::write_file(
         &folder.join("results.json"),
@@ -173,7 +198,7 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
                 folder.display(),
                 output::plain(&error)
             ),
-            "",
+            "choose a folder that you may make, or that exists already",
         )
     })
 }

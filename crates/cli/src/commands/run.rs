@@ -9,7 +9,7 @@ mod trace_file;
 
 use std::sync::Arc;
 
-use elbowroom::execute::{Analyst, WholeRegion};
+use elbowroom::execute::{Analyst, WholeRegion, check_vary};
 use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
     self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
@@ -27,9 +27,9 @@ use serde_json::{Value, json};
 use crate::args::{RunArgs, RunningChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::{self, AnyPlan};
-use crate::output;
+use crate::output::{self, tame};
 use planner::Who;
-use realtime::Realtime;
+use realtime::{Pace, PacedPlanner, Realtime};
 use trace_file::TraceFile;
 
 /// Executes a plan, or plays a stored run back.
@@ -53,6 +53,9 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     };
     let likelihoods = likelihoods_text(arguments)?;
     let choices = Choices::of(arguments, likelihoods.as_ref(), &task)?;
+    check_vary(&task, &choices.flow.vary).map_err(|error| {
+        Failure::new(error, "`elbowroom help envelope` says what --vary can name")
+    })?;
     who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
@@ -73,7 +76,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
             Some(command) => {
                 let within = &arguments.answer_within;
                 let mut world = process::ProcessWorld::start(command, &job.task, within)?;
-                let report = job.run(&mut world, None, &mut writer);
+                let report = job.run(&mut world, None, None, &mut writer);
                 world.stop();
                 report
             }
@@ -100,16 +103,30 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// A run in a world; `model` is what is known of it.
+    /// A run in a world; `model` is what is known of it, and `pace` its wall clock, if it has one.
     fn run(
         &self,
         world: &mut dyn World,
         model: Option<&WorldModel>,
+        pace: Option<&Pace>,
         recorder: &mut dyn Recorder,
     ) -> Report {
         let (choices, first) = (&self.choices, self.first.as_ref());
-        let run =
-            |planning: Planning<'_>| choices.run_with(&self.task, first, world, planning, recorder);
+        let run = |planning: Planning<'_>| {
+            let Some(pace) = pace else {
+                return choices.run_with(&self.task, first, world, planning, recorder);
+            };
+            let mut paced = PacedPlanner {
+                inner: planning.planner,
+                pace,
+                planning_time: &choices.settings.planning_time,
+            };
+            let planning = Planning {
+                planner: &mut paced,
+                odds: planning.odds,
+            };
+            choices.run_with(&self.task, first, world, planning, recorder)
+        };
         self.who
             .with(self.arguments, &self.texts, choices, model, run)
     }
@@ -144,10 +161,15 @@ impl Job<'_> {
             unreliable = Unreliable::new(sim, reports, arguments.seed, resolution);
             &mut unreliable
         };
-        Ok(match &arguments.realtime {
-            None => self.run(world, Some(&model), recorder),
-            Some(factor) => self.run(&mut Realtime::new(world, factor), Some(&model), recorder),
-        })
+        let Some(factor) = &arguments.realtime else {
+            return Ok(self.run(world, Some(&model), None, recorder));
+        };
+        let pace = Pace::new(factor);
+        let mut world = Realtime {
+            inner: world,
+            pace: &pace,
+        };
+        Ok(self.run(&mut world, Some(&model), Some(&pace), recorder))
     }
 }
 
@@ -192,7 +214,7 @@ impl Choices {
                     RunningChoice::Await => RunningRule::Await,
                     RunningChoice::Keep => RunningRule::Keep,
                 },
-                planning_time: planning_time(&arguments.planning_time)?,
+                planning_time: planning_time(planning_time_text(arguments))?,
                 most_replans: arguments.max_replans,
                 time_limit: arguments.time_limit.clone(),
                 ..RunSettings::default()
@@ -299,6 +321,15 @@ fn likelihoods_text(arguments: &RunArgs) -> Result<Option<Source>, Failure> {
         .transpose()
 }
 
+/// On a wall clock, making plans takes time unless somebody says otherwise.
+fn planning_time_text(arguments: &RunArgs) -> &str {
+    let otherwise = match &arguments.realtime {
+        Some(_) => "measured",
+        None => "0",
+    };
+    arguments.planning_time.as_deref().unwrap_or(otherwise)
+}
+
 fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
     if text == "measured" {
         return Ok(PlanningTime::Measured);
@@ -307,7 +338,7 @@ fn planning_time(text: &str) -> Result<PlanningTime, Failure> {
         Ok(seconds) if !seconds.is_negative() => Ok(PlanningTime::Seconds(seconds)),
         _ => Err(Failure::new(
             format!("`--planning-time {text}` is neither `measured` nor a number of seconds"),
-            "",
+            "write, for example, --planning-time 2.5",
         )),
     }
 }
@@ -335,7 +366,8 @@ fn header(
         "vary": arguments.vary,
         "precision": arguments.precision.to_string(),
         "running": format!("{:?}", arguments.running).to_lowercase(),
-        "planning_time": arguments.planning_time,
+        "planning_time": planning_time_text(arguments),
+        "realtime": arguments.realtime.as_ref().map(ToString::to_string),
         "max_replans": arguments.max_replans,
         "time_limit": arguments.time_limit.to_string(),
         "epsilon": arguments.epsilon.to_string(),
@@ -347,6 +379,11 @@ pub(super) fn exit(verdict: &Verdict) -> Answer {
         Verdict::GoalReached => Exit::Yes,
         Verdict::Unsolvable | Verdict::NoPlan { .. } => Exit::No,
         Verdict::ReplanLimit | Verdict::TimeLimit => Exit::Limit,
-        Verdict::WorldFailed { why } => return Err(Failure::new(why, "")),
+        Verdict::WorldFailed { why } => {
+            return Err(Failure::new(
+                format!("the world failed: {}", tame(why)),
+                "docs/formats/world-protocol.md says what a world must do",
+            ));
+        }
     })
 }

@@ -144,11 +144,13 @@ impl Experiment {
             let message = "this program reads format = \"elbowroom-experiment\", version = 1";
             return Err(wrong(read.format.span().start, message.to_owned()));
         }
+        read.check_size()
+            .map_err(|(at, message)| wrong(at, message))?;
         let named = |name: &Spanned<String>| {
             file(name.get_ref()).map_err(|error| wrong(name.span().start, error))
         };
         let mut executors = Vec::new();
-        for name in &read.executors {
+        for name in read.executors.get_ref() {
             let spec = name.get_ref().parse::<ExecutorSpec>();
             executors.push(spec.map_err(|error| wrong(name.span().start, error.to_string()))?);
         }
@@ -166,20 +168,22 @@ impl Experiment {
                 vary,
             });
         }
-        for published in &read.published {
-            if published.get_ref().coverage.len() != columns.len() {
-                let message = "write one figure for each column";
-                return Err(wrong(published.span().start, message.to_owned()));
-            }
-        }
+        let rows = rows(&executors, read.clairvoyant);
+        read.check_published(&rows)
+            .map_err(|(at, message)| wrong(at, message))?;
         let mut together = Vec::new();
         for group in &read.together {
             let width = group.names.len();
-            if let Some(row) = group.rows.iter().find(|row| row.get_ref().len() != width) {
+            if let Some(row) = group
+                .rows
+                .get_ref()
+                .iter()
+                .find(|row| row.get_ref().len() != width)
+            {
                 let message = format!("write {width} values, one for each name");
                 return Err(wrong(row.span().start, message));
             }
-            let rows = group.rows.iter();
+            let rows = group.rows.get_ref().iter();
             together.push(Together {
                 names: group.names.clone(),
                 rows: rows
@@ -206,13 +210,13 @@ impl Experiment {
             blanks: read
                 .blanks
                 .into_iter()
-                .map(|(name, values)| (name, values.iter().map(text_of).collect()))
+                .map(|(name, values)| (name, values.get_ref().iter().map(text_of).collect()))
                 .collect(),
             together,
             columns,
             executors,
             clairvoyant: read.clairvoyant,
-            trials: read.trials,
+            trials: read.trials.into_inner(),
             seed: read.seed,
             settings,
             precision,
@@ -256,10 +260,14 @@ impl Experiment {
 
     /// The names of the rows.
     pub fn rows(&self) -> Vec<String> {
-        let rows = self.executors.iter().map(ToString::to_string);
-        let last = self.clairvoyant.then(|| CLAIRVOYANT.to_owned());
-        rows.chain(last).collect()
+        rows(&self.executors, self.clairvoyant)
     }
+}
+
+fn rows(executors: &[ExecutorSpec], clairvoyant: bool) -> Vec<String> {
+    let rows = executors.iter().map(ToString::to_string);
+    let last = clairvoyant.then(|| CLAIRVOYANT.to_owned());
+    rows.chain(last).collect()
 }
 
 /// The row for plans that are made knowing what will happen.

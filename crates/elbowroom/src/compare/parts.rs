@@ -1,5 +1,6 @@
 //! Experiments in parts: which parts belong together, and what they make together.
 
+use std::collections::BTreeSet;
 use std::fmt::Debug;
 
 /// Results of a part of an experiment, or of several.
@@ -43,6 +44,31 @@ pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
     Ok(whole)
 }
 
+/// Whether an experiment that is split into `shards` parts has these, each of them once.
+pub(crate) fn are_possible(shards: u64, parts: &[u64]) -> bool {
+    let mut seen = BTreeSet::new();
+    !parts.is_empty() && parts.iter().all(|part| *part < shards && seen.insert(part))
+}
+
+/// How many trials of `what` were made, in words; where parts are missing, it says so.
+pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> String {
+    let shards = shards.max(1);
+    if (0..shards).all(|part| parts.contains(&part)) {
+        return format!("{trials} trials of {what}");
+    }
+    // Part p has the trials p, p + shards, … below `trials`.
+    let of_part = |part: &u64| trials.saturating_sub(*part).div_ceil(shards);
+    let count: u64 = parts.iter().map(of_part).sum();
+    let names: Vec<String> = parts
+        .iter()
+        .map(|part| format!("{part}/{shards}"))
+        .collect();
+    format!(
+        "incomplete: {count} of {trials} trials of {what}; parts made: {}",
+        names.join(", ")
+    )
+}
+
 /// A number that is different for different experiments: FNV-1a over all that they depend on.
 pub(crate) fn fingerprint(experiment: &impl Debug, trials: u64) -> String {
     let everything = format!("{trials} {experiment:?}");
@@ -52,4 +78,41 @@ pub(crate) fn fingerprint(experiment: &impl Debug, trials: u64) -> String {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         });
     format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{are_possible, made};
+    use crate::compare::Part;
+
+    #[test]
+    fn what_was_made_is_what_the_parts_have() {
+        assert_eq!(
+            made(8, "each problem", 3, &[0, 1, 2]),
+            "8 trials of each problem"
+        );
+        for (trials, shards) in [(8, 3), (2, 5), (9, 3), (1, 1)] {
+            for shard in 0..shards {
+                let part = Part {
+                    trials,
+                    shard,
+                    shards,
+                    jobs: 0,
+                };
+                let words = made(trials, "it", shards, &[shard]);
+                let count = part.numbers().count();
+                let expected =
+                    format!("{count} of {trials} trials of it; parts made: {shard}/{shards}");
+                assert!(shards == 1 || words.ends_with(&expected), "{words}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_is_there_once_and_below_the_number_of_parts() {
+        assert!(are_possible(3, &[2, 0]));
+        for (shards, parts) in [(3, vec![3]), (3, vec![1, 1]), (1, vec![]), (0, vec![0])] {
+            assert!(!are_possible(shards, &parts), "{shards}: {parts:?}");
+        }
+    }
 }

@@ -111,12 +111,25 @@ impl Results {
         if cells != vec![width; height] || pairs != cells {
             return Err(ResultsError("rows and columns do not fit".to_owned()));
         }
+        if !parts::are_possible(results.shards, &results.parts) {
+            return Err(ResultsError("there are no such parts".to_owned()));
+        }
         Ok(results)
     }
 
     /// As JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Whether these are results of that experiment, with any number of trials.
+    pub fn are_of(&self, experiment: &Experiment) -> bool {
+        self.fingerprint == fingerprint(experiment, self.trials)
+            && self.rows == experiment.rows()
+            && self
+                .columns
+                .iter()
+                .eq(experiment.columns.iter().map(|it| &it.name))
     }
 
     /// Puts parts of one experiment together.
@@ -149,7 +162,11 @@ impl Results {
             cells
         });
         Table {
-            caption: format!("{} ({} trials of each problem)", self.title, self.trials),
+            caption: format!(
+                "{} ({})",
+                self.title,
+                parts::made(self.trials, "each problem", self.shards, &self.parts)
+            ),
             rows: rows.collect(),
             headings,
         }
@@ -250,9 +267,10 @@ impl Experiment {
             .replans
             .get(column)
             .filter(|mean| mean.is_finite());
-        match replans {
-            Some(replans) => format!("{:.1} ({replans:.1})", published.coverage[column]),
-            None => format!("{:.1}", published.coverage[column]),
+        match (published.coverage.get(column), replans) {
+            (Some(coverage), Some(replans)) => format!("{coverage:.1} ({replans:.1})"),
+            (Some(coverage), None) => format!("{coverage:.1}"),
+            (None, _) => "-".to_owned(),
         }
     }
 }

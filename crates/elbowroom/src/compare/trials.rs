@@ -293,6 +293,9 @@ impl Setting<'_> {
     }
 
     fn wrong(&self, message: &str) -> ExperimentError {
+        if self.filling.is_empty() {
+            return ExperimentError::other(format!("the problem: {message}"));
+        }
         let filling = self.filling.iter();
         let filling: Vec<_> = filling
             .map(|(name, value)| format!("{name} = {value}"))

@@ -12,6 +12,7 @@ use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use super::facts_only::{facts_only, sorted};
+use super::vary::is_about_an_absent_action;
 use crate::flow;
 
 /// Makes plans ready with [`flow`].
@@ -36,7 +37,7 @@ impl Analyst {
             match parametrize(task, plan, &freed.deordered.nominal, one) {
                 Ok(_) => fitting.push(spec.clone()),
                 Err(ParametrizeError::NothingMatches { .. }) => {}
-                Err(ParametrizeError::UnknownName { .. }) if is_about_actions(task, spec) => {}
+                Err(error) if is_about_an_absent_action(task, spec, &error) => {}
                 Err(error) => return Err(error.to_string()),
             }
         }
@@ -146,16 +147,4 @@ impl Region for WholeRegion {
         let envelope = DecoupledEnvelope::point(values);
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }
-}
-
-/// Whether a specification that fits nothing names an action of the domain, which this plan just
-/// does not use.
-fn is_about_actions(task: &Task, spec: &VarySpec) -> bool {
-    let schemas = &task.problem().schemas;
-    let mut words = spec.text.split([' ', '(', ')']);
-    words.any(|word| {
-        schemas
-            .iter()
-            .any(|schema| schema.name.eq_ignore_ascii_case(word))
-    })
 }

@@ -56,6 +56,9 @@ impl PerturbedResults {
                 "this program reads {FORMAT}, version 1"
             )));
         }
+        if !parts::are_possible(results.shards, &results.parts) {
+            return Err(PerturbedError::other("there are no such parts"));
+        }
         Ok(results)
     }
 

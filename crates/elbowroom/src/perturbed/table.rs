@@ -4,6 +4,8 @@ use elbowroom_report::plot::{IntervalPlot, Point, Series};
 use elbowroom_report::statistics::{Mean, Proportion};
 use elbowroom_report::table::Table;
 
+use crate::compare::parts;
+
 use super::{ExecutorKind, PerturbedResults, Row, WorldKind};
 
 /// The results as a table.
@@ -52,7 +54,12 @@ pub fn table(results: &PerturbedResults) -> Table {
             mean(row.failed.actions),
         ]
     };
-    let caption = [results.title.clone()].into_iter();
+    let mut title = results.title.clone();
+    let made = parts::made(results.trials, "each row", results.shards, &results.parts);
+    if made.starts_with("incomplete") {
+        title = format!("{title} ({made})");
+    }
+    let caption = [title].into_iter();
     let caption = caption.chain(agreement(rows)).chain(nearness(rows));
     Table {
         caption: caption.collect::<Vec<_>>().join("\n"),

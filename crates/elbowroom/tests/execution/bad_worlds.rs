@@ -53,7 +53,8 @@ fn bad(run: u64) -> Reports {
         lateness: Distribution::Uniform {
             from: 0.0,
             to: 40.0,
-        },
+        }
+        .into(),
         ..Reports::default()
     };
     match run % 5 {

@@ -61,10 +61,8 @@ impl Run<'_> {
         if (task.fact_count(), task.fluent_count())
             != (self.task.fact_count(), self.task.fluent_count())
         {
-            self.task = Arc::new(task);
-            self.belief.know(Arc::clone(&self.task));
+            self.know(Arc::new(task));
             self.ports.world.know(&self.task);
-            self.ports.recorder.know(&self.task);
         }
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),

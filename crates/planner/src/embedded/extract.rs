@@ -101,12 +101,11 @@ pub(crate) fn plan_of(
         })?;
     }
     let log = stepper.log.as_ref()?;
-    let times = match &state.symbolic {
-        None => exact_times(compiled, &state.network, log, settings)?,
-        Some(_) => {
-            let exact = exact_distances(log);
-            symbolic::solve(&state, compiled.scale, &exact, compiled.metric.as_ref())?
-        }
+    let times = if state.symbolic.is_none() {
+        exact_times(compiled, &state.network, log, settings)?
+    } else {
+        let exact = exact_distances(log);
+        symbolic::solve(&state, compiled.scale, &exact, compiled.metric.as_ref())?
     };
     let mut plan = TimeTriggeredPlan::default();
     for (number, timing) in timings.iter().enumerate() {

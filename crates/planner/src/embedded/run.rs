@@ -34,7 +34,7 @@ const HASTE: u64 = 20_000;
 const HASTE_WITH_RESOURCES: u64 = 2_048;
 
 /// How many turns the hasty search gets for each one of the complete search.
-const COMPLETE_SHARE: u64 = 10;
+const COMPLETE_SHARE: u64 = 8;
 
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound { stopped, counts }

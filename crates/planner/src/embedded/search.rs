@@ -7,93 +7,39 @@
 //! A search for plans of a better metric weighs what a state has spent against what the relaxed
 //! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
+mod doubt;
 mod limit;
 mod queue;
-mod share;
+mod style;
+
+use std::collections::VecDeque;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
-use super::compile::{Compiled, Eagerness, NONE};
+use super::compile::{Compiled, NONE};
 use super::guide::Guide;
 use super::hash::Map;
-use super::pairs::Pairs;
 use super::relaxed::Relaxed;
 use super::state::{Outlook, State};
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
+use doubt::Doubt;
 pub(crate) use limit::Limit;
 use queue::Queue;
-use share::Share;
+pub(crate) use style::{Aim, Style};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
+
+/// Each turn of that number goes to the successor that has waited longest, in a complete search. So
+/// it does not lose itself where an estimate is good, and endlessly many states are no goal.
+const FAIRNESS: u64 = 32;
 
 /// After how many states the stronger bound is asked about the beginning.
 pub(crate) const PATIENCE: u64 = 64;
 
 /// After how many states the stronger bound is asked about the next ones too.
 const DOUBT: u64 = 512;
-
-/// How a search goes about it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Style {
-    /// If present, actions that are at least so eager end at once, and states are compared
-    /// roughly. Some plans are lost.
-    pub(crate) haste: Option<Eagerness>,
-    /// How many states that differ in times only are kept; more are dropped, and some plans lost.
-    pub(crate) variants: usize,
-    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
-    pub(crate) fills_up: bool,
-    /// What is looked for.
-    pub(crate) aim: Aim,
-}
-
-/// What a search looks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Aim {
-    /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.
-    Goal,
-    /// Plans of a better metric. What costs least to finish comes first.
-    CheapRest,
-    /// Plans of a better metric. What has been spent counts too, what is still to be spent so many
-    /// times as much (weighted A*; Pohl 1970).
-    CheapWhole(i64),
-    /// Shorter plans of the same metric.
-    Shortest,
-}
-
-impl Style {
-    /// Loses nothing but what [`Search::is_incomplete`] tells.
-    pub(crate) const COMPLETE: Self = Self {
-        haste: None,
-        variants: usize::MAX,
-        fills_up: false,
-        aim: Aim::Goal,
-    };
-
-    /// Actions that are at least so eager end at once.
-    pub(crate) fn hasty(haste: Eagerness) -> Self {
-        Self {
-            haste: Some(haste),
-            variants: 4,
-            fills_up: false,
-            aim: Aim::Goal,
-        }
-    }
-
-    /// The same, filling up what is used up.
-    pub(crate) fn filling_up(self) -> Self {
-        Self {
-            fills_up: true,
-            ..self
-        }
-    }
-
-    /// The same with another aim.
-    pub(crate) fn towards(self, aim: Aim) -> Self {
-        Self { aim, ..self }
-    }
-}
 
 /// A search in progress.
 #[derive(Debug)]
@@ -103,17 +49,15 @@ pub(crate) struct Search<'a> {
     style: Style,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
-    /// A stronger bound, once the search takes long.
-    pairs: Option<Pairs<'a>>,
-    share: Share,
-    /// Whether there are too many pairs for that.
-    is_too_large: bool,
+    doubt: Doubt<'a>,
     has_begun: bool,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
     known: Map<u64, Vec<u32>>,
     all: Queue,
     preferred: Queue,
+    /// All successors, first come first served, in a search that has to come by everywhere.
+    oldest: VecDeque<(u32, Step)>,
     turns: [i64; 2],
     best_steps: u32,
     /// Whether times are irrelevant but for their distances.
@@ -126,6 +70,8 @@ pub(crate) struct Search<'a> {
     horizon: Ticks,
     /// Whether something was dropped that could have led to a plan.
     pub(crate) has_lost: bool,
+    /// How many successors had their turn.
+    drawn: u64,
     pub(crate) expanded: u64,
     pub(crate) generated: u64,
     pub(crate) evaluated: u64,
@@ -189,15 +135,14 @@ impl<'a> Search<'a> {
             symmetry,
             style,
             stepper: Stepper::new(compiled),
+            doubt: Doubt::new(compiled, relaxed.size()),
             relaxed,
-            pairs: None,
-            share: Share::START,
-            is_too_large: false,
             has_begun: false,
             nodes: Vec::new(),
             known: Map::default(),
             all: Queue::default(),
             preferred: Queue::default(),
+            oldest: VecDeque::new(),
             turns: [0, 0],
             best_steps: u32::MAX,
             is_timeless,
@@ -205,6 +150,7 @@ impl<'a> Search<'a> {
             limit: None,
             horizon: NEVER,
             has_lost: false,
+            drawn: 0,
             expanded: 0,
             generated: 0,
             evaluated: 0,
@@ -259,7 +205,7 @@ impl<'a> Search<'a> {
 
     /// How many pairs the stronger bound has looked up.
     pub(crate) fn lookups(&self) -> u64 {
-        self.pairs.as_ref().map_or(0, |pairs| pairs.work)
+        self.doubt.lookups()
     }
 
     /// Looks at one more state.
@@ -271,13 +217,7 @@ impl<'a> Search<'a> {
             }
             return self.visit(ROOT, Step::Timed, initial);
         }
-        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
-        let queue = usize::from(!is_preferred_turn);
-        self.turns[queue] += 1;
-        let entry = match queue {
-            0 => self.preferred.pop(),
-            _ => self.all.pop().or_else(|| self.preferred.pop()),
-        };
+        let entry = self.next_entry();
         let Some((parent, step)) = entry else {
             return Turn::Over;
         };
@@ -289,6 +229,24 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         };
         self.visit(parent, step, state)
+    }
+
+    /// Whose turn it is.
+    fn next_entry(&mut self) -> Option<(u32, Step)> {
+        self.drawn += 1;
+        if self.drawn.is_multiple_of(FAIRNESS)
+            && !self.all.is_empty()
+            && let Some(oldest) = self.oldest.pop_front()
+        {
+            return Some(oldest);
+        }
+        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
+        let queue = usize::from(!is_preferred_turn);
+        self.turns[queue] += 1;
+        match queue {
+            0 => self.preferred.pop(),
+            _ => self.all.pop().or_else(|| self.preferred.pop()),
+        }
     }
 
     /// The successor; in haste, one in which what has started is over, if possible.
@@ -375,47 +333,41 @@ impl<'a> Search<'a> {
             outlook,
             hope: Hope::Unknown,
         });
-        if is_goal {
-            // A state in which the goal holds may still have successors worth looking at: the
-            // judge can refuse the plan.
-            self.expand(number, &estimate);
+        // A state in which the goal holds may still have successors worth looking at: the judge can
+        // refuse the plan, and another one can be better.
+        self.expand(number, &estimate);
+        if is_goal && self.may_be_better(number) {
             return Turn::Goal(self.steps_to(number));
         }
-        self.expand(number, &estimate);
         Turn::Nothing
     }
 
-    /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
-    /// successor of a state has its turn, and gets a share of the time.
-    fn is_cut(&mut self, number: u32) -> bool {
-        if self.pairs.is_none()
-            && self.evaluated >= DOUBT
-            && !self.is_timeless
-            && !self.is_too_large
-        {
-            self.pairs = Pairs::of(self.compiled);
-            self.is_too_large = self.pairs.is_none();
-        }
-        let Some(pairs) = &mut self.pairs else {
-            return false;
+    /// Whether the metric of a state in which the goal holds may be within the limit. This is for
+    /// metrics that do not only grow, and spares the judge.
+    fn may_be_better(&self, number: u32) -> bool {
+        let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
+            return true;
         };
+        let spent = metric.spent(&self.nodes[number as usize].state);
+        !metric.time.is_zero() || spent.is_none_or(|spent| spent <= limit.value)
+    }
+
+    /// Whether the stronger bound shows that no plan begins like this. It is asked when the first
+    /// successor of a state has its turn.
+    fn is_cut(&mut self, number: u32) -> bool {
         let node = &mut self.nodes[number as usize];
         match node.hope {
             Hope::Some => return false,
             Hope::None => return true,
             Hope::Unknown => {}
         }
-        node.hope = Hope::Some;
-        if !self.share.asks(self.relaxed.size(), self.evaluated) {
+        if self.is_timeless || self.evaluated < DOUBT {
             return false;
         }
-        pairs.horizon = self.stepper.horizon;
-        let before = pairs.work;
-        let is_hopeless = pairs.is_hopeless(&node.state);
-        self.share.note(pairs.work - before, is_hopeless);
-        if is_hopeless {
-            node.hope = Hope::None;
-        }
+        self.doubt.evaluated = self.evaluated;
+        self.doubt.horizon = self.stepper.horizon;
+        let is_hopeless = self.doubt.is_hopeless(&node.state);
+        node.hope = if is_hopeless { Hope::None } else { Hope::Some };
         is_hopeless
     }
 
@@ -433,6 +385,11 @@ impl<'a> Search<'a> {
         for &step in &estimate.applicable {
             self.generated += 1;
             self.all.push(rank, number, step);
+        }
+        if self.style.haste.is_none() {
+            let steps = estimate.applicable.iter();
+            self.oldest.extend(steps.map(|&step| (number, step)));
+            self.memory += 12 * estimate.applicable.len();
         }
     }
 

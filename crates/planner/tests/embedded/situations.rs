@@ -144,3 +144,62 @@ fn the_same_problem_has_the_same_answer_and_reports() {
     };
     assert_eq!(run(), run());
 }
+
+/// A tank that is being filled since 0, by two for each unit of time, when it is done; it is 6 now.
+fn filling(duration: Interval) -> (Task, Situation) {
+    let domain = "
+        (:requirements :durative-actions :numeric-fluents)
+        (:predicates (idle) (drained)) (:functions (level) (pumped))
+        (:durative-action fill :parameters () :duration (= ?duration 8)
+          :condition (at start (idle))
+          :effect (and (at start (not (idle))) (at end (idle))
+            (at end (increase (level) (* 2 ?duration)))
+            (at end (increase (pumped) (* 3 ?duration)))))
+        (:durative-action drain :parameters () :duration (= ?duration 1)
+          :condition (at start (>= (level) 16))
+          :effect (and (at start (decrease (level) 16)) (at end (drained))))";
+    let problem = "(:init (idle) (= (level) 0) (= (pumped) 0)) (:goal (drained))
+        (:metric minimize (pumped))";
+    let mut task = task(domain, problem);
+    let fill = task.problem().schema("fill").expect("as written above");
+    let action = task.instantiate(fill, &[]).expect("as written above");
+    let mut situation = Situation::initial(&task);
+    let idle = task.problem().predicate("idle").expect("as written above");
+    let idle = task.find_fact(idle, &[]).expect("as written above");
+    situation.state.facts.remove(&idle);
+    situation.time = 6.into();
+    situation.running.push(RunningAction {
+        action,
+        start: Rational::ZERO,
+        duration,
+    });
+    (task, situation)
+}
+
+#[test]
+fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
+    let (mut task, situation) = filling(Interval::closed(8.into(), 8.into()));
+    let answer = answer_from(&mut task, &situation, 100);
+    assert_eq!(describe(&answer), "0: (fill) [8]\n8001/1000: (drain) [1]");
+    let whole = plan(&mut task, &situation, &Settings::default(), &mut |_| {
+        ControlFlow::Continue(())
+    });
+    let found = whole.found().expect("there is a plan");
+    assert_eq!(found.metric, Some(24.into()));
+}
+
+#[test]
+fn what_takes_longer_than_it_should_changes_numbers_more() {
+    // The duration is known, and not the domain's.
+    let (mut task, situation) = filling(Interval::closed(10.into(), 10.into()));
+    let answer = answer_from(&mut task, &situation, 100);
+    assert_eq!(describe(&answer), "0: (fill) [10]\n10001/1000: (drain) [1]");
+    // It may last from 7 to 10: then it lasts as long as it has to.
+    let (mut task, situation) = filling(Interval::closed(7.into(), 10.into()));
+    let answer = answer_from(&mut task, &situation, 100);
+    assert!(
+        !matches!(answer, Answer::Unsolvable { .. }),
+        "{}",
+        describe(&answer)
+    );
+}

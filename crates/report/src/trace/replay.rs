@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::{FORMAT, VERSION};
 use crate::Names;
-use crate::wire::{field_number, read_number, read_observation};
+use crate::wire::{field_number, mention, read_number, read_observation};
 
 /// A trace that cannot be played back.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -103,6 +103,8 @@ impl Stored {
 /// A world that reports what a trace says it reported.
 pub struct ReplayWorld {
     names: Names,
+    task: Arc<Task>,
+    has_grown: bool,
     passages: VecDeque<(usize, Value)>,
 }
 
@@ -111,6 +113,8 @@ impl ReplayWorld {
     pub fn new(stored: &Stored, task: &Task) -> Self {
         Self {
             names: Names::of(task),
+            task: Arc::new(task.clone()),
+            has_grown: false,
             passages: stored.of_kind(&["passed", "looked"]),
         }
     }
@@ -125,6 +129,9 @@ impl ReplayWorld {
         let now = field_number(&entry, "now").map_err(|wrong| error(wrong.message))?;
         let reported = entry.get("observations").and_then(Value::as_array);
         let observations = reported.map(Vec::as_slice).unwrap_or_default().iter();
+        for observation in observations.clone() {
+            self.has_grown |= mention(observation, &mut self.names, &mut self.task);
+        }
         let observations = observations
             .map(|it| read_observation(it, &self.names).map_err(|wrong| error(wrong.message)));
         Ok(Passage {
@@ -155,6 +162,11 @@ impl World for ReplayWorld {
 
     fn know(&mut self, task: &Arc<Task>) {
         self.names.learn(task);
+        self.task = Arc::clone(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        std::mem::take(&mut self.has_grown).then(|| Arc::clone(&self.task))
     }
 }
 

@@ -1,10 +1,12 @@
 //! Reading world files.
 
+mod changes;
+mod section;
+
 use std::ops::Range;
 
 use elbowroom_model::Problem;
 use elbowroom_num::Rational;
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
@@ -12,75 +14,13 @@ use super::{
 };
 use crate::draw::Distribution;
 use crate::pattern::{ActionPattern, Names};
-
-/// The file as it stands.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    format: Spanned<String>,
-    version: Spanned<i64>,
-    resolution: Option<Spanned<f64>>,
-    #[serde(default)]
-    duration: Vec<Spanned<Section>>,
-    #[serde(default)]
-    delay: Vec<Spanned<Section>>,
-    #[serde(default)]
-    amount: Vec<Spanned<Section>>,
-    #[serde(default)]
-    failure: Vec<Spanned<Section>>,
-    #[serde(default)]
-    event: Vec<Spanned<Section>>,
-    reports: Option<Spanned<Section>>,
-}
-
-/// Whatever can stand in one section; which of it may, depends on the section.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Section {
-    action: Option<Spanned<String>>,
-    fluent: Option<Spanned<String>>,
-    fact: Option<Spanned<String>>,
-    becomes: Option<Spanned<Becomes>>,
-    probability: Option<Spanned<f64>>,
-    when: Option<Spanned<String>>,
-    reported: Option<bool>,
-    constant: Option<Spanned<f64>>,
-    normal: Option<Spanned<Shape>>,
-    lognormal: Option<Spanned<Shape>>,
-    uniform: Option<Spanned<Shape>>,
-    triangular: Option<Spanned<Shape>>,
-    values: Option<Spanned<Vec<f64>>>,
-    minimum: Option<f64>,
-    maximum: Option<f64>,
-    relative: Option<bool>,
-    lost: Option<Spanned<f64>>,
-    duplicated: Option<Spanned<f64>>,
-    late: Option<Spanned<f64>>,
-    contradicted: Option<Spanned<f64>>,
-}
-
-/// The numbers of a distribution.
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Shape {
-    mean: Option<f64>,
-    deviation: Option<f64>,
-    from: Option<f64>,
-    to: Option<f64>,
-    mode: Option<f64>,
-    minimum: Option<f64>,
-    maximum: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Becomes {
-    Truth(bool),
-    Value(f64),
-}
+use section::{File, Section, Shape};
 
 /// A distribution where it stands, with its minimum and maximum.
-type Found = (Range<usize>, Distribution, Option<f64>, Option<f64>);
+type Found = (Range<usize>, Distribution, Limit, Limit);
+
+/// A minimum or a maximum, where it stands.
+type Limit = Option<(Range<usize>, f64)>;
 
 /// The text, to find lines in.
 struct Reader<'a> {
@@ -93,7 +33,7 @@ type Read<T> = Result<T, WorldFileError>;
 pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
     let reader = Reader { text, problem };
     let file: File = toml::from_str(text)
-        .map_err(|error| reader.wrong(&error.span().unwrap_or(0..0), error.message()))?;
+        .map_err(|error| reader.wrong(&error.span().unwrap_or(0..0), in_words(error.message())))?;
     if file.format.get_ref() != "elbowroom-world" {
         return Err(reader.wrong(&file.format.span(), "write format = \"elbowroom-world\""));
     }
@@ -108,21 +48,17 @@ pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
             .ok_or_else(|| reader.wrong(&resolution.span(), "it must be greater than 0"))?;
     }
     for section in &file.duration {
-        let rule = reader.rule(section)?;
+        let rule = reader.rule_of(section, "[[duration]]", &["action", "relative"])?;
+        let rule = reader.not_negative(section, rule)?;
         model.durations.push((reader.action(section)?, rule));
     }
     for section in &file.delay {
-        let rule = reader.rule(section)?;
+        let rule = reader.rule_of(section, "[[delay]]", &["action"])?;
+        let rule = reader.not_negative(section, rule)?;
         model.delays.push((reader.action(section)?, rule));
     }
     for section in &file.amount {
-        let fluent = section.get_ref().fluent.as_ref();
-        let fluent = fluent.ok_or_else(|| reader.wrong(&section.span(), "`fluent` is missing"))?;
-        model.amounts.push(Amount {
-            action: reader.action(section)?,
-            fluent: reader.pattern(fluent, Names::Functions)?,
-            rule: reader.rule(section)?,
-        });
+        model.amounts.push(reader.amount(section)?);
     }
     for section in &file.failure {
         model.failures.push(reader.failing(section)?);
@@ -156,6 +92,55 @@ impl Reader<'_> {
         self.pattern(action, Names::Actions)
     }
 
+    /// The distribution of a section that has nothing else than `own`.
+    fn rule_of(&self, section: &Spanned<Section>, name: &str, own: &[&str]) -> Read<Rule> {
+        match section.get_ref().excess(name, own, true) {
+            Some((span, message)) => Err(self.wrong(&span, message)),
+            None => self.rule(section),
+        }
+    }
+
+    /// A time, or a time span, that is not meant to be less than 0.
+    fn not_negative(&self, section: &Spanned<Section>, rule: Rule) -> Read<Rule> {
+        if !rule.means_negative() {
+            return Ok(rule);
+        }
+        Err(self.wrong(
+            &self.place(section),
+            "time is never negative; correct the number, or give a `minimum`",
+        ))
+    }
+
+    /// Where the distribution of a section stands.
+    fn place(&self, section: &Spanned<Section>) -> Range<usize> {
+        let given = section.get_ref();
+        let places = [
+            given.constant.as_ref().map(Spanned::span),
+            given.values.as_ref().map(Spanned::span),
+            given.normal.as_ref().map(Spanned::span),
+            given.lognormal.as_ref().map(Spanned::span),
+            given.uniform.as_ref().map(Spanned::span),
+            given.triangular.as_ref().map(Spanned::span),
+        ];
+        let mut places = places.into_iter().flatten();
+        places.next().unwrap_or_else(|| section.span())
+    }
+
+    fn amount(&self, section: &Spanned<Section>) -> Read<Amount> {
+        let rule = self.rule_of(section, "[[amount]]", &["action", "fluent", "relative"])?;
+        let fluent = section.get_ref().fluent.as_ref();
+        let fluent = fluent.ok_or_else(|| self.wrong(&section.span(), "`fluent` is missing"))?;
+        let amount = Amount {
+            action: self.action(section)?,
+            fluent: self.pattern(fluent, Names::Functions)?,
+            rule,
+        };
+        match changes::is_in_vain(&amount, self.problem) {
+            Some(message) => Err(self.wrong(&fluent.span(), message)),
+            None => Ok(amount),
+        }
+    }
+
     fn probability(&self, value: &Spanned<f64>) -> Read<f64> {
         if (0.0..=1.0).contains(value.get_ref()) {
             Ok(*value.get_ref())
@@ -168,7 +153,12 @@ impl Reader<'_> {
     fn rule(&self, section: &Spanned<Section>) -> Read<Rule> {
         let given = section.get_ref();
         let mut found: Vec<Found> = Vec::new();
-        let plain = |span, distribution| (span, distribution, given.minimum, given.maximum);
+        let limit = |limit: &Option<Spanned<f64>>| {
+            let limit = limit.as_ref();
+            limit.map(|limit| (limit.span(), *limit.get_ref()))
+        };
+        let beside = (limit(&given.minimum), limit(&given.maximum));
+        let plain = |span, distribution| (span, distribution, beside.0.clone(), beside.1.clone());
         if let Some(value) = &given.constant {
             found.push(plain(
                 value.span(),
@@ -191,12 +181,9 @@ impl Reader<'_> {
             if let Some(shape) = shape {
                 let distribution = self.distribution(name, shape)?;
                 let limits = shape.get_ref();
-                found.push((
-                    shape.span(),
-                    distribution,
-                    limits.minimum.or(given.minimum),
-                    limits.maximum.or(given.maximum),
-                ));
+                let minimum = self.once(limit(&limits.minimum), &beside.0)?;
+                let maximum = self.once(limit(&limits.maximum), &beside.1)?;
+                found.push((shape.span(), distribution, minimum, maximum));
             }
         }
         let Some((span, distribution, minimum, maximum)) = found.pop() else {
@@ -211,12 +198,33 @@ impl Reader<'_> {
         if let Some(problem) = distribution.problem() {
             return Err(self.wrong(&span, problem));
         }
+        for (span, limit) in minimum.iter().chain(&maximum) {
+            if !limit.is_finite() {
+                return Err(self.wrong(span, "a limit must be finite; leave it out for none"));
+            }
+        }
+        if let (Some((_, minimum)), Some((span, maximum))) = (&minimum, &maximum)
+            && minimum > maximum
+        {
+            return Err(self.wrong(span, "`maximum` must not be less than `minimum`"));
+        }
         Ok(Rule {
             distribution,
-            minimum,
-            maximum,
-            is_relative: given.relative.unwrap_or(false),
+            minimum: minimum.map(|(_, minimum)| minimum),
+            maximum: maximum.map(|(_, maximum)| maximum),
+            is_relative: given.relative.as_ref().is_some_and(|it| *it.get_ref()),
         })
+    }
+
+    /// The limit inside the braces or the one beside them, whichever there is.
+    fn once(&self, inside: Limit, beside: &Limit) -> Read<Limit> {
+        match (inside, beside) {
+            (Some((span, _)), Some(_)) => Err(self.wrong(
+                &span,
+                "write this limit once: inside the braces, or beside them",
+            )),
+            (inside, beside) => Ok(inside.or_else(|| beside.clone())),
+        }
     }
 
     fn distribution(&self, name: &str, shape: &Spanned<Shape>) -> Read<Distribution> {
@@ -275,6 +283,10 @@ impl Reader<'_> {
 
     fn failing(&self, section: &Spanned<Section>) -> Read<Failing> {
         let given = section.get_ref();
+        let own = ["action", "probability", "when"];
+        if let Some((span, message)) = given.excess("[[failure]]", &own, false) {
+            return Err(self.wrong(&span, message));
+        }
         let probability = given.probability.as_ref();
         let probability =
             probability.ok_or_else(|| self.wrong(&section.span(), "`probability` is missing"))?;
@@ -296,16 +308,27 @@ impl Reader<'_> {
 
     fn exogenous(&self, section: &Spanned<Section>) -> Read<Exogenous> {
         let given = section.get_ref();
+        let own = ["fact", "fluent", "becomes", "probability", "reported"];
+        let time = self.rule_of(section, "[[event]]", &own)?;
+        let time = self.not_negative(section, time)?;
         let becomes = given.becomes.as_ref();
         let becomes = becomes.ok_or_else(|| self.wrong(&section.span(), "`becomes` is missing"))?;
-        let change = match (&given.fact, &given.fluent, becomes.get_ref()) {
+        let value = match becomes.get_ref() {
+            toml::Value::Boolean(truth) => Becomes::Truth(*truth),
+            toml::Value::Integer(value) => Becomes::Value(Some(Rational::from(*value))),
+            toml::Value::Float(value) => Becomes::Value(exact(*value)),
+            _ => {
+                let message = "write true or false for a fact, or a number for a fluent";
+                return Err(self.wrong(&becomes.span(), message));
+            }
+        };
+        let change = match (&given.fact, &given.fluent, value) {
             (Some(fact), None, Becomes::Truth(truth)) => {
                 self.pattern(fact, Names::Predicates)?;
-                ExogenousChange::Fact(self.ground(fact)?, *truth)
+                ExogenousChange::Fact(self.ground(fact)?, truth)
             }
             (None, Some(fluent), Becomes::Value(value)) => {
                 self.pattern(fluent, Names::Functions)?;
-                let value = exact(*value);
                 let value =
                     value.ok_or_else(|| self.wrong(&becomes.span(), "the value must be finite"))?;
                 ExogenousChange::Value(self.ground(fluent)?, value)
@@ -319,10 +342,10 @@ impl Reader<'_> {
         };
         let probability = given.probability.as_ref();
         Ok(Exogenous {
-            time: self.rule(section)?,
+            time,
             probability: probability.map_or(Ok(1.0), |value| self.probability(value))?,
             change,
-            is_reported: given.reported.unwrap_or(true),
+            is_reported: given.reported.as_ref().is_none_or(|it| *it.get_ref()),
         })
     }
 
@@ -350,12 +373,23 @@ impl Reader<'_> {
             Some(value) => self.probability(value),
             None => Ok(0.0),
         };
+        let own = ["lost", "duplicated", "late", "contradicted"];
+        if let Some((span, message)) = given.excess("[reports]", &own, true) {
+            return Err(self.wrong(&span, message));
+        }
         let late = probability(&given.late)?;
-        let lateness = if late > 0.0 {
-            self.rule(section)?.distribution
+        let lateness = if late > 0.0 || given.is_distributed() {
+            let lateness = self.rule(section)?;
+            self.not_negative(section, lateness)?
         } else {
-            Distribution::Constant(0.0)
+            Distribution::Constant(0.0).into()
         };
+        if given.late.is_none() && given.is_distributed() {
+            return Err(self.wrong(
+                &self.place(section),
+                "`late` is missing: how likely it is that a report comes so late",
+            ));
+        }
         Ok(Reports {
             lost: probability(&given.lost)?,
             duplicated: probability(&given.duplicated)?,
@@ -364,6 +398,20 @@ impl Reader<'_> {
             contradicted: probability(&given.contradicted)?,
         })
     }
+}
+
+/// What becomes of a fact, or of a fluent; `None` is no number.
+enum Becomes {
+    Truth(bool),
+    Value(Option<Rational>),
+}
+
+/// The message of the reader of TOML, which speaks of Rust's types.
+fn in_words(message: &str) -> String {
+    let message = message.replace("expected f64", "expected a number");
+    let message = message.replace("expected i64", "expected a whole number");
+    let message = message.replace("expected a boolean", "expected true or false");
+    message.replace("expected struct Shape", "expected numbers in braces, { … }")
 }
 
 /// The number as it is written, not as a float rounds it.

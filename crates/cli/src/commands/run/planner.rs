@@ -30,6 +30,14 @@ impl Who {
     /// Whom `--planner` names.
     pub(super) fn named(arguments: &RunArgs) -> Result<Self, Failure> {
         let name = &arguments.planner;
+        let is_another = !name.eq_ignore_ascii_case(EMBEDDED) && !name.eq_ignore_ascii_case(NOBODY);
+        if arguments.planner_time.is_some() && !is_another {
+            return Err(Failure::new(
+                format!("--planner-time says nothing to `--planner {name}`"),
+                "leave it out, or name another planner; the embedded one is limited by \
+                 --planner-states and --improve-states",
+            ));
+        }
         if name.eq_ignore_ascii_case(EMBEDDED) {
             return Ok(Self::Embedded);
         }

@@ -1,9 +1,9 @@
 //! A world that is a process: `docs/formats/world-protocol.md`.
 
-use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, Command as Program, Stdio};
+mod pipes;
+
+use std::process::{Child, Command as Program, Stdio};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
@@ -13,24 +13,30 @@ use elbowroom::num::Rational;
 use elbowroom::report::{Names, wire};
 use serde_json::{Value, json};
 
+use crate::clock::Clock;
 use crate::exit::Failure;
-use crate::output::plain;
+use crate::output::{excerpt, plain};
+use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 
-/// A line longer than this is no message.
-const LONGEST_LINE: usize = 1 << 20;
+/// How long a program has to end when the run is over.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// A child process that is told what to start, and reports what happens.
 pub(super) struct ProcessWorld {
     child: Child,
-    stdin: ChildStdin,
-    lines: Receiver<String>,
+    mouth: Mouth,
+    ears: Ears,
     patience: Duration,
+    /// There is no use in telling it anything more.
+    is_deaf: bool,
     names: Names,
     task: Arc<Task>,
+    has_grown: bool,
 }
 
 impl ProcessWorld {
-    /// Starts the program, with the words of `command` as its arguments.
+    /// Starts the program, with the words of `command` as its arguments. `patience` is how long it
+    /// may take over one answer, in seconds.
     pub(super) fn start(
         command: &str,
         task: &Arc<Task>,
@@ -39,13 +45,14 @@ impl ProcessWorld {
         let cannot = |why: String| {
             Failure::new(
                 format!("cannot start the world `{command}`: {why}"),
-                "give a program and its arguments, separated by spaces",
+                "give a program and its arguments, separated by spaces; \
+                 docs/formats/world-protocol.md says what it must do",
             )
         };
         let mut words = command.split_whitespace();
         let program = words
             .next()
-            .ok_or_else(|| cannot("it is empty".to_owned()))?;
+            .ok_or_else(|| cannot("the command is empty".to_owned()))?;
         let mut child = Program::new(program)
             .args(words)
             .stdin(Stdio::piped())
@@ -57,78 +64,169 @@ impl ProcessWorld {
                 "its standard input and output are not there".to_owned(),
             ));
         };
-        let (sender, lines) = channel();
-        // Reading blocks; a thread of its own lets us stop waiting.
-        std::thread::spawn(move || {
-            for line in BufReader::new(stdout).lines() {
-                let Ok(line) = line else { break };
-                if line.len() > LONGEST_LINE || sender.send(line).is_err() {
-                    break;
-                }
-            }
-        });
         let mut world = Self {
             child,
-            stdin,
-            lines,
+            mouth: Mouth::new(stdin),
+            ears: Ears::new(stdout),
             patience: Duration::try_from_secs_f64(patience.to_f64()).unwrap_or(Duration::MAX),
+            is_deaf: false,
             names: Names::of(task),
             task: Arc::clone(task),
+            has_grown: false,
         };
-        world
-            .tell(&json!({ "type": "hello", "protocol": "elbowroom-world", "version": 1 }))
-            .map_err(|error| cannot(error.message))?;
-        Ok(world)
+        let hello = json!({ "type": "hello", "protocol": "elbowroom-world", "version": 1 });
+        match world.tell(&hello) {
+            Ok(()) => Ok(world),
+            Err(error) => {
+                world.stop();
+                Err(cannot(error.message))
+            }
+        }
     }
 
     /// Says good-bye, and ends the program if it does not end by itself.
     pub(super) fn stop(mut self) {
-        let _ = self.tell(&json!({ "type": "stop" }));
-        drop(self.stdin);
-        for _ in 0..20 {
-            if !matches!(self.child.try_wait(), Ok(None)) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(50));
+        if !self.is_deaf {
+            let _ = self.tell_within(&json!({ "type": "stop" }), FAREWELL);
         }
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        // Closes its standard input.
+        drop(self.mouth);
+        if ended(&mut self.child, FAREWELL).is_none() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
     }
 
     fn tell(&mut self, message: &Value) -> Result<(), WorldError> {
-        let line = format!("{message}\n");
-        let told = self.stdin.write_all(line.as_bytes());
-        told.and_then(|()| self.stdin.flush()).map_err(|error| {
-            WorldError::new(format!("the world no longer listens: {}", plain(&error)))
-        })
+        match self.tell_within(message, self.patience) {
+            Told::Yes => Ok(()),
+            Told::NobodyReads => Err(WorldError::new(format!(
+                "it has not read what it was told within {} s; --answer-within says how long to \
+                 wait",
+                self.patience.as_secs_f64()
+            ))),
+            Told::End => Err(self.gone()),
+        }
+    }
+
+    fn tell_within(&mut self, message: &Value, patience: Duration) -> Told {
+        let told = self.mouth.tell(format!("{message}\n"), patience);
+        self.is_deaf = !matches!(told, Told::Yes);
+        told
     }
 
     /// Everything up to the message that says what time it is.
     fn hear(&mut self) -> Result<Passage, WorldError> {
+        let clock = Clock::start();
         let mut observations = Vec::new();
+        let mut said = 0;
         loop {
-            let line = self
-                .lines
-                .recv_timeout(self.patience)
-                .map_err(|error| match error {
-                    RecvTimeoutError::Timeout => WorldError::new(
-                        "the world has not answered in time; --answer-within says how long to wait",
-                    ),
-                    RecvTimeoutError::Disconnected => WorldError::new("the world has ended"),
-                })?;
-            if line.trim().is_empty() {
+            let line = match self
+                .ears
+                .hear(self.patience.saturating_sub(clock.elapsed()))
+            {
+                Heard::Line(line) => line,
+                Heard::EndlessLine => return Err(endless_line()),
+                Heard::TooMuch => return Err(babbles()),
+                Heard::Nothing => {
+                    return Err(WorldError::new(format!(
+                        "it has not ended its answer with `time` within {} s; --answer-within \
+                         says how long to wait",
+                        self.patience.as_secs_f64()
+                    )));
+                }
+                Heard::End => return Err(self.gone()),
+            };
+            said += line.len();
+            if said > LONGEST_ANSWER {
+                return Err(babbles());
+            }
+            let line = line.trim();
+            if line.is_empty() {
                 continue;
             }
-            let wrong = |why: String| WorldError::new(format!("the world said `{line}`: {why}"));
-            let message: Value =
-                serde_json::from_str(&line).map_err(|error| wrong(format!("not JSON: {error}")))?;
-            if message.get("type").and_then(Value::as_str) == Some("time") {
-                let now =
-                    wire::field_number(&message, "now").map_err(|error| wrong(error.message))?;
-                return Ok(Passage { now, observations });
+            match self.read(line) {
+                Ok(Said::Time(now)) => return Ok(Passage { now, observations }),
+                Ok(Said::Observation(observation)) => observations.push(observation),
+                Err(why) => {
+                    return Err(WorldError::new(format!(
+                        "it said `{}`: {why}",
+                        excerpt(line)
+                    )));
+                }
             }
-            let observation = wire::read_observation(&message, &self.names);
-            observations.push(observation.map_err(|error| wrong(error.message))?);
+        }
+    }
+
+    fn read(&mut self, line: &str) -> Result<Said, String> {
+        let message: Value =
+            serde_json::from_str(line).map_err(|error| format!("not JSON: {error}"))?;
+        if message.get("type").and_then(Value::as_str) == Some("time") {
+            let now = wire::field_number(&message, "now");
+            return now.map(Said::Time).map_err(|error| error.message);
+        }
+        self.has_grown |= wire::mention(&message, &mut self.names, &mut self.task);
+        let observation = wire::read_observation(&message, &self.names);
+        observation
+            .map(Said::Observation)
+            .map_err(|error| error.message)
+    }
+
+    /// The program no longer listens, or has closed its output.
+    fn gone(&mut self) -> WorldError {
+        self.is_deaf = true;
+        let ending = ended(&mut self.child, FAREWELL);
+        // Who says too much is no longer listened to, which ends most programs.
+        loop {
+            match self.ears.hear(Duration::ZERO) {
+                Heard::Line(_) => {}
+                Heard::EndlessLine => return endless_line(),
+                Heard::TooMuch => return babbles(),
+                Heard::Nothing | Heard::End => break,
+            }
+        }
+        let why = match ending {
+            Some(status) => format!(
+                "the program has ended ({status}) before the run was over; what it printed to \
+                 standard error may say why"
+            ),
+            None => "the program has closed its standard input or output before the run was over"
+                .to_owned(),
+        };
+        WorldError::new(why)
+    }
+}
+
+fn endless_line() -> WorldError {
+    WorldError::new(format!(
+        "it said more than {} MB without a line feed; write one message a line",
+        LONGEST_LINE >> 20
+    ))
+}
+
+fn babbles() -> WorldError {
+    WorldError::new(format!(
+        "it said more than {} MB without ending its answer with `time`",
+        LONGEST_ANSWER >> 20
+    ))
+}
+
+/// One line, understood.
+enum Said {
+    Time(Rational),
+    Observation(Observation),
+}
+
+/// How a program has ended, if it does so within `patience`.
+fn ended(child: &mut Child, patience: Duration) -> Option<std::process::ExitStatus> {
+    let clock = Clock::start();
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Some(status),
+            Ok(None) if clock.elapsed() < patience => {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            _ => return None,
         }
     }
 }
@@ -142,7 +240,12 @@ impl World for ProcessWorld {
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         self.tell(&json!({ "type": "wait", "until": wire::number(until) }))?;
-        self.hear()
+        let mut passage = self.hear()?;
+        // Who counts in floats has come as far as a float can.
+        if passage.now.to_f64().total_cmp(&until.to_f64()).is_eq() {
+            passage.now.clone_from(until);
+        }
+        Ok(passage)
     }
 
     fn look(
@@ -164,5 +267,9 @@ impl World for ProcessWorld {
     fn know(&mut self, task: &Arc<Task>) {
         self.names.learn(task);
         self.task = Arc::clone(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        std::mem::take(&mut self.has_grown).then(|| Arc::clone(&self.task))
     }
 }

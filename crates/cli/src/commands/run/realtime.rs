@@ -1,31 +1,70 @@
 //! A world on a wall clock.
+//!
+//! Its time 0 is the moment at which the run begins, before there is a plan. What is decided takes
+//! no time in the world, but making plans does: as long as it takes on the wall clock, times the
+//! factor. What happens meanwhile is reported afterwards, with the times at which it happened.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
-use elbowroom::model::Task;
+use elbowroom::execution::run::PlanningTime;
+use elbowroom::execution::{
+    Command, Observation, Passage, Planner, PlannerAnswer, World, WorldError,
+};
 use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 
 use crate::clock::Clock;
 
-/// Lets the time of another world pass at a fixed rate of the wall clock's.
-pub(super) struct Realtime<'a> {
-    inner: &'a mut dyn World,
+/// How the time of a world passes: `factor` of its seconds in one of the wall clock's.
+pub(super) struct Pace {
     clock: Clock,
-    factor: f64,
+    factor: Rational,
+    /// How long the world's clock was stopped, on the wall clock.
+    stopped: Cell<Duration>,
 }
 
-impl<'a> Realtime<'a> {
-    /// `factor` seconds of the world pass in one second.
-    pub(super) fn new(inner: &'a mut dyn World, factor: &Rational) -> Self {
+impl Pace {
+    /// The world's time is 0 now.
+    pub(super) fn new(factor: &Rational) -> Self {
         Self {
-            inner,
             clock: Clock::start(),
-            factor: factor.to_f64(),
+            factor: factor.clone(),
+            stopped: Cell::new(Duration::ZERO),
         }
     }
+
+    /// How long it is until the world's clock reads `time`.
+    fn left(&self, time: &Rational) -> Duration {
+        let passed = self.clock.elapsed().saturating_sub(self.stopped.get());
+        on_the_wall(time, &self.factor).saturating_sub(passed)
+    }
+
+    /// `spent` is all that planning took on the wall clock; in the world it takes `allowed`. For
+    /// what is longer, the world's clock was stopped.
+    fn stop(&self, spent: Duration, allowed: &Rational) {
+        let excess = spent.saturating_sub(on_the_wall(allowed, &self.factor));
+        self.stopped.set(self.stopped.get() + excess);
+    }
+}
+
+/// How long the world's `time` is on the wall clock.
+fn on_the_wall(time: &Rational, factor: &Rational) -> Duration {
+    let seconds = time.to_f64() / factor.to_f64();
+    if seconds > 0.0 {
+        // More seconds than can be counted: nobody lives to see that.
+        Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+    } else {
+        Duration::ZERO
+    }
+}
+
+/// Lets the time of another world pass at a pace.
+pub(super) struct Realtime<'a> {
+    pub(super) inner: &'a mut dyn World,
+    pub(super) pace: &'a Pace,
 }
 
 impl World for Realtime<'_> {
@@ -35,11 +74,7 @@ impl World for Realtime<'_> {
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let passage = self.inner.wait(until)?;
-        let due = passage.now.to_f64() / self.factor;
-        let early = due - self.clock.elapsed().as_secs_f64();
-        if let Ok(pause) = Duration::try_from_secs_f64(early) {
-            std::thread::sleep(pause);
-        }
+        std::thread::sleep(self.pace.left(&passage.now));
         Ok(passage)
     }
 
@@ -53,5 +88,58 @@ impl World for Realtime<'_> {
 
     fn know(&mut self, task: &Arc<Task>) {
         self.inner.know(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        self.inner.grown()
+    }
+}
+
+/// A planner in such a world.
+pub(super) struct PacedPlanner<'a> {
+    pub(super) inner: &'a mut dyn Planner,
+    pub(super) pace: &'a Pace,
+    /// How long a plan takes in the world.
+    pub(super) planning_time: &'a PlanningTime,
+}
+
+impl Planner for PacedPlanner<'_> {
+    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+        let clock = Clock::start();
+        let mut answer = self.inner.plan(task, situation);
+        match self.planning_time {
+            PlanningTime::Measured => answer.seconds = Some(clock.seconds() * &self.pace.factor),
+            PlanningTime::Seconds(seconds) => self.pace.stop(clock.elapsed(), seconds),
+        }
+        answer
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Pace, on_the_wall};
+    use elbowroom::num::Rational;
+    use std::time::Duration;
+
+    #[test]
+    fn no_time_is_too_long_or_too_short_to_be_counted() {
+        let tiny = Rational::new(1, 1_000_000_000_000) * Rational::new(1, 1_000_000_000_000);
+        assert_eq!(on_the_wall(&Rational::ONE, &tiny), Duration::MAX);
+        assert_eq!(on_the_wall(&Rational::from(-1), &tiny), Duration::ZERO);
+        let ten = Rational::from(10);
+        assert_eq!(
+            on_the_wall(&Rational::from(5), &ten),
+            Duration::from_millis(500)
+        );
+    }
+
+    #[test]
+    fn the_clock_stands_still_while_planning_takes_longer_than_it_may() {
+        let pace = Pace::new(&Rational::from(10));
+        // Two seconds of planning, of which the world sees three of its own, 0.3 on the wall.
+        pace.stop(Duration::from_secs(2), &Rational::from(3));
+        assert_eq!(pace.stopped.get(), Duration::from_millis(1700));
+        pace.stop(Duration::from_millis(100), &Rational::from(3));
+        assert_eq!(pace.stopped.get(), Duration::from_millis(1700));
     }
 }

@@ -7,9 +7,10 @@ use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::report::trace;
 use serde_json::Value;
 
-use crate::look::{BAD, GOOD, HINT, STRONG, styled};
+use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::number::nearest;
-use crate::output::counted;
+use crate::output::{counted, tame};
+use crate::wrap::wrapped;
 
 pub(super) fn document(report: &Report) -> Value {
     let mut document = trace::report(report);
@@ -21,6 +22,7 @@ pub(super) fn document(report: &Report) -> Value {
 pub(super) fn human(report: &Report) -> String {
     let replans = counted(report.replans, "new plan");
     let time = nearest(&report.time);
+    let width = Look::of_stdout().width;
     let mut text = match &report.verdict {
         Verdict::GoalReached => {
             format!(
@@ -33,10 +35,9 @@ pub(super) fn human(report: &Report) -> String {
             styled(BAD, "failed")
         ),
         Verdict::NoPlan { why } => {
-            format!(
-                "{}: no plan to go on with at {time}: {why}\n",
-                styled(BAD, "failed")
-            )
+            let why = wrapped(&tame(why), width, 2);
+            let failed = styled(BAD, "failed");
+            format!("{failed}: no plan to go on with at {time}:\n{why}\n")
         }
         Verdict::ReplanLimit => format!(
             "{}: given up at {time}, after {replans}; --max-replans allows no more\n",
@@ -49,16 +50,17 @@ pub(super) fn human(report: &Report) -> String {
             )
         }
         Verdict::WorldFailed { why } => {
-            format!(
-                "{}: the world failed at {time}: {why}\n",
-                styled(BAD, "failed")
-            )
+            let why = wrapped(&tame(why), width, 2);
+            let failed = styled(BAD, "failed");
+            format!("{failed}: the world failed at {time}:\n{why}\n")
         }
     };
     if !report.reasons.is_empty() {
         let _ = writeln!(text, "\n{}", styled(STRONG, "Why the plan was given up"));
         for reason in &report.reasons {
-            let _ = writeln!(text, "  {reason}");
+            // What worlds and other programs say is in there.
+            let reason = tame(&reason.to_string());
+            let _ = writeln!(text, "{}", wrapped(&reason, width, 2));
         }
     }
     let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));

@@ -1,5 +1,7 @@
 //! Experiment files as they stand.
 
+use std::ops::Range;
+
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_num::Rational;
 use indexmap::IndexMap;
@@ -16,10 +18,10 @@ pub(super) struct File {
     pub(super) title: String,
     pub(super) domain: Spanned<String>,
     pub(super) problem: Spanned<String>,
-    pub(super) trials: u64,
+    pub(super) trials: Spanned<u64>,
     #[serde(default)]
     pub(super) seed: u64,
-    pub(super) executors: Vec<Spanned<String>>,
+    pub(super) executors: Spanned<Vec<Spanned<String>>>,
     #[serde(default)]
     pub(super) clairvoyant: bool,
     pub(super) running: Option<Spanned<String>>,
@@ -31,7 +33,7 @@ pub(super) struct File {
     pub(super) planner_states: Option<u64>,
     pub(super) improve_states: Option<u64>,
     #[serde(default)]
-    pub(super) blanks: IndexMap<String, Vec<toml::Value>>,
+    pub(super) blanks: IndexMap<String, Spanned<Vec<toml::Value>>>,
     #[serde(default)]
     pub(super) together: Vec<TogetherFile>,
     pub(super) column: Vec<ColumnFile>,
@@ -53,10 +55,56 @@ pub(super) struct ColumnFile {
 #[serde(deny_unknown_fields)]
 pub(super) struct TogetherFile {
     pub(super) names: Vec<String>,
-    pub(super) rows: Vec<Spanned<Vec<toml::Value>>>,
+    pub(super) rows: Spanned<Vec<Spanned<Vec<toml::Value>>>>,
 }
 
 impl File {
+    /// That there is something to make and something to make it with: where not, and what to do.
+    pub(super) fn check_size(&self) -> Result<(), (usize, String)> {
+        let wrong = |span: Range<usize>, message: &str| Err((span.start, message.to_owned()));
+        if *self.trials.get_ref() == 0 {
+            return wrong(self.trials.span(), "make at least one trial");
+        }
+        if self.executors.get_ref().is_empty() {
+            return wrong(self.executors.span(), "name at least one executor");
+        }
+        if self.column.is_empty() {
+            return wrong(self.format.span(), "write at least one [[column]]");
+        }
+        let blanks = self.blanks.values();
+        if let Some(empty) = blanks.into_iter().find(|it| it.get_ref().is_empty()) {
+            return wrong(empty.span(), "give the blank at least one value");
+        }
+        let mut groups = self.together.iter().map(|group| &group.rows);
+        if let Some(empty) = groups.find(|rows| rows.get_ref().is_empty()) {
+            return wrong(empty.span(), "give the blanks at least one row");
+        }
+        Ok(())
+    }
+
+    /// That published figures belong to rows and columns of the table.
+    pub(super) fn check_published(&self, rows: &[String]) -> Result<(), (usize, String)> {
+        for published in &self.published {
+            let wrong = |message: String| Err((published.span().start, message));
+            let figures = published.get_ref();
+            if !rows.contains(&figures.executor) {
+                let name = &figures.executor;
+                let rows = rows.join(", ");
+                return wrong(format!("`{name}` is no row of the table; it has {rows}"));
+            }
+            let count = figures.replans.len();
+            if figures.coverage.len() != self.column.len()
+                || (count != 0 && count != self.column.len())
+            {
+                return wrong(format!(
+                    "write one figure for each of the {} columns, nan where there is none",
+                    self.column.len()
+                ));
+            }
+        }
+        Ok(())
+    }
+
     pub(super) fn planning(&self) -> Result<Planning, (usize, String)> {
         let seconds = match &self.planner_time {
             None => None,
@@ -74,7 +122,15 @@ impl File {
                     seconds,
                 })
             }
-            _ => Ok(Planning::Embedded),
+            _ => match &self.planner_time {
+                None => Ok(Planning::Embedded),
+                Some(time) => Err((
+                    time.span().start,
+                    "`planner_time` is for another planner: name it with `planner`, or limit the \
+                     embedded one with `planner_states` and `improve_states`"
+                        .to_owned(),
+                )),
+            },
         }
     }
 

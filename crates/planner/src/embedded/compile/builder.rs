@@ -1,12 +1,15 @@
 //! Compiles a grounded task.
 
+mod durations;
 mod finish;
+mod snaps;
 
-use elbowroom_model::ground::{self, Body, Change as ModelChange, Condition, DurativeBody};
-use elbowroom_model::problem::Comparison;
+use elbowroom_model::ground::{self, Body, Condition, DurativeBody};
 use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{Footprint, Situation, Task};
 use elbowroom_num::Rational;
+
+pub(super) use durations::reads_duration;
 
 use super::directions::Shifts;
 use super::eagerness::excludes_itself;
@@ -17,10 +20,8 @@ use super::shortened::full_actions;
 use super::symbols::Symbols;
 use super::times::has_fixed_numbers;
 use super::unsupported::{Unsupported, check};
-use super::{
-    Action, Bound, Change, Compiled, Conditional, Duration, Eagerness, Flow, NONE, Snap, Update,
-};
-use crate::embedded::formula::{Formula, Numeric};
+use super::{Action, Compiled, Duration, Eagerness, Flow, NONE, Snap};
+use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
 
 /// How many actions are compiled between two questions whether to go on.
@@ -282,88 +283,6 @@ impl<'a> Builder<'a> {
         self.push_snap(snap, wishes)
     }
 
-    fn snap(&mut self, body: &ground::SnapAction, guards: &mut Vec<Formula>) -> Snap {
-        let mut snap = Snap {
-            condition: self.symbols.formula(&body.condition),
-            ..Snap::default()
-        };
-        let mut costs = Vec::new();
-        for effect in &body.effects {
-            let is_unconditional = effect.guard.is_trivial();
-            if is_unconditional && let Some(cost) = self.cost(&effect.change) {
-                costs.push(cost);
-                continue;
-            }
-            let Some(change) = self.change(&effect.change) else {
-                continue;
-            };
-            if is_unconditional {
-                match change {
-                    Change::Add(fact) => snap.adds.push(fact),
-                    Change::Delete(fact) => snap.deletes.push(fact),
-                    Change::Update(update) => snap.updates.push(update),
-                    Change::Cost(_) => {}
-                }
-                continue;
-            }
-            let at_start = (!effect.guard.at_start.is_trivial()).then(|| {
-                guards.push(self.symbols.formula(&effect.guard.at_start));
-                u8::try_from(guards.len() - 1).unwrap_or(u8::MAX)
-            });
-            let now = self.symbols.formula(&effect.guard.now);
-            snap.conditional.push(Conditional {
-                at_start,
-                now,
-                change,
-            });
-        }
-        if !costs.is_empty() {
-            let sum = ground::Expression::Add(costs);
-            snap.cost = Some(self.symbols.numeric(&sum));
-        }
-        // An addition wins over a deletion by the same happening.
-        let adds = std::mem::take(&mut snap.adds);
-        snap.deletes.retain(|fact| !adds.contains(fact));
-        snap.adds = adds;
-        snap
-    }
-
-    /// What a change does to the search's numbers, if it does anything.
-    fn change(&mut self, change: &ModelChange) -> Option<Change> {
-        match change {
-            ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
-            ModelChange::Delete(fact) => self.symbols.known_fact(*fact).map(Change::Delete),
-            ModelChange::Update {
-                operator,
-                fluent,
-                value,
-            } => match self.symbols.known_fluent(*fluent) {
-                Some(fluent) => Some(Change::Update(Update {
-                    fluent,
-                    operator: *operator,
-                    value: self.symbols.numeric(value),
-                })),
-                None => {
-                    let cost = self.cost(change)?;
-                    Some(Change::Cost(self.symbols.numeric(&cost)))
-                }
-            },
-        }
-    }
-
-    /// What a change adds to what the metric sums up.
-    fn cost(&self, change: &ModelChange) -> Option<ground::Expression> {
-        let ModelChange::Update {
-            operator,
-            fluent,
-            value,
-        } = change
-        else {
-            return None;
-        };
-        self.metric.as_ref()?.cost(*fluent, *operator, value)
-    }
-
     fn durative(
         &mut self,
         action: &ground::Action,
@@ -395,28 +314,7 @@ impl<'a> Builder<'a> {
         for constraint in &body.duration {
             duration.constrain(constraint, self.symbols.numeric(&constraint.bound));
         }
-        let uses_duration = !flows.is_empty() || {
-            let mut reads = false;
-            let mut look = |leaf: &ground::Expression| {
-                reads |= *leaf == ground::Expression::Duration;
-            };
-            body.over_all
-                .visit_expressions(&mut |e| e.visit_leaves(&mut look));
-            for snap in [&body.start, &body.end] {
-                snap.condition
-                    .visit_expressions(&mut |e| e.visit_leaves(&mut look));
-                for effect in &snap.effects {
-                    effect
-                        .guard
-                        .now
-                        .visit_expressions(&mut |e| e.visit_leaves(&mut look));
-                    if let ModelChange::Update { value, .. } = &effect.change {
-                        value.visit_leaves(&mut look);
-                    }
-                }
-            }
-            reads
-        };
+        let uses_duration = !flows.is_empty() || reads_duration(body);
         Action {
             schema: action.schema,
             arguments: action.arguments.clone(),
@@ -431,31 +329,6 @@ impl<'a> Builder<'a> {
             only_adds_at_end: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
-        }
-    }
-}
-
-impl Duration {
-    fn constrain(&mut self, constraint: &ground::DurationConstraint, value: Numeric) {
-        let Some(constant) = value.as_constant() else {
-            self.bounds.push(Bound {
-                comparison: constraint.comparison,
-                value,
-                at_end: constraint.at_end,
-            });
-            return;
-        };
-        if !matches!(constraint.comparison, Comparison::AtMost | Comparison::Less)
-            && *constant > self.least
-        {
-            self.least = constant.clone();
-        }
-        if !matches!(
-            constraint.comparison,
-            Comparison::AtLeast | Comparison::Greater
-        ) && self.most.as_ref().is_none_or(|most| constant < most)
-        {
-            self.most = Some(constant.clone());
         }
     }
 }

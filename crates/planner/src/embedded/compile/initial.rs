@@ -4,6 +4,7 @@ use elbowroom_model::Situation;
 use elbowroom_num::End;
 
 use super::Compiled;
+use super::times::known_duration;
 use crate::embedded::state::{Open, State};
 use crate::embedded::symbolic::{self, Form};
 
@@ -41,9 +42,9 @@ pub(super) fn initial(compiled: &mut Compiled, situation: &Situation) -> State {
             End::Open(value) => (Some(compiled.scale.ceil(value).0 - 1), false),
         };
         is_exact &= exact;
-        state
-            .open
-            .push(Open::under_way(narrow(number), start, least, most));
+        let mut open = Open::under_way(narrow(number), start, least, most);
+        open.duration = known_duration(running).cloned();
+        state.open.push(open);
     }
     compiled.is_exact &= is_exact;
     if compiled.is_symbolic {

@@ -276,13 +276,17 @@ impl Changes {
             }
         }
         for timed in task.timed() {
-            timed.changes.iter().for_each(|change| changes.note(change));
+            for change in &timed.changes {
+                changes.note(change);
+            }
         }
         changes
     }
 
     fn note_all(&mut self, effects: &[ground::Effect]) {
-        effects.iter().for_each(|effect| self.note(&effect.change));
+        for effect in effects {
+            self.note(&effect.change);
+        }
     }
 
     fn note(&mut self, change: &ModelChange) {

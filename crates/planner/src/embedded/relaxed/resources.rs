@@ -35,7 +35,7 @@ pub(super) struct Shortage {
 /// The resources of a problem.
 #[derive(Debug, Default)]
 pub(super) struct Resources {
-    resources: Vec<Resource>,
+    list: Vec<Resource>,
     /// For each operator what it adds to resources, or, negative, takes.
     changes: Vec<Vec<(usize, f64)>>,
     /// What a relaxed plan leaves of each.
@@ -48,14 +48,14 @@ impl Resources {
         let mut resources = Self::default();
         let mut place = vec![None; compiled.fluents.len()];
         for (fluent, floor) in floors(compiled) {
-            place[fluent as usize] = Some(resources.resources.len());
-            resources.resources.push(Resource {
+            place[fluent as usize] = Some(resources.list.len());
+            resources.list.push(Resource {
                 fluent,
                 floor,
                 feeds: Vec::new(),
             });
         }
-        if resources.resources.is_empty() {
+        if resources.list.is_empty() {
             return resources;
         }
         for (number, operator) in (0..).zip(&graph.operators) {
@@ -76,7 +76,7 @@ impl Resources {
                 }
             }
             for &(place, amount) in changes.iter().filter(|change| change.1 > 0.0) {
-                resources.resources[place].feeds.push((number, amount));
+                resources.list[place].feeds.push((number, amount));
             }
             resources.changes.push(changes);
         }
@@ -85,14 +85,14 @@ impl Resources {
 
     /// Whether nothing is used up.
     pub(super) fn is_empty(&self) -> bool {
-        self.resources.is_empty()
+        self.list.is_empty()
     }
 
     /// A new relaxed plan begins.
     pub(super) fn begin(&mut self, state: &State) {
         self.left.clear();
         self.is_settled.clear();
-        for resource in &self.resources {
+        for resource in &self.list {
             let value = state.values[resource.fluent as usize].as_ref();
             self.left
                 .push(value.map_or(f64::INFINITY, |value| value.to_f64() - resource.floor));
@@ -110,7 +110,7 @@ impl Resources {
     /// What to add for the sake of a resource that runs out; each resource is told once. `cost`
     /// says what an operator costs that is within reach.
     pub(super) fn shortage(&mut self, cost: impl Fn(u32) -> Option<u32>) -> Option<Shortage> {
-        for (place, resource) in self.resources.iter().enumerate() {
+        for (place, resource) in self.list.iter().enumerate() {
             if self.left[place] >= 0.0 || self.is_settled[place] {
                 continue;
             }

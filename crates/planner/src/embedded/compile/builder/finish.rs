@@ -183,7 +183,7 @@ impl Builder<'_> {
             relaxed_gap: None,
             is_symbolic: false,
         };
-        compiled.is_symbolic = is_symbolic(&compiled);
+        compiled.is_symbolic = is_symbolic(&compiled, situation);
         let fact_count = compiled.facts.len();
         compiled.relaxed_gap = gaps::among_facts(&compiled.actions, &compiled.snaps, fact_count);
         compiled.gap = gaps::among_numbers(&compiled.actions, &compiled.snaps, fact_count)

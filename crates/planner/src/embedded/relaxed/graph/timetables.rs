@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::super::super::compile::{Change, Compiled, NONE, Timed};
 use super::super::super::formula::{Formula, Literal};
 use super::super::super::time::{NEVER, Ticks};
-use super::{Draft, Graph, Kind, least_ticks, most_ticks, narrow};
+use super::actions::{Draft, least_ticks, most_ticks};
+use super::{Graph, Kind, narrow};
 
 /// A literal that changes at fixed times only, and an operator needs.
 #[derive(Clone, Copy, Debug)]

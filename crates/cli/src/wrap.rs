@@ -1,0 +1,37 @@
+//! Long lines, broken between words.
+
+use unicode_width::UnicodeWidthStr;
+
+/// The text in lines of at most `width` columns, where words allow it. The first line is indented by
+/// `indent`, the others by two more.
+pub(crate) fn wrapped(text: &str, width: usize, indent: usize) -> String {
+    let mut lines = Vec::new();
+    let mut line = " ".repeat(indent);
+    let mut is_empty = true;
+    for word in text.split(' ') {
+        if !is_empty && line.width() + 1 + word.width() > width {
+            lines.push(std::mem::replace(&mut line, " ".repeat(indent + 2)));
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        is_empty = false;
+    }
+    lines.push(line);
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::wrapped;
+
+    #[test]
+    fn lines_break_between_words_and_hang() {
+        let text = wrapped("one two three four", 11, 2);
+        assert_eq!(text, "  one two\n    three\n    four");
+        assert_eq!(wrapped("indivisible word", 4, 0), "indivisible\n  word");
+        assert_eq!(wrapped("", 4, 1), " ");
+    }
+}

@@ -1,0 +1,267 @@
+//! What the command does not understand, or could not honour, it refuses; nothing is ignored.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn elbowroom(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .env("NO_COLOR", "1")
+        .args(arguments)
+        .output()
+        .expect("the command can be started")
+}
+
+/// A folder that no other test uses.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("elbowroom-{}-{name}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a temporary folder can be made");
+    folder
+}
+
+/// What the command says when it refuses something: exit code 2, nothing on standard output.
+fn refusal(arguments: &[&str]) -> String {
+    let output = elbowroom(arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {output:?}");
+    assert!(output.stdout.is_empty(), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stderr).expect("text")
+}
+
+const RUN: [&str; 3] = [
+    "run",
+    "cases/delivery/domain.pddl",
+    "cases/delivery/problem.pddl",
+];
+
+#[test]
+fn options_of_run_that_could_do_nothing_are_refused() {
+    for (options, words) in [
+        (&["--planner-time", "5"][..], "--planner-states"),
+        (
+            &["--planner-time", "5", "--planner", "none"],
+            "says nothing to",
+        ),
+        (
+            &["--seed", "3", "--world-process", "cat"],
+            "cannot be used with",
+        ),
+        (
+            &["--realtime", "2", "--world-process", "cat"],
+            "cannot be used with",
+        ),
+        (&["--answer-within", "3"], "--world-process"),
+        (&["--realtime", "1e-30"], "between 0.000001"),
+        (&["--planning-time", "soon"], "--planning-time 2.5"),
+    ] {
+        let said = refusal(&[&RUN[..], options].concat());
+        assert!(said.contains(words), "{options:?}: {said}");
+    }
+}
+
+#[test]
+fn what_nothing_in_the_problem_is_called_cannot_be_left_open() {
+    for (spec, words) in [
+        ("duration drve", "did you mean `drive`?"),
+        ("deadline (at rover moon)", "--vary"),
+    ] {
+        let said = refusal(&[&RUN[..], &["--vary", spec]].concat());
+        assert!(said.contains(words), "{spec}: {said}");
+    }
+    for spec in ["duration drive", "duration n0", "duration n99"] {
+        let output = elbowroom(&[&RUN[..], &["--vary", spec]].concat());
+        assert_ne!(output.status.code(), Some(2), "{spec}: {output:?}");
+    }
+}
+
+#[test]
+fn advice_on_files_is_about_the_file_that_is_missing() {
+    let said = refusal(&[&RUN[..], &["--world", "no.toml"]].concat());
+    assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+    let said = refusal(&["compare", "no.toml"]);
+    assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+    let said = refusal(&["run", "no.pddl", RUN[2]]);
+    assert!(said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+}
+
+#[test]
+fn tables_are_no_wider_than_eighty_columns() {
+    let folder = folder("wide");
+    let more: String = ["b", "c", "d", "e"]
+        .iter()
+        .map(|name| format!("[[column]]\nname = \"{name}\"\nworld = \"world.toml\"\n"))
+        .collect();
+    let more = format!("{more}[[column]]");
+    let changes = [("trials = 6", "trials = 1"), ("[[column]]", more.as_str())];
+    let file = experiment(&folder, &changes);
+    let output = elbowroom(&["compare", &file]);
+    let table = String::from_utf8(output.stdout).expect("text");
+    for name in ["b:", "c:", "d:", "e:", "late:", "replans", "clairvoyant"] {
+        assert!(table.contains(name), "{name}: {table}");
+    }
+    let longest = table.lines().map(|line| line.chars().count()).max();
+    assert!(longest <= Some(80), "{table}");
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
+fn a_trace_is_played_back_as_it_is() {
+    for option in [
+        ["--executor", "stn"],
+        ["--trace", "x.jsonl"],
+        ["--seed", "1"],
+        ["--world-process", "cat"],
+        ["--epsilon", "1"],
+    ] {
+        let said = refusal(&["run", "--replay", "t.jsonl", option[0], option[1]]);
+        assert!(said.contains("cannot be used with"), "{option:?}: {said}");
+    }
+}
+
+/// The shipped experiment, with changes.
+fn experiment(folder: &Path, changes: &[(&str, &str)]) -> String {
+    let text = fs::read_to_string(root().join("crates/cli/tests/files/late-drives.toml"));
+    let mut text = text.expect("the experiment");
+    for file in ["domain.pddl", "problem.pddl"] {
+        let from = root().join("cases/delivery").join(file);
+        fs::copy(from, folder.join(file)).expect("copied");
+    }
+    let world = root().join("crates/cli/tests/files/late-drives-world.toml");
+    fs::copy(world, folder.join("world.toml")).expect("copied");
+    for (from, to) in [
+        ("../../../../cases/delivery/", ""),
+        ("late-drives-world.toml", "world.toml"),
+    ]
+    .iter()
+    .chain(changes)
+    {
+        assert!(text.contains(from), "{from}: {text}");
+        text = text.replace(from, to);
+    }
+    let file = folder.join("experiment.toml");
+    fs::write(&file, text).expect("written");
+    file.display().to_string()
+}
+
+#[test]
+fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
+    let folder = folder("empty-experiments");
+    let cases = [
+        (
+            "trials = 6",
+            "trials = 0",
+            "line 6: make at least one trial",
+        ),
+        (
+            "executors = [\"guarded\", \"live\", \"fixed:10\"]",
+            "executors = []",
+            "line 7: name at least one",
+        ),
+        (
+            "[[column]]",
+            "[blanks]\nfoo = []\n[[column]]",
+            "line 13: give the blank",
+        ),
+        (
+            "[[column]]",
+            "[[together]]\nnames = [\"foo\"]\nrows = []\n[[column]]",
+            "at least one row",
+        ),
+        (
+            "trials = 6",
+            "trials = 6\nplanner_time = 5",
+            "line 7: `planner_time` is for another",
+        ),
+    ];
+    for (from, to, words) in cases {
+        let file = experiment(&folder, &[(from, to)]);
+        let said = refusal(&["compare", &file]);
+        assert!(said.contains(words), "{to}: {said}");
+    }
+    for (figures, words) in [
+        (
+            "executor = \"nobody\"\ncoverage = [1]",
+            "`nobody` is no row",
+        ),
+        (
+            "executor = \"live\"\ncoverage = [1, 2]",
+            "each of the 1 columns",
+        ),
+        (
+            "executor = \"live\"\ncoverage = [1]\nreplans = [1, 2]",
+            "each of the 1 columns",
+        ),
+    ] {
+        let file = experiment(&folder, &[]);
+        let text = fs::read_to_string(&file).expect("the experiment");
+        fs::write(&file, format!("{text}\n[[published]]\n{figures}\n")).expect("written");
+        let said = refusal(&["compare", &file]);
+        assert!(said.contains(words), "{figures}: {said}");
+    }
+    let file = experiment(&folder, &[]);
+    assert!(refusal(&["compare", &file, "--trials", "0"]).contains("0 is not in 1.."));
+    // A problem without blanks is named as such.
+    let file = experiment(
+        &folder,
+        &[("executors", "planner = \"{domain} {problem}\"\nexecutors")],
+    );
+    let said = refusal(&["compare", &file]);
+    assert!(!said.contains("with :"), "{said}");
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
+fn only_results_of_the_experiment_are_merged_and_missing_parts_are_named() {
+    let folder = folder("merging");
+    let file = experiment(&folder, &[]);
+    let part = |shard: &str| {
+        let name = folder.join(shard.replace('/', "-")).display().to_string();
+        let made = elbowroom(&["compare", &file, "--shard", shard, "-o", &name]);
+        assert!(made.status.success(), "{made:?}");
+        let table = String::from_utf8(made.stdout).expect("text");
+        (format!("{name}/results.json"), table)
+    };
+    let ((first, table), (last, _)) = (part("0/3"), part("2/3"));
+    let words = "incomplete: 2 of 6 trials of each problem; parts made: 0/3";
+    assert!(table.contains(words), "{table}");
+    let merged = elbowroom(&["compare", &file, "--merge", &first, &last]);
+    let table = String::from_utf8(merged.stdout).expect("text");
+    let words = "incomplete: 4 of 6 trials of each problem; parts made: 0/3, 2/3";
+    assert!(table.contains(words), "{table}");
+
+    // Another column, another title: another experiment, whose results once made a panic.
+    let more = "[[column]]\nname = \"more\"\nworld = \"world.toml\"\n[[column]]";
+    let other = experiment(&folder, &[("[[column]]", more), ("Late drives", "Others")]);
+    let said = refusal(&["compare", &other, "--merge", &first, &last]);
+    assert!(said.contains("is not of this experiment"), "{said}");
+
+    let text = fs::read_to_string(&first).expect("results");
+    let impossible = text.replace("\"shards\": 3", "\"shards\": 0");
+    assert_ne!(text, impossible);
+    fs::write(&first, impossible).expect("written");
+    let said = refusal(&["compare", &experiment(&folder, &[]), "--merge", &first]);
+    assert!(said.contains("no such parts"), "{said}");
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_told_before_the_trials() {
+    let folder = folder("no-folder");
+    let file = experiment(&folder, &[("trials = 6", "trials = 1000000000")]);
+    let bad = folder.join("experiment.toml/results").display().to_string();
+    let said = refusal(&["compare", &file, "-o", &bad]);
+    assert!(said.contains("cannot make the folder"), "{said}");
+    // What cannot be written is printed all the same.
+    let file = experiment(&folder, &[("trials = 6", "trials = 1")]);
+    let taken = folder.join("out");
+    fs::create_dir_all(taken.join("results.json")).expect("made");
+    let output = elbowroom(&["compare", &file, "-o", &taken.display().to_string()]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let table = String::from_utf8(output.stdout).expect("text");
+    assert!(table.contains("guarded"), "{table}");
+    fs::remove_dir_all(folder).expect("it is there");
+}

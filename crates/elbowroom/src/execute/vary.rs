@@ -1,0 +1,68 @@
+//! What is to be left open, before there is a plan.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::StnPlan;
+use elbowroom_plan::parametrize::{ParametrizeError, Target, VarySpec, parametrize};
+
+/// Whether each specification names something that the problem has, or a plan may have.
+///
+/// What a plan does not have, it cannot leave open, and that is no mistake: the next plan may have
+/// it. A name that nothing in the problem has is one.
+///
+/// # Errors
+/// The first mistake.
+pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
+    let plan = StnPlan::unconstrained(task, Vec::new());
+    let timed = task.timed().iter().map(|timed| timed.time.clone());
+    let nominal: Vec<Rational> = [Rational::ZERO].into_iter().chain(timed).collect();
+    for spec in specs {
+        if matches!(spec.target, Target::Unknown { .. }) {
+            continue;
+        }
+        let is_about_the_problem = matches!(spec.target, Target::Initial(_) | Target::Timed { .. });
+        match parametrize(task, plan.clone(), &nominal, std::slice::from_ref(spec)) {
+            Ok(_) => {}
+            Err(ParametrizeError::NothingMatches { .. }) if !is_about_the_problem => {}
+            Err(error) if is_about_an_absent_action(task, spec, &error) => {}
+            Err(ParametrizeError::UnknownName { name, .. }) if is_label(&name) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Whether a specification that fits nothing names an action of the domain, which the plan just
+/// does not use.
+pub(super) fn is_about_an_absent_action(
+    task: &Task,
+    spec: &VarySpec,
+    error: &ParametrizeError,
+) -> bool {
+    let schemas = &task.problem().schemas;
+    let is_action = |word: &str| {
+        let mut names = schemas.iter().map(|schema| schema.name.as_str());
+        names.any(|name| name.eq_ignore_ascii_case(word))
+    };
+    matches!(error, ParametrizeError::UnknownName { .. })
+        && spec.text.split([' ', '(', ')']).any(is_action)
+}
+
+/// Whether it is what a step of a plan may be called: `n0`.
+fn is_label(name: &str) -> bool {
+    let number = name.strip_prefix(['n', 'N']);
+    number.is_some_and(|number| !number.is_empty() && number.bytes().all(|it| it.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_label;
+
+    #[test]
+    fn steps_are_called_by_numbers() {
+        assert!(is_label("n12"));
+        assert!(!is_label("n"));
+        assert!(!is_label("nap"));
+        assert!(!is_label("12"));
+    }
+}

@@ -1,0 +1,80 @@
+//! Whether the world's clock comes forward.
+
+use elbowroom_num::Rational;
+
+/// So many answers of the world in one second of its time are too many, unless the plan has so
+/// many steps that they may all be about them.
+const MOST_ANSWERS: usize = 10_000;
+
+/// How many answers each step of a plan may bring within a second: its start and its end, each of
+/// them once more, and some facts.
+const ANSWERS_PER_STEP: usize = 10;
+
+/// Counts the answers in which the clock has not come forward by a second.
+///
+/// Reports reset nothing: a world may report for ever without time passing. So the number of
+/// answers in a run is bounded, whatever the world says: by [`MOST_ANSWERS`] for each second until
+/// [`RunSettings::time_limit`](super::RunSettings::time_limit).
+#[derive(Clone, Debug, Default)]
+pub(super) struct Progress {
+    /// From when the answers are counted.
+    since: Rational,
+    answers: usize,
+}
+
+impl Progress {
+    /// Takes note of an answer at `now`; `steps` is how many the present plan has.
+    ///
+    /// # Errors
+    /// In words, when the clock stands still.
+    pub(super) fn note(&mut self, now: &Rational, steps: usize) -> Result<(), String> {
+        if *now >= &self.since + Rational::ONE {
+            self.since.clone_from(now);
+            self.answers = 0;
+        }
+        self.answers += 1;
+        let most = MOST_ANSWERS.max(ANSWERS_PER_STEP.saturating_mul(steps));
+        if self.answers <= most {
+            return Ok(());
+        }
+        Err(format!(
+            "its clock stands still: {most} answers have brought it from {} to {} only; when \
+             nothing happens, time must pass until the moment that was asked for",
+            self.since.to_f64(),
+            now.to_f64(),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MOST_ANSWERS, Progress};
+    use elbowroom_num::Rational;
+
+    /// How many answers are taken when the nth has the time `clock(n)`.
+    fn taken(most: i64, steps: usize, clock: impl Fn(i64) -> Rational) -> i64 {
+        let mut progress = Progress::default();
+        let mut taken = 0..most;
+        taken
+            .find(|&n| progress.note(&clock(n), steps).is_err())
+            .unwrap_or(most)
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_or_creeps_is_noticed() {
+        let most = i64::try_from(MOST_ANSWERS).expect("a small number");
+        assert_eq!(taken(3 * most, 0, |_| Rational::ZERO), most);
+        let creeping = |n: i64| Rational::ONE - Rational::new(1, n + 1);
+        assert_eq!(taken(3 * most, 0, creeping), most);
+    }
+
+    #[test]
+    fn a_heartbeat_and_a_large_plan_are_no_standstill() {
+        let most = i64::try_from(MOST_ANSWERS).expect("a small number");
+        assert_eq!(taken(3 * most, 0, |n| Rational::new(n, 5000)), 3 * most);
+        assert_eq!(
+            taken(3 * most, 3 * MOST_ANSWERS, |_| Rational::ZERO),
+            3 * most
+        );
+    }
+}

@@ -1,0 +1,169 @@
+//! From actions to operators.
+
+use super::super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
+use super::super::super::time::{NEVER, Ticks};
+use super::super::numbers;
+use super::{Graph, Kind};
+
+/// An operator before it enters the graph.
+pub(super) struct Draft<'a> {
+    pub(super) kind: Kind,
+    pub(super) needs: Vec<u32>,
+    pub(super) is_running: Option<u32>,
+    pub(super) action: &'a Action,
+    pub(super) snaps: &'a [&'a Snap],
+}
+
+impl Graph {
+    /// Adds the operators of an action.
+    pub(super) fn add_action(
+        &mut self,
+        compiled: &Compiled,
+        number: u32,
+        action: &Action,
+        haste: Option<Eagerness>,
+    ) {
+        if action.end == NONE {
+            let snap = compiled.snap(action.start);
+            let needs = self.propositions(&snap.condition);
+            self.start_of[number as usize] = self.add_snaps(
+                compiled,
+                &Draft {
+                    kind: Kind::Start(number),
+                    needs,
+                    is_running: None,
+                    action,
+                    snaps: &[snap],
+                },
+            );
+            return;
+        }
+        let end = compiled.snap(action.end);
+        let running = self.running(number);
+        let mut end_needs = self.propositions(&end.condition);
+        if action.start != NONE {
+            let start = compiled.snap(action.start);
+            let mut needs = self.propositions(&start.condition);
+            // What must hold from the start on, and is not the start's own doing. Another start
+            // at the same moment may bring it about, if such a pair exists; see the compiler's
+            // gap.
+            let gained: Vec<u32> = effects_of(start).collect();
+            let over_all = self.propositions(&action.over_all);
+            let tests = self.first_test..self.first_running;
+            needs.extend(
+                over_all
+                    .iter()
+                    .filter(|need| !gained.contains(need) && !tests.contains(need)),
+            );
+            let is_whole = haste.is_some_and(|haste| action.eagerness >= haste)
+                && end_needs
+                    .iter()
+                    .all(|need| over_all.contains(need) || gained.contains(need));
+            let (snaps, kind) = if is_whole {
+                (vec![start, end], Kind::Whole(number))
+            } else {
+                (vec![start], Kind::Start(number))
+            };
+            self.start_of[number as usize] = self.add_snaps(
+                compiled,
+                &Draft {
+                    kind,
+                    needs,
+                    is_running: (!is_whole).then_some(running),
+                    action,
+                    snaps: &snaps,
+                },
+            );
+        }
+        end_needs.push(running);
+        self.end_of[number as usize] = self.add_snaps(
+            compiled,
+            &Draft {
+                kind: Kind::End(number),
+                needs: end_needs,
+                is_running: None,
+                action,
+                snaps: &[end],
+            },
+        );
+    }
+
+    /// Adds an operator for the snaps together, and one for each conditional effect.
+    fn add_snaps(&mut self, compiled: &Compiled, draft: &Draft<'_>) -> u32 {
+        let least = least_ticks(compiled, draft.action);
+        let mut effects: Vec<(u32, Ticks)> = Vec::new();
+        effects.extend(draft.is_running.map(|running| (running, least)));
+        for (snap, delay) in draft.snaps.iter().zip([0, least]) {
+            effects.extend(effects_of(snap).map(|effect| (effect, delay)));
+        }
+        let span = if draft.snaps.len() > 1 { least } else { 0 };
+        let updates: Vec<&Update> = draft.snaps.iter().flat_map(|snap| &snap.updates).collect();
+        let mut gains = self.gains_of(compiled, &updates);
+        // A continuous change may reach any value, from the start to the end.
+        for flow in &draft.action.flows {
+            self.add_any_gain(flow.fluent, &mut gains);
+        }
+        let windows = self.windows_of(compiled, draft);
+        let operator = self.add(draft.kind, 1, draft.needs.clone(), &effects, gains);
+        self.operators[operator as usize].windows = windows.clone();
+        self.operators[operator as usize].span = span;
+        for effect in draft.snaps.iter().flat_map(|snap| &snap.conditional) {
+            let mut needs = draft.needs.clone();
+            needs.extend(self.propositions(&effect.now));
+            if let Some(guard) = effect.at_start
+                && !matches!(draft.kind, Kind::End(_))
+            {
+                needs.extend(self.propositions(&draft.action.guards[guard as usize]));
+            }
+            let (effects, gains) = match &effect.change {
+                Change::Add(fact) => (vec![(2 * fact, 0)], Vec::new()),
+                Change::Delete(fact) => (vec![(2 * fact + 1, 0)], Vec::new()),
+                Change::Update(update) => (Vec::new(), self.gains_of(compiled, &[update])),
+                Change::Cost(_) => continue,
+            };
+            let extra = self.add(draft.kind, 1, needs, &effects, gains);
+            self.operators[extra as usize].is_step = false;
+            self.operators[extra as usize].windows = windows.clone();
+        }
+        operator
+    }
+
+    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, f64)> {
+        let mut gains: Vec<(u32, f64)> = Vec::new();
+        for update in updates {
+            for &test in &self.tests_of_fluent[update.fluent as usize] {
+                if gains.iter().all(|(known, _)| *known != test) {
+                    let gain = numbers::gain(compiled, test, updates);
+                    if gain.abs() > 0.0 {
+                        gains.push((test, gain));
+                    }
+                }
+            }
+        }
+        gains
+    }
+
+    /// Whatever is tested of the fluent may come about.
+    pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, f64)>) {
+        for &test in &self.tests_of_fluent[fluent as usize] {
+            gains.retain(|(known, _)| *known != test);
+            gains.push((test, f64::INFINITY));
+        }
+    }
+}
+
+/// The least duration of an action, as far as it does not depend on the state.
+pub(super) fn least_ticks(compiled: &Compiled, action: &Action) -> Ticks {
+    compiled.scale.floor(&action.duration.least).0
+}
+
+/// The longest it may take, likewise; [`NEVER`] if there is no bound.
+pub(super) fn most_ticks(compiled: &Compiled, action: &Action) -> Ticks {
+    let most = action.duration.most.as_ref();
+    most.map_or(NEVER, |most| compiled.scale.ceil(most).0)
+}
+
+fn effects_of(snap: &Snap) -> impl Iterator<Item = u32> + '_ {
+    let adds = snap.adds.iter().map(|fact| 2 * fact);
+    adds.chain(snap.deletes.iter().map(|fact| 2 * fact + 1))
+}

@@ -1,0 +1,136 @@
+//! World files as they stand, and what may stand where.
+
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The file as it stands.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    pub(super) format: Spanned<String>,
+    pub(super) version: Spanned<i64>,
+    pub(super) resolution: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub(super) duration: Vec<Spanned<Section>>,
+    #[serde(default)]
+    pub(super) delay: Vec<Spanned<Section>>,
+    #[serde(default)]
+    pub(super) amount: Vec<Spanned<Section>>,
+    #[serde(default)]
+    pub(super) failure: Vec<Spanned<Section>>,
+    #[serde(default)]
+    pub(super) event: Vec<Spanned<Section>>,
+    pub(super) reports: Option<Spanned<Section>>,
+}
+
+/// Whatever can stand in one section; which of it may, depends on the section.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Section {
+    pub(super) action: Option<Spanned<String>>,
+    pub(super) fluent: Option<Spanned<String>>,
+    pub(super) fact: Option<Spanned<String>>,
+    pub(super) becomes: Option<Spanned<toml::Value>>,
+    pub(super) probability: Option<Spanned<f64>>,
+    pub(super) when: Option<Spanned<String>>,
+    pub(super) reported: Option<Spanned<bool>>,
+    pub(super) constant: Option<Spanned<f64>>,
+    pub(super) normal: Option<Spanned<Shape>>,
+    pub(super) lognormal: Option<Spanned<Shape>>,
+    pub(super) uniform: Option<Spanned<Shape>>,
+    pub(super) triangular: Option<Spanned<Shape>>,
+    pub(super) values: Option<Spanned<Vec<f64>>>,
+    pub(super) minimum: Option<Spanned<f64>>,
+    pub(super) maximum: Option<Spanned<f64>>,
+    pub(super) relative: Option<Spanned<bool>>,
+    pub(super) lost: Option<Spanned<f64>>,
+    pub(super) duplicated: Option<Spanned<f64>>,
+    pub(super) late: Option<Spanned<f64>>,
+    pub(super) contradicted: Option<Spanned<f64>>,
+}
+
+/// The numbers of a distribution.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Shape {
+    pub(super) mean: Option<f64>,
+    pub(super) deviation: Option<f64>,
+    pub(super) from: Option<f64>,
+    pub(super) to: Option<f64>,
+    pub(super) mode: Option<f64>,
+    pub(super) minimum: Option<Spanned<f64>>,
+    pub(super) maximum: Option<Spanned<f64>>,
+}
+
+/// The keys that say how a quantity is distributed.
+const DISTRIBUTION: &[&str] = &[
+    "constant",
+    "normal",
+    "lognormal",
+    "uniform",
+    "triangular",
+    "values",
+    "minimum",
+    "maximum",
+];
+
+impl Section {
+    /// Everything that stands in it, and where.
+    fn given(&self) -> Vec<(&'static str, Range<usize>)> {
+        fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+            value.map(Spanned::span)
+        }
+        let all = [
+            ("action", at(self.action.as_ref())),
+            ("fluent", at(self.fluent.as_ref())),
+            ("fact", at(self.fact.as_ref())),
+            ("becomes", at(self.becomes.as_ref())),
+            ("probability", at(self.probability.as_ref())),
+            ("when", at(self.when.as_ref())),
+            ("reported", at(self.reported.as_ref())),
+            ("constant", at(self.constant.as_ref())),
+            ("normal", at(self.normal.as_ref())),
+            ("lognormal", at(self.lognormal.as_ref())),
+            ("uniform", at(self.uniform.as_ref())),
+            ("triangular", at(self.triangular.as_ref())),
+            ("values", at(self.values.as_ref())),
+            ("minimum", at(self.minimum.as_ref())),
+            ("maximum", at(self.maximum.as_ref())),
+            ("relative", at(self.relative.as_ref())),
+            ("lost", at(self.lost.as_ref())),
+            ("duplicated", at(self.duplicated.as_ref())),
+            ("late", at(self.late.as_ref())),
+            ("contradicted", at(self.contradicted.as_ref())),
+        ];
+        let given = all.into_iter();
+        given
+            .filter_map(|(name, span)| Some((name, span?)))
+            .collect()
+    }
+
+    /// The first thing in it, if any, that is neither of `own` nor, where it has one, of its
+    /// distribution: where it stands, and what to do.
+    pub(super) fn excess(
+        &self,
+        name: &str,
+        own: &[&str],
+        is_distributed: bool,
+    ) -> Option<(Range<usize>, String)> {
+        let extra = if is_distributed { DISTRIBUTION } else { &[] };
+        let given = self.given();
+        let is_known = |key: &&str| own.contains(key) || extra.contains(key);
+        let (key, span) = given.into_iter().find(|(key, _)| !is_known(key))?;
+        let known: Vec<&str> = own.iter().chain(extra).copied().collect();
+        let known = known.join(", ");
+        let message = format!("`{key}` says nothing in {name}; leave it out. There are {known}");
+        Some((span, message))
+    }
+
+    /// Whether it says how something is distributed.
+    pub(super) fn is_distributed(&self) -> bool {
+        let mut given = self.given().into_iter();
+        given.any(|(key, _)| DISTRIBUTION.contains(&key))
+    }
+}
