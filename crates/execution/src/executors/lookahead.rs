@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use elbowroom_model::ground::{Action, Change, Condition, DurativeBody, Expression};
+use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Expression};
 use elbowroom_model::problem::Comparison;
 use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
@@ -41,8 +41,8 @@ pub(super) const REGISTERED: Registered = Registered {
 const MOST_RUNNING: usize = 3;
 
 /// Worlds with more states, those of facts times those of actions under way, are not tabulated: a
-/// table of so many takes a second or two.
-const MOST_STATES: usize = 1 << 17;
+/// table of so many takes some seconds.
+const MOST_STATES: usize = 1 << 18;
 
 /// Nor are worlds with more facts than this, however little can be done in them.
 const MOST_FACTS: usize = 16;
@@ -73,13 +73,13 @@ impl Table {
     fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Arc<Self>> {
         let mut task = task.clone();
         let actions = all_actions(&mut task).ok()?;
-        if ends_break_others(&actions) {
+        if ends_break_others(&actions) || has_negations(&task, &actions) {
             return None;
         }
         let plan = PartialOrderPlan::unordered(&task, actions);
         let steps = plan.instances().map(|(_, instance)| step(&task, instance));
         let steps = steps.collect::<Option<Vec<Step>>>()?;
-        let model = Model::new(task, plan, likelihoods, Semantics::World).ok()?;
+        let model = Model::new(task, plan, &without_luck(likelihoods), Semantics::World).ok()?;
         let facts = model.facts().count();
         if facts > MOST_FACTS || sets(steps.len()) << facts > MOST_STATES {
             return None;
@@ -145,6 +145,36 @@ impl Table {
     }
 }
 
+/// Nothing comes about by itself. A table takes whatever is done for a chance of that, and where
+/// nothing but the world's clock goes on, it would do something in vain for ever.
+fn without_luck(likelihoods: &Likelihoods) -> Likelihoods {
+    let mut likelihoods = likelihoods.clone();
+    let entries = likelihoods.predicates.values_mut();
+    for entry in entries.chain(likelihoods.facts.values_mut()) {
+        entry.becomes_true = entry.becomes_true.map(|_| 0.0);
+    }
+    let becomes_true = &mut likelihoods.defaults.becomes_true;
+    *becomes_true = becomes_true.map(|_| 0.0);
+    likelihoods
+}
+
+/// Whether something needs a fact to be false: facts that are lost would be luck then.
+fn has_negations(task: &Task, actions: &[Action]) -> bool {
+    let needs = actions.iter().flat_map(|action| match &action.body {
+        Body::Instantaneous(snap) => vec![&snap.condition],
+        Body::Durative(body) => vec![&body.start.condition, &body.over_all, &body.end.condition],
+    });
+    needs.chain([task.goal()]).any(is_negative)
+}
+
+fn is_negative(condition: &Condition) -> bool {
+    match condition {
+        Condition::Fact(_) | Condition::Compare(..) => false,
+        Condition::Not(_) => true,
+        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(is_negative),
+    }
+}
+
 /// The action, as long as it takes at least.
 fn step(task: &Task, instance: &Instance) -> Option<Step> {
     let action = instance.action.clone();
@@ -171,12 +201,14 @@ fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
             _ => None,
         })?;
         match constraint.comparison {
-            Comparison::AtMost | Comparison::Less => {
+            Comparison::AtMost => {
                 longest = Some(longest.map_or(bound.clone(), |known| known.min(bound)));
             }
-            Comparison::AtLeast | Comparison::Greater | Comparison::Equal => {
+            Comparison::AtLeast | Comparison::Equal => {
                 shortest = Some(shortest.map_or(bound.clone(), |known| known.max(bound)));
             }
+            // With bounds that are not reached there may be no shortest.
+            Comparison::Greater | Comparison::Less => return None,
         }
     }
     shortest.or(longest).filter(Rational::is_positive)
@@ -201,16 +233,11 @@ fn ends_break_others(actions: &[Action]) -> bool {
     })
 }
 
-/// Whether a change can make a condition false.
+/// Whether a change can make a condition without negations false.
 fn breaks(change: &Change, condition: &Condition) -> bool {
     match condition {
         Condition::Fact(fact) => *change == Change::Delete(*fact),
-        Condition::Compare(..) => false,
-        Condition::Not(part) => match &**part {
-            Condition::Fact(fact) => *change == Change::Add(*fact),
-            // Whatever it is, it may.
-            _ => true,
-        },
+        Condition::Compare(..) | Condition::Not(_) => false,
         Condition::And(parts) | Condition::Or(parts) => {
             parts.iter().any(|part| breaks(change, part))
         }
@@ -299,6 +326,11 @@ mod tests {
         assert!(durations(&look, "(light) (at 5 (not (light)))").is_none());
         assert!(durations(&format!("{look}{}", burn("")), "").is_some());
         // What is to be seen must be seen before the light goes out.
+        // Nor may anything have to be dark: then it would be luck to lose the light.
+        let hide = look
+            .replace("look", "hide")
+            .replace("(light)", "(not (light))");
+        assert!(durations(&hide, "").is_none());
         let goes_out = burn("(at end (not (light)))");
         assert!(durations(&format!("{look}{goes_out}"), "").is_none());
         let numbers = burn("(at end (increase (far ?p) 1))");

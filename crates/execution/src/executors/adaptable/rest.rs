@@ -32,6 +32,9 @@ const MOST_FAILURES: i32 = 1000;
 /// So often in a row a failure is put down to a condition that does not hold.
 const MOST_EXPLAINED: i32 = 3;
 
+/// So often an action is stopped before its end for good reasons.
+const MOST_LET_GO: u32 = 3;
+
 /// A plan, and how it stands.
 pub(super) struct Rest {
     mission: Mission,
@@ -46,6 +49,8 @@ pub(super) struct Rest {
     failures: BTreeMap<InstanceId, i32>,
     /// What was told to stop and has not.
     let_go: BTreeSet<StepId>,
+    /// How often each instance was told to stop.
+    times_let_go: BTreeMap<InstanceId, u32>,
     /// The number of the next order.
     next_step: u32,
 }
@@ -62,6 +67,7 @@ impl Rest {
             steps,
             chooser,
             let_go: BTreeSet::new(),
+            times_let_go: BTreeMap::new(),
             mission: mission.clone(),
             recent: Vec::new(),
             failures: BTreeMap::new(),
@@ -204,13 +210,21 @@ impl Rest {
                 let until = self.first_overdue().map(|time| self.world(&time));
                 wait(until, "what is under way has ended")
             }
-            Ok(Choice::Abandon(instance)) => self.let_go(instance),
+            Ok(Choice::Abandon(instance)) => self.let_go(instance, &now),
             Ok(Choice::Replan) => replan(Reason::new(Cause::NoOrder).since(moment.now.clone())),
         }
     }
 
-    /// Stops an action whose end is not worth waiting for.
-    fn let_go(&mut self, instance: InstanceId) -> Decided {
+    /// Stops an action whose end is not worth waiting for; not again and again, which would take no
+    /// time.
+    fn let_go(&mut self, instance: InstanceId, now: &Rational) -> Decided {
+        let times = self.times_let_go.entry(instance).or_default();
+        if *times >= MOST_LET_GO {
+            let overdue = self.first_overdue().filter(|time| time > now);
+            let until = overdue.map(|time| self.world(&time));
+            return wait(until, "what is under way has ended");
+        }
+        *times += 1;
         let is_it = |(step, (under_way, _)): (&StepId, &(InstanceId, Option<Rational>))| {
             (*under_way == instance).then_some(*step)
         };
