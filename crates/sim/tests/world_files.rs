@@ -171,6 +171,17 @@ fn nothing_in_a_file_is_ignored() {
             5,
             "only continuously",
         ),
+    ];
+    for (sections, line, words) in cases {
+        let (found, message) = mistake(sections);
+        assert_eq!(found, line, "{sections}: {message}");
+        assert!(message.contains(words), "{sections}: {message}");
+    }
+}
+
+#[test]
+fn numbers_that_make_no_sense_are_mistakes() {
+    let cases = [
         (
             "[[duration]]\naction = \"go\"\nconstant = 1\nminimum = 30\nmaximum = 20\n",
             7,
