@@ -324,6 +324,7 @@ impl<'a> Run<'a> {
         };
         self.account.begin_plan(&mission.running);
         self.steps = mission.time_triggered.steps.len();
+        self.progress.begin_plan();
         self.news.clear();
         self.ports.recorder.record(&Entry::Mission(&mission));
         if let Err(reason) = self.ports.executor.adopt(&mission) {

@@ -13,8 +13,8 @@ const ANSWERS_PER_STEP: usize = 10;
 /// Counts the answers in which the clock has not come forward by a second.
 ///
 /// Reports reset nothing: a world may report for ever without time passing. So the number of
-/// answers in a run is bounded, whatever the world says: by [`MOST_ANSWERS`] for each second until
-/// [`RunSettings::time_limit`](super::RunSettings::time_limit).
+/// answers in a run is bounded, whatever the world says: by [`MOST_ANSWERS`] for each plan, and for
+/// each second until [`RunSettings::time_limit`](super::RunSettings::time_limit).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Progress {
     /// From when the answers are counted.
@@ -23,6 +23,12 @@ pub(super) struct Progress {
 }
 
 impl Progress {
+    /// A new plan is taken up: what was tried again and again in the last one does not count
+    /// against it. How many plans there are is bounded by itself.
+    pub(super) fn begin_plan(&mut self) {
+        self.answers = 0;
+    }
+
     /// Takes note of an answer at `now`; `steps` is how many the present plan has.
     ///
     /// # Errors
