@@ -47,6 +47,8 @@ pub(super) struct Rest {
     recent: Vec<(NodeId, Rational)>,
     /// How often each instance has failed in a row.
     failures: BTreeMap<InstanceId, i32>,
+    /// What was new last, in words: what came before no order was left.
+    latest: Option<String>,
     /// What was told to stop and has not.
     let_go: BTreeSet<StepId>,
     /// How often each instance was told to stop.
@@ -71,6 +73,7 @@ impl Rest {
             mission: mission.clone(),
             recent: Vec::new(),
             failures: BTreeMap::new(),
+            latest: None,
         }
     }
 
@@ -92,6 +95,7 @@ impl Rest {
         belief: &Progression,
         likelihoods: &Likelihoods,
     ) -> Option<Reason> {
+        self.latest = self.words(news, belief).or(self.latest.take());
         match news {
             News::Started { step, time, .. } => {
                 let local = time - &self.mission.origin;
@@ -137,6 +141,36 @@ impl Rest {
                 Some(Reason::new(Cause::Silence).of(action).since(since.clone()))
             }
         }
+    }
+
+    /// What is new, in words.
+    fn words(&self, news: &News, belief: &Progression) -> Option<String> {
+        let action = |step: &StepId| {
+            let (instance, _) = self.under_way.get(step)?;
+            Some(self.steps[instance.index()].action.name.as_str())
+        };
+        let at = |time: &Rational| time.to_decimal(3);
+        Some(match news {
+            News::Started { step, time, .. } => {
+                format!("{} started at {}", action(step)?, at(time))
+            }
+            News::Ended {
+                step, time, ending, ..
+            } => format!("{} {} at {}", action(step)?, ending.name(), at(time)),
+            News::Fact(fact) => {
+                let name = belief.task().fact_name(*fact);
+                let truth = if belief.fact(*fact) { "true" } else { "false" };
+                format!("{name} was seen to be {truth}")
+            }
+            News::Value(fluent) => {
+                let name = belief.task().fluent_name(*fluent);
+                match belief.value(*fluent) {
+                    Some(value) => format!("{name} was seen to be {}", at(value)),
+                    None => format!("{name} was seen to have no value"),
+                }
+            }
+            News::Contradiction { .. } | News::Silence { .. } => return None,
+        })
     }
 
     /// An instance's start or end.
@@ -211,7 +245,11 @@ impl Rest {
                 wait(until, "what is under way has ended")
             }
             Ok(Choice::Abandon(instance)) => self.let_go(instance, &now),
-            Ok(Choice::Replan) => replan(Reason::new(Cause::NoOrder).since(moment.now.clone())),
+            Ok(Choice::Replan) => {
+                let mut reason = Reason::new(Cause::NoOrder).since(moment.now.clone());
+                reason.behind = self.latest.iter().cloned().collect();
+                replan(reason)
+            }
         }
     }
 
