@@ -17,6 +17,7 @@
 mod assignment;
 mod bound;
 mod cache;
+mod chain;
 mod memo;
 mod nominal;
 mod room;

@@ -17,9 +17,9 @@
 use elbowroom_plan::InstanceId;
 
 use super::assignment;
+use super::chain::Chain;
 use super::nominal::{Nominal, Truth};
 use super::separations::Separations;
-use crate::likelihoods::Flip;
 use crate::model::{Event, Model, Requirement, Semantics};
 use crate::network::PrunedNetwork;
 
@@ -343,7 +343,7 @@ impl Run<'_, '_, '_> {
             return self.chance(fact, truth, before);
         }
         let steps = i32::try_from(before).unwrap_or(i32::MAX);
-        let stays = 1.0 - chain.0.becomes_false;
+        let stays = 1.0 - chain.fails();
         if self.network.running().contains(&id) {
             return stays.powi(steps);
         }
@@ -409,49 +409,5 @@ impl Run<'_, '_, '_> {
             }
         }
         best
-    }
-}
-
-/// A fact changing by itself, seen from the truth that is wanted.
-#[derive(Clone, Copy)]
-struct Chain(Flip);
-
-impl Chain {
-    fn of(flip: Flip, truth: bool) -> Self {
-        Self(if truth {
-            flip
-        } else {
-            Flip {
-                becomes_true: flip.becomes_false,
-                becomes_false: flip.becomes_true,
-            }
-        })
-    }
-
-    /// Whether chances move to one side only.
-    fn is_steady(self) -> bool {
-        self.0.becomes_true + self.0.becomes_false <= 1.0
-    }
-
-    /// The greatest chance after `steps` steps or more.
-    ///
-    /// Chances move towards `becomes_true / (becomes_true + becomes_false)` from one side, unless
-    /// the two sum up to more than 1; then they jump from side to side.
-    fn best_after(self, p: f64, steps: usize) -> f64 {
-        let Flip {
-            becomes_true,
-            becomes_false,
-        } = self.0;
-        let sum = becomes_true + becomes_false;
-        if sum > 1.0 {
-            return 1.0;
-        }
-        if sum <= 0.0 {
-            return p;
-        }
-        let rest = becomes_true / sum;
-        let decayed =
-            rest + (p - rest) * (1.0 - sum).powi(i32::try_from(steps).unwrap_or(i32::MAX));
-        decayed.max(rest)
     }
 }
