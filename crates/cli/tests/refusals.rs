@@ -1,21 +1,11 @@
 //! What the command does not understand, or could not honour, it refuses; nothing is ignored.
 
+mod command;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn elbowroom(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_elbowroom"))
-        .current_dir(root())
-        .env("NO_COLOR", "1")
-        .args(arguments)
-        .output()
-        .expect("the command can be started")
-}
+use command::{elbowroom, root};
 
 /// A folder that no other test uses.
 fn folder(name: &str) -> PathBuf {

@@ -1,22 +1,13 @@
 //! Stored runs are played back to the same decisions, whoever decided.
 
+mod command;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
 
 use serde_json::Value;
 
-fn elbowroom(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_elbowroom"))
-        .current_dir(root())
-        .args(arguments)
-        .output()
-        .expect("the command can be started")
-}
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+use command::{elbowroom, root};
 
 /// A file that is removed when nobody needs it any more.
 struct Temporary(PathBuf);

@@ -1,21 +1,11 @@
 //! Worlds that are processes, and runs that are killed.
 
+mod command;
+
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn elbowroom(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_elbowroom"))
-        .current_dir(root())
-        .env("NO_COLOR", "1")
-        .args(arguments)
-        .output()
-        .expect("the command can be started")
-}
+use command::{elbowroom, root};
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
