@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 
 use crate::circumstances::Circumstances;
-use crate::dispatch::{Choice, LayerDispatch, NextHappening, goal_holds};
+use crate::dispatch::{Choice, LayerDispatch};
 use crate::network::TooCoupled;
-use crate::optimum::{Move, Optimum, Perturbed, Settings};
+use crate::optimum::{Optimum, Perturbed, Settings};
 use crate::search::{Progress, Slot};
 
 /// Chooses what is most likely to lead to success, counting retries, repetitions and detours.
@@ -61,22 +61,11 @@ impl Lookahead {
         let Some((process, optimum)) = &self.table else {
             return self.dispatch.choose(circumstances, watch);
         };
-        if circumstances.running.is_empty() && goal_holds(process.model(), circumstances) {
-            return Ok(Choice::GoalReached);
-        }
-        Ok(match optimum.choose(process, circumstances) {
-            Move::Do(node) => Choice::Next(NextHappening {
-                node,
-                position: 0,
-                slot: Slot {
-                    node,
-                    earliest: circumstances.now.clone(),
-                    latest: None,
-                },
-                is_new_order: false,
-            }),
-            Move::Abandon(id) => Choice::Abandon(id),
-            Move::Stop => Choice::Replan,
-        })
+        let now = &circumstances.now;
+        Ok(optimum.choice(process, circumstances, |node| Slot {
+            node,
+            earliest: now.clone(),
+            latest: None,
+        }))
     }
 }

@@ -31,6 +31,8 @@ use elbowroom_model::State;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::circumstances::Circumstances;
+use crate::dispatch::{Choice, NextHappening, goal_holds};
+use crate::search::Slot;
 
 pub use process::Perturbed;
 
@@ -123,6 +125,28 @@ pub struct Optimum {
 }
 
 impl Optimum {
+    /// What is best from here, as an executor is told it; `slot` says when a happening can be.
+    pub fn choice(
+        &self,
+        process: &Perturbed,
+        circumstances: &Circumstances,
+        slot: impl FnOnce(NodeId) -> Slot,
+    ) -> Choice {
+        if circumstances.running.is_empty() && goal_holds(process.model(), circumstances) {
+            return Choice::GoalReached;
+        }
+        match self.choose(process, circumstances) {
+            Move::Do(node) => Choice::Next(NextHappening {
+                node,
+                position: 0,
+                slot: slot(node),
+                is_new_order: false,
+            }),
+            Move::Abandon(id) => Choice::Abandon(id),
+            Move::Stop => Choice::Replan,
+        }
+    }
+
     /// The greatest probability of success from here, in [0, 1], with all patience left.
     ///
     /// With [`Horizon::Unlimited`] it is approached from below; the sweeps stop when none of them

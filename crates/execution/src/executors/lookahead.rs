@@ -7,11 +7,9 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
-use elbowroom_probability::dispatch::goal_holds;
-use elbowroom_probability::optimum::{Move, Optimum, Perturbed, Settings};
+use elbowroom_probability::optimum::{Optimum, Perturbed, Settings};
 use elbowroom_probability::{
-    Choice, Circumstances, Likelihoods, Model, NextHappening, OrderSearch, SearchSettings,
-    Semantics, Slot,
+    Choice, Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, Semantics, Slot,
 };
 
 use super::Registered;
@@ -121,27 +119,15 @@ impl Table {
 
     /// What is best. A start is due as soon as nothing that interferes with it has just happened.
     pub(super) fn choose(&self, search: &OrderSearch, circumstances: &Circumstances) -> Choice {
-        if circumstances.running.is_empty() && goal_holds(self.process.model(), circumstances) {
-            return Choice::GoalReached;
-        }
-        match self.optimum.choose(&self.process, circumstances) {
-            Move::Do(node) => {
-                let slots = search.windows(circumstances, &[node]);
-                let slot = slots.and_then(|slots| slots.into_iter().next());
-                Choice::Next(NextHappening {
-                    node,
-                    position: 0,
-                    slot: slot.unwrap_or_else(|| Slot {
-                        node,
-                        earliest: circumstances.now.clone(),
-                        latest: None,
-                    }),
-                    is_new_order: false,
-                })
-            }
-            Move::Abandon(id) => Choice::Abandon(id),
-            Move::Stop => Choice::Replan,
-        }
+        self.optimum.choice(&self.process, circumstances, |node| {
+            let slots = search.windows(circumstances, &[node]);
+            let slot = slots.and_then(|slots| slots.into_iter().next());
+            slot.unwrap_or_else(|| Slot {
+                node,
+                earliest: circumstances.now.clone(),
+                latest: None,
+            })
+        })
     }
 }
 

@@ -17,23 +17,30 @@ const DELIVERY: &str = "
       :condition (and (over all (there)) (over all (open)) (at start (loaded)))
       :effect (and (at start (not (loaded))) (at end (delivered))))";
 
-/// On the way since 0 with the parcel; it is 6 now.
-fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
-    let problem =
-        format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
-    let mut task = task(DELIVERY, &problem);
-    let go = task.problem().schema("go").expect("as written above");
-    let action = task.instantiate(go, &[]).expect("as written above");
-    let mut situation = Situation::initial(&task);
-    let here = task.problem().predicate("here").expect("as written above");
-    let here = task.find_fact(here, &[]).expect("as written above");
-    situation.state.facts.remove(&here);
+/// It is 6; an action without arguments has been under way since 0, and its start has made a fact
+/// false.
+fn under_way(task: &mut Task, schema: &str, gone: &str, duration: Interval) -> Situation {
+    let schema = task.problem().schema(schema).expect("as written");
+    let action = task.instantiate(schema, &[]).expect("as written");
+    let mut situation = Situation::initial(task);
+    let gone = task.problem().predicate(gone).expect("as written");
+    let gone = task.find_fact(gone, &[]).expect("as written");
+    situation.state.facts.remove(&gone);
     situation.time = 6.into();
     situation.running.push(RunningAction {
         action,
         start: Rational::ZERO,
         duration,
     });
+    situation
+}
+
+/// On the way since 0 with the parcel; it is 6 now.
+fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
+    let problem =
+        format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
+    let mut task = task(DELIVERY, &problem);
+    let situation = under_way(&mut task, "go", "here", duration);
     (task, situation)
 }
 
@@ -161,18 +168,7 @@ fn filling(duration: Interval) -> (Task, Situation) {
     let problem = "(:init (idle) (= (level) 0) (= (pumped) 0)) (:goal (drained))
         (:metric minimize (pumped))";
     let mut task = task(domain, problem);
-    let fill = task.problem().schema("fill").expect("as written above");
-    let action = task.instantiate(fill, &[]).expect("as written above");
-    let mut situation = Situation::initial(&task);
-    let idle = task.problem().predicate("idle").expect("as written above");
-    let idle = task.find_fact(idle, &[]).expect("as written above");
-    situation.state.facts.remove(&idle);
-    situation.time = 6.into();
-    situation.running.push(RunningAction {
-        action,
-        start: Rational::ZERO,
-        duration,
-    });
+    let situation = under_way(&mut task, "fill", "idle", duration);
     (task, situation)
 }
 
