@@ -16,13 +16,14 @@
 //!
 //! Dynamic controllability comes with its [`Dispatchable`] form, by which a [`Dispatcher`] executes
 //! the network: what an event means for the future shows at its neighbours. If there is none, a
-//! [`Conflict`] says why.
+//! [`Conflict`] says why, and a [`Spoiler`] beats whoever tries.
 
 mod conflict;
 mod dispatchable;
 mod dispatcher;
 mod dynamic;
 mod extended;
+mod spoiler;
 mod strong;
 
 use std::collections::BTreeSet;
@@ -36,6 +37,7 @@ pub use conflict::{Conflict, Ground, Step};
 pub use dispatchable::{Dispatchable, DispatchableEdge, Wait};
 pub use dispatcher::{Dispatcher, Missed};
 pub use extended::Extended;
+pub use spoiler::Spoiler;
 pub use strong::StrongConflict;
 
 /// `lower <= end - activation <= upper`, where the world decides how much it is.

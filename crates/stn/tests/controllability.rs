@@ -5,8 +5,11 @@ mod game;
 
 use std::sync::Arc;
 
-use elbowroom_stn::uncertain::{Dispatchable, Dispatcher, UncertainNetwork};
-use elbowroom_stn::{NodeId, Weight};
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{
+    ContingentLink, Dispatchable, Dispatcher, Spoiler, UncertainNetwork,
+};
+use elbowroom_stn::{Constraint, Network, NodeId, Weight};
 use game::{Board, Random};
 
 /// As many as the variable says, to try more by hand.
@@ -235,4 +238,113 @@ fn the_dispatcher_satisfies_every_requirement_whatever_the_world_does() {
         }
     }
     assert!(runs > 1000);
+}
+
+#[test]
+fn a_link_without_an_upper_bound_is_one_with_a_very_large_one() {
+    let mut controllable = [0; 2];
+    for seed in 0..many(10_000) {
+        let board = Board::random(&mut Random(seed));
+        let network = board.network();
+        // Without a horizon, or nothing unbounded would ever do.
+        let mut requirements = Network::with_nodes(board.count);
+        for constraint in network.requirements().constraints() {
+            if constraint.from != NodeId(0) {
+                requirements.add(constraint.clone());
+            }
+        }
+        let unbounded = |upper: Option<i64>, random: &mut Random| {
+            let links = network.links().iter().cloned().map(|mut link| {
+                if random.below(2) == 0 {
+                    link.upper = upper;
+                }
+                link
+            });
+            UncertainNetwork::new(requirements.clone(), links.collect()).unwrap()
+        };
+        let infinite = unbounded(None, &mut Random(seed)).is_dynamically_controllable();
+        let large = unbounded(Some(100_000), &mut Random(seed)).is_dynamically_controllable();
+        assert_eq!(infinite, large, "seed {seed}");
+        controllable[usize::from(infinite)] += 1;
+    }
+    assert!(
+        controllable.iter().all(|&count| count > 100),
+        "{controllable:?}"
+    );
+}
+
+/// The same network with rational bounds.
+fn rational(network: &UncertainNetwork<i64>) -> UncertainNetwork {
+    let mut requirements = Network::with_nodes(network.requirements().node_count());
+    for constraint in network.requirements().constraints() {
+        let bound = Rational::from(constraint.bound);
+        requirements.add(Constraint::at_most(constraint.from, constraint.to, bound));
+    }
+    let links = network.links().iter().map(|link| ContingentLink {
+        activation: link.activation,
+        end: link.end,
+        lower: link.lower.into(),
+        upper: link.upper.map(Rational::from),
+    });
+    UncertainNetwork::new(requirements, links.collect()).unwrap()
+}
+
+/// Executes a network against the spoiler; whether every requirement held in the end.
+fn survives(board: &Board, network: &UncertainNetwork, random: &mut Random) -> bool {
+    let spoiler = Spoiler::new(network.clone(), NodeId(0));
+    let mut happened: Vec<Option<Rational>> = vec![None; board.count];
+    happened[0] = Some(Rational::ZERO);
+    let eagerness = 1 + random.below(4);
+    for now in 0..=board.horizon {
+        let now = Rational::from(now);
+        loop {
+            for link in spoiler.ends_now(&now, &happened) {
+                happened[network.link(link).end.index()] = Some(now.clone());
+            }
+            let free: Vec<usize> = (0..board.count)
+                .filter(|&node| {
+                    let id = NodeId(u32::try_from(node).unwrap());
+                    happened[node].is_none() && !network.is_contingent(id)
+                })
+                .collect();
+            if free.is_empty() || random.below(eagerness) != 0 {
+                break;
+            }
+            happened[free[random.below(free.len())]] = Some(now.clone());
+        }
+    }
+    network
+        .requirements()
+        .constraints()
+        .iter()
+        .all(|constraint| {
+            match (
+                &happened[constraint.from.index()],
+                &happened[constraint.to.index()],
+            ) {
+                (Some(from), Some(to)) => to - from <= constraint.bound,
+                _ => false,
+            }
+        })
+}
+
+#[test]
+fn the_spoiler_beats_everybody_where_the_network_is_not_controllable() {
+    let mut games = 0;
+    for seed in 0..many(3_000) {
+        let mut random = Random(seed);
+        let board = Board::random(&mut random);
+        let network = board.network();
+        if network.is_dynamically_controllable() {
+            continue;
+        }
+        for _ in 0..10 {
+            assert!(
+                !survives(&board, &rational(&network), &mut random),
+                "seed {seed}"
+            );
+            games += 1;
+        }
+    }
+    assert!(games > 1000);
 }
