@@ -122,7 +122,10 @@ impl<W: Weight> Dispatcher<W> {
     }
 
     /// When a ready node may happen if nothing happens before: its window is open then, and its
-    /// waits are over. `Err` if it waits for the end of that link however long it takes.
+    /// waits are over.
+    ///
+    /// # Errors
+    /// The link whose end it waits for however long that takes.
     pub fn earliest(&self, node: NodeId) -> Result<Option<&W>, LinkId> {
         let mut earliest = self.windows[node.index()][WindowEnd::Earliest as usize]
             .as_ref()
@@ -186,10 +189,10 @@ impl<W: Weight> Dispatcher<W> {
         }
         let form = Arc::clone(&self.form);
         for (to, bound, edge) in form.leaving(node) {
-            self.limit(to, WindowEnd::Latest, time.plus(bound), edge);
+            self.limit(to, WindowEnd::Latest, &time.plus(bound), edge);
         }
         for (from, bound, edge) in form.entering(node) {
-            self.limit(from, WindowEnd::Earliest, time.minus(bound), edge);
+            self.limit(from, WindowEnd::Earliest, &time.minus(bound), edge);
         }
         for wait in form.waits_at(node) {
             let end = form.network().link(wait.link).end;
@@ -211,7 +214,7 @@ impl<W: Weight> Dispatcher<W> {
     }
 
     /// A node may not happen before, or after, `time`.
-    fn limit(&mut self, node: NodeId, end: WindowEnd, time: W, edge: EdgeId) {
+    fn limit(&mut self, node: NodeId, end: WindowEnd, time: &W, edge: EdgeId) {
         let form = Arc::clone(&self.form);
         let mut limited = vec![(node, edge)];
         while let Some((node, edge)) = limited.pop() {
@@ -220,8 +223,8 @@ impl<W: Weight> Dispatcher<W> {
             }
             let known = &mut self.windows[node.index()][end as usize];
             let is_news = known.as_ref().is_none_or(|(known, _)| match end {
-                WindowEnd::Earliest => time > *known,
-                WindowEnd::Latest => time < *known,
+                WindowEnd::Earliest => time > known,
+                WindowEnd::Latest => time < known,
             });
             if is_news {
                 *known = Some((time.clone(), edge));

@@ -39,7 +39,7 @@ impl Spoiler {
         // The end of one link may activate another one that takes no time.
         while let Some(id) = self.next_candidate(now, &happened, &later) {
             let link = self.network.link(id);
-            let begun = self.running_since(link, &happened);
+            let begun = running_since(link, &happened);
             let is_over = begun
                 .zip(link.upper.as_ref())
                 .is_some_and(|(begun, upper)| begun + upper <= *now);
@@ -64,7 +64,7 @@ impl Spoiler {
     ) -> Option<LinkId> {
         let may_end = |id: &LinkId| {
             let link = self.network.link(*id);
-            let begun = self.running_since(link, happened);
+            let begun = running_since(link, happened);
             begun.is_some_and(|begun| begun + &link.lower <= *now)
         };
         let mut links = self.network.link_ids().filter(|id| !later.contains(id));
@@ -75,23 +75,11 @@ impl Spoiler {
     pub fn next_look(&self, now: &Rational, happened: &[Option<Rational>]) -> Option<Rational> {
         let links = self.network.links().iter();
         let looks = links.flat_map(|link| {
-            let begun = self.running_since(link, happened);
+            let begun = running_since(link, happened);
             let bounds = [Some(&link.lower), link.upper.as_ref()];
             bounds.map(|bound| Some(begun.as_ref()? + bound?))
         });
         looks.flatten().filter(|look| look > now).min()
-    }
-
-    /// When a link that is not over was activated.
-    fn running_since(
-        &self,
-        link: &ContingentLink,
-        happened: &[Option<Rational>],
-    ) -> Option<Rational> {
-        let is_over = happened[link.end.index()].is_some();
-        happened[link.activation.index()]
-            .clone()
-            .filter(|_| !is_over)
     }
 
     /// Whether no executor can be sure to win any more, if these links do not end now.
@@ -158,4 +146,12 @@ impl Spoiler {
         }
         UncertainNetwork::new(requirements, links).ok()
     }
+}
+
+/// When a link that is not over was activated.
+fn running_since(link: &ContingentLink, happened: &[Option<Rational>]) -> Option<Rational> {
+    let is_over = happened[link.end.index()].is_some();
+    happened[link.activation.index()]
+        .clone()
+        .filter(|_| !is_over)
 }
