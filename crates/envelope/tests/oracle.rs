@@ -29,8 +29,8 @@ fn upper(parameter: usize) -> BoxEnd {
     }
 }
 
-fn reach(number: i64) -> Option<Rational> {
-    Some(Rational::from(number))
+fn number(number: i64) -> Rational {
+    Rational::from(number)
 }
 
 #[test]
@@ -42,12 +42,12 @@ fn a_look_at_another_box_changes_nothing_about_how_the_accepted_one_can_be_widen
     // This box is inside as well, but nothing found for it holds for the accepted one.
     assert_eq!(oracle.objection(&envelope("[1, 8] [1, 1]")), Ok(None));
     assert_eq!(oracle.accepted(), Some(&accepted));
-    let too_far = oracle.objection_to_reach(upper(0), reach(8));
+    let too_far = oracle.objection_to_reach(upper(0), Some(number(8)));
     assert!(
         matches!(too_far, Ok(Some(Objection::NoSchedule(_)))),
         "{too_far:?}"
     );
-    assert_eq!(oracle.try_reach(upper(0), reach(2)), Ok(true));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
     assert_eq!(oracle.accepted(), Some(&envelope("[1, 2] [1, 8]")));
 }
 
@@ -57,7 +57,7 @@ fn looks_are_counted_but_what_it_takes_to_come_back_from_them_is_not() {
     let mut oracle = oracle(&task, &plan).unwrap();
     assert_eq!(oracle.start(&envelope("[1, 1] [1, 1]")), Ok(None));
     assert_eq!(oracle.objection(&envelope("[1, 2] [1, 2]")), Ok(None));
-    assert_eq!(oracle.try_reach(upper(0), reach(2)), Ok(true));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
     assert_eq!(oracle.checks(), 3);
 }
 
@@ -67,11 +67,11 @@ fn an_end_that_reaches_so_far_already_stays_where_it_is() {
     let mut oracle = oracle(&task, &plan).unwrap();
     let accepted = envelope("[1, 4] [1, 4]");
     assert_eq!(oracle.start(&accepted), Ok(None));
-    assert_eq!(oracle.try_reach(upper(0), reach(2)), Ok(true));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
     assert_eq!(oracle.accepted(), Some(&accepted));
     // Nothing has become tighter either.
-    assert_eq!(oracle.try_reach(upper(1), reach(6)), Ok(true));
-    assert_eq!(oracle.try_reach(upper(0), reach(5)), Ok(false));
+    assert_eq!(oracle.try_reach(upper(1), Some(number(6))), Ok(true));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(5))), Ok(false));
     assert_eq!(oracle.accepted(), Some(&envelope("[1, 4] [1, 6]")));
 }
 
@@ -80,7 +80,7 @@ fn the_nominal_values_are_the_box_to_start_from_if_nobody_names_another() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     assert_eq!(oracle.accepted(), None);
-    assert_eq!(oracle.try_reach(upper(1), reach(9)), Ok(true));
+    assert_eq!(oracle.try_reach(upper(1), Some(number(9))), Ok(true));
     assert_eq!(oracle.accepted(), Some(&envelope("[1, 1] [1, 9]")));
 }
 
@@ -99,7 +99,7 @@ fn an_oracle_can_be_made_in_one_thread_and_used_in_another() {
     let (task, plan) = RELAY.task_and_plan();
     let mut oracle = oracle(&task, &plan).unwrap();
     drop((task, plan));
-    let asked = std::thread::spawn(move || oracle.try_reach(upper(0), reach(9)));
+    let asked = std::thread::spawn(move || oracle.try_reach(upper(0), Some(number(9))));
     assert_eq!(asked.join().unwrap(), Ok(true));
 }
 

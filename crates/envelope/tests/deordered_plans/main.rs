@@ -24,20 +24,26 @@ use scenario::{scenario, time};
 /// A schedule whose nodes, in random order, take an end or a random point of their windows.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
-    let mut network = ConsistentNetwork::try_from(plan.network(&[])).unwrap();
+    let mut network =
+        ConsistentNetwork::try_from(plan.network(&[])).expect("a plan with a schedule");
     let mut nodes: Vec<_> = network.network().nodes().skip(1).collect();
     nodes.shuffle(rng);
     for node in nodes {
         let windows = network.windows(zero);
-        let earliest = windows[node].earliest.clone().unwrap();
+        let earliest = windows[node]
+            .earliest
+            .clone()
+            .expect("times are not negative");
         let latest = windows[node].latest.clone();
         let latest = latest.unwrap_or_else(|| &earliest + time(rng, 20));
-        let share = *[0, 0, 1, 2, 4, 4].choose(rng).unwrap();
+        let share = *[0, 0, 1, 2, 4, 4].choose(rng).expect("shares");
         let at = &earliest + (latest - &earliest) * Rational::new(share, 4);
         network
             .add(Constraint::at_least(zero, node, at.clone()))
-            .unwrap();
-        network.add(Constraint::at_most(zero, node, at)).unwrap();
+            .expect("inside its window");
+        network
+            .add(Constraint::at_most(zero, node, at))
+            .expect("inside its window");
     }
     network.schedule().relative_to(zero).times().to_vec()
 }
