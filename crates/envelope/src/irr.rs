@@ -1,11 +1,11 @@
 //! Incremental Rectangular Robustification.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use elbowroom_num::{End, Rational};
-use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId};
+use crate::obligations::Refusal;
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, Side};
 
 use crate::frontier::{Frontier, Growth};
 use crate::oracle::{Objection, Oracle};
@@ -87,58 +87,46 @@ pub struct IrrRun {
 /// Incremental Rectangular Robustification: Algorithm 1 of Cashmore et al. (2020).
 ///
 /// Invariant: the box lies inside the robustness envelope at every iteration, the first included:
-/// the start point is checked like any other box. `on_widening` is called each time the box has
+/// the start point is checked like any other box. `on_step` is called each time the box has
 /// grown, and once more at every refusal with `None`, so that it can end the search at any moment.
 ///
 /// # Errors
 /// When there are too many cases to tell apart.
 #[doc(alias = "Incremental Rectangular-Robustification")]
 pub fn irr(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     settings: &Settings,
     on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
 ) -> Result<IrrRun, Refusal> {
-    let plan = oracle.plan();
+    let plan = Arc::clone(oracle.plan());
     let already = oracle.checks();
     let mut envelope = DecoupledEnvelope::point(&plan.nominal());
-    let run = |envelope, widenings, checks, stop| {
-        Ok(IrrRun {
-            envelope,
-            widenings,
-            checks: checks - already,
-            stop,
-        })
-    };
-    if let Some(objection) = oracle.objection(&envelope)? {
-        return run(Err(objection), 0, oracle.checks(), StopReason::Converged);
+    if let Some(objection) = oracle.start(&envelope)? {
+        return Ok(IrrRun {
+            envelope: Err(objection),
+            widenings: 0,
+            checks: oracle.checks() - already,
+            stop: StopReason::Converged,
+        });
     }
-    let mut frontier = Frontier::new(plan, &settings.precision, settings.growth);
+    let mut frontier = Frontier::new(&plan, &settings.precision, settings.growth);
     let mut widenings = 0;
-    while let Some((end, step)) = frontier.next_end() {
-        if settings
-            .most_checks
-            .is_some_and(|most| oracle.checks() - already >= most)
-        {
-            return run(
-                Ok(envelope),
-                widenings,
-                oracle.checks(),
-                StopReason::CheckLimit,
-            );
-        }
-        let parameter = plan.parameter(end.parameter);
-        let widened = match widened(&envelope, parameter, end, &step) {
-            Some(candidate) if oracle.is_inside_after(&candidate, Some(end))? => Some(candidate),
-            _ => None,
+    let stop = loop {
+        let Some((end, step)) = frontier.next_end() else {
+            break StopReason::Converged;
         };
-        let flow = if let Some(candidate) = widened {
-            envelope = candidate;
+        let checks = oracle.checks() - already;
+        if settings.most_checks.is_some_and(|most| checks >= most) {
+            break StopReason::CheckLimit;
+        }
+        let range = &plan.parameter(end.parameter).range;
+        let flow = if widen(oracle, &envelope, range, end, &step)? {
             frontier.accept(end);
-            if let Some(farthest) = farthest(&envelope, parameter, end)
-                && oracle.is_inside_after(&farthest, Some(end))?
-            {
-                envelope = farthest;
+            if matches!(end.side.of(range), End::Infinite) && oracle.try_reach(end, None)? {
                 frontier.finish(end);
+            }
+            if let Some(accepted) = oracle.accepted() {
+                envelope.clone_from(accepted);
             }
             widenings += 1;
             on_step(Some(&Widening {
@@ -151,20 +139,35 @@ pub fn irr(
             on_step(None)
         };
         if flow.is_break() {
-            return run(
-                Ok(envelope),
-                widenings,
-                oracle.checks(),
-                StopReason::Cancelled,
-            );
+            break StopReason::Cancelled;
         }
-    }
-    run(
-        Ok(envelope),
+    };
+    Ok(IrrRun {
+        envelope: Ok(envelope),
         widenings,
-        oracle.checks(),
-        StopReason::Converged,
-    )
+        checks: oracle.checks() - already,
+        stop,
+    })
+}
+
+/// Moves one end of the accepted box, `envelope`, out by a step; whether it could be, within the
+/// parameter's range.
+fn widen(
+    oracle: &mut Oracle,
+    envelope: &DecoupledEnvelope,
+    range: &Interval,
+    end: BoxEnd,
+    step: &Rational,
+) -> Result<bool, Refusal> {
+    let Some(reach) = end.reach(envelope) else {
+        return Ok(false);
+    };
+    let reach = reach + step;
+    let value = match end.side {
+        Side::Lower => -&reach,
+        Side::Upper => reach.clone(),
+    };
+    Ok(range.contains(&value) && oracle.try_reach(end, Some(reach))?)
 }
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
@@ -173,20 +176,20 @@ pub fn irr(
 /// # Errors
 /// When there are too many cases to tell apart.
 pub fn limits(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     step: &Rational,
 ) -> Result<Vec<[Option<Limit>; 2]>, Refusal> {
-    let plan = oracle.plan();
+    let plan = Arc::clone(oracle.plan());
     let mut limits = Vec::with_capacity(plan.parameters.len());
     for (index, parameter) in plan.parameters.iter().enumerate() {
         let mut pair = [None, None];
-        for (place, side) in [Side::Lower, Side::Upper].into_iter().enumerate() {
+        for side in Side::BOTH {
             let end = BoxEnd {
                 parameter: ParameterId::from(index),
                 side,
             };
-            pair[place] = limit(oracle, envelope, parameter, end, step)?;
+            pair[side.index()] = limit(oracle, envelope, parameter, end, step)?;
         }
         limits.push(pair);
     }
@@ -194,7 +197,7 @@ pub fn limits(
 }
 
 fn limit(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     parameter: &Parameter,
     end: BoxEnd,
@@ -203,14 +206,7 @@ fn limit(
     let Some(reach) = end.reach(envelope) else {
         return Ok(Some(Limit::Unbounded));
     };
-    let range = DecoupledEnvelope {
-        intervals: vec![parameter.range.clone()],
-    };
-    let border = BoxEnd {
-        parameter: ParameterId(0),
-        ..end
-    }
-    .reach(&range);
+    let border = end.side.reach(&parameter.range);
     if border.as_ref().is_some_and(|border| reach >= *border) {
         return Ok(Some(Limit::Range));
     }
@@ -220,34 +216,4 @@ fn limit(
     Ok(oracle
         .objection(&refused)?
         .map(|objection| Limit::Objection { refused, objection }))
-}
-
-/// The box with one end moved by a step; `None` if that would leave the parameter's range.
-fn widened(
-    envelope: &DecoupledEnvelope,
-    parameter: &Parameter,
-    end: BoxEnd,
-    step: &Rational,
-) -> Option<DecoupledEnvelope> {
-    let reach = end.reach(envelope)? + step;
-    let widened = end.with_reach(envelope, Some(reach));
-    let interval = widened.interval(end.parameter);
-    let moved = match end.side {
-        Side::Lower => &interval.lower,
-        Side::Upper => &interval.upper,
-    };
-    parameter.range.contains(moved.value()?).then_some(widened)
-}
-
-/// The box with one end as far out as the parameter's range goes, if that is infinitely far.
-fn farthest(
-    envelope: &DecoupledEnvelope,
-    parameter: &Parameter,
-    end: BoxEnd,
-) -> Option<DecoupledEnvelope> {
-    let border = match end.side {
-        Side::Lower => &parameter.range.lower,
-        Side::Upper => &parameter.range.upper,
-    };
-    matches!(border, End::Infinite).then(|| end.with_reach(envelope, None))
 }

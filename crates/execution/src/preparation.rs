@@ -52,7 +52,7 @@ pub trait Region {
     /// Why the plan is not guaranteed to work for these values; `None` if it is.
     fn objection(
         &mut self,
-        task: &Task,
+        task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &[Rational],
     ) -> Option<String>;

@@ -1,7 +1,8 @@
 //! Plans that leave room.
 //!
-//! In: a task and a time-triggered plan, or an STN plan file. Out: STN plans, their parameters,
-//! and what every schedule of such a plan must satisfy.
+//! In: a task and a time-triggered plan, or an STN plan file. Out: STN plans and their parameters.
+//! What every schedule of such a plan must satisfy, and for which values of its parameters it does,
+//! is the concern of the crate `elbowroom-envelope`.
 //!
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
 //! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
@@ -14,14 +15,10 @@ mod decoupled;
 pub mod deorder;
 mod durations;
 pub mod format;
-pub mod linear;
 mod network;
-pub mod obligations;
 mod parameter;
 pub mod parametrize;
 pub mod partial_order;
-pub mod reduction;
-pub mod soundness;
 mod stn_plan;
 mod suggestion;
 #[cfg(test)]
@@ -29,7 +26,7 @@ mod testing;
 pub mod uncertain;
 mod unknowns;
 
-pub use decoupled::DecoupledEnvelope;
+pub use decoupled::{BoxEnd, DecoupledEnvelope, Side};
 pub use network::{Schedule, network_node};
 pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
 pub use partial_order::{Link, LinkKind, PartialOrderPlan};

@@ -2,8 +2,7 @@
 
 use elbowroom::model::Task;
 use elbowroom::model::validate::Violation;
-use elbowroom::plan::reduction::Side;
-use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind};
+use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind, Side};
 use elbowroom::{Explanation, Shortfall};
 use serde_json::{Map, Value, json};
 

@@ -4,8 +4,7 @@ use elbowroom::envelope::{
     Growth, Limit, Oracle, Settings, StopReason, Widening, irr, limits, sharpen,
 };
 use elbowroom::num::Rational;
-use elbowroom::plan::reduction::{BoxEnd, Side};
-use elbowroom::plan::{DecoupledEnvelope, ParameterId};
+use elbowroom::plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 
 use super::watch::{Stop, Watch};
 use super::{Subject, document, fails, refused, text};
@@ -42,7 +41,7 @@ pub(super) struct Step {
 }
 
 /// Searches, and prints what was found.
-pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) -> Answer {
+pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle, watch: &Watch) -> Answer {
     if watch.flow().is_break() {
         return nothing_yet(subject, watch.stop());
     }
@@ -81,8 +80,8 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
         Err(objection) => return fails::at_nominal(subject, &oracle, &objection),
     };
     if subject.arguments.sharpen && stop == Stop::Converged {
-        envelope =
-            sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
+        let sharp = sharpen(&mut oracle, &envelope, &mut || watch.flow());
+        envelope = sharp.map_err(|r| refused(&r))?.unwrap_or(envelope);
         if watch.flow().is_break() {
             stop = watch.stop();
         }
@@ -120,7 +119,7 @@ fn nothing_yet(subject: &Subject<'_>, stop: Stop) -> Answer {
 /// is no time left to ask.
 fn what_limits(
     subject: &Subject<'_>,
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     watch: &Watch,
 ) -> Result<Vec<[Option<String>; 2]>, Failure> {
@@ -179,8 +178,5 @@ fn in_words(subject: &Subject<'_>, limits: &[[Option<Limit>; 2]]) -> Vec<[Option
 
 fn value_of(envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Rational> {
     let interval = envelope.interval(end.parameter);
-    match end.side {
-        Side::Lower => interval.lower.value().cloned(),
-        Side::Upper => interval.upper.value().cloned(),
-    }
+    end.side.of(interval).value().cloned()
 }

@@ -10,7 +10,7 @@ use super::dnf::Wanted;
 use super::separation::is_fixed;
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Refusal, Substitution};
-use crate::stn_plan::{Node, NodeId, StnPlan};
+use elbowroom_plan::{Node, NodeId, StnPlan};
 
 /// How many timed initials at open times one conjunct of the goal may depend on.
 const MOST_OPEN: usize = 10;

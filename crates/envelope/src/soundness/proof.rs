@@ -5,11 +5,8 @@ use elbowroom_model::Task;
 use super::bad_case::{Outcome, Schedules};
 use super::certificate::Certificate;
 use super::scale::Scale;
-use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Difference, OverAll, Refusal};
-use crate::parameter::{ParameterId, ParametrizedPlan};
-use crate::reduction::BoxEnd;
-use crate::stn_plan::NodeId;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan};
 
 /// How many places of the moment are told apart in one over-all condition.
 const MOST_PLACES: usize = 100_000;

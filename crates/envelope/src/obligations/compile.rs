@@ -5,7 +5,7 @@ mod guards;
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
@@ -23,8 +23,7 @@ use super::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
 };
 use crate::linear::Linear;
-use crate::parameter::{ParameterKind, ParametrizedPlan};
-use crate::stn_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::{InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan};
 
 /// How many combinations of outcomes of conditional effects are followed.
 const MOST_RUNS: usize = 256;
@@ -50,7 +49,7 @@ impl Obligations {
             direct: separations(task, &plan.plan, &order, epsilon),
             over_all: Vec::new(),
         };
-        let substitution = Rc::new(substitution.clone());
+        let substitution = Arc::new(substitution.clone());
         let compiler = Compiler {
             task,
             plan,
@@ -98,7 +97,7 @@ struct Compiler<'a> {
     plan: &'a ParametrizedPlan,
     /// All nodes in nominal order.
     order: Vec<NodeId>,
-    substitution: Rc<Substitution>,
+    substitution: Arc<Substitution>,
 }
 
 impl Compiler<'_> {
@@ -256,7 +255,7 @@ impl Compiler<'_> {
 
     /// What can be said only when the whole timeline is known: over-all conditions and goal.
     fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
-        let timeline = Rc::new(run.timeline);
+        let timeline = Arc::new(run.timeline);
         let plan = &self.plan.plan;
         for (index, instance) in plan.instances.iter().enumerate() {
             let id = InstanceId::from(index);

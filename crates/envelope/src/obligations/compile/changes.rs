@@ -12,7 +12,7 @@ use super::super::{BadCase, Difference, Obligation, Obligations, Refusal, Requir
 use super::guards::GuardPart;
 use super::{Compiler, Run};
 use crate::linear::Linear;
-use crate::stn_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::{InstanceId, Node, NodeId};
 
 impl Compiler<'_> {
     /// The continuous changes that begin at the start of an instance, with their rates; `None` is

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::{Delta, Rational};
 
-use crate::decoupled::DecoupledEnvelope;
-use crate::reduction::{BoxEnd, Edge};
+use crate::reduction::Edge;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 
 /// A sum of constraints that comes out below zero on one side and at zero on the other.
 ///

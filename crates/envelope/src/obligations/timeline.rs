@@ -11,8 +11,7 @@ use elbowroom_num::Rational;
 
 use super::{Inequality, Refusal, Substitution};
 use crate::linear::Linear;
-use crate::parameter::{ParameterId, ParametrizedPlan};
-use crate::stn_plan::NodeId;
+use elbowroom_plan::{NodeId, ParameterId, ParametrizedPlan};
 
 /// The events of every fact and fluent so far, in nominal order.
 ///

@@ -8,11 +8,10 @@ use elbowroom_stn::Constraint;
 
 use super::bad_case::spread;
 use super::certificate::Certificate;
-use crate::decoupled::DecoupledEnvelope;
 use crate::linear::Linear;
 use crate::obligations::Inequality;
-use crate::parameter::{ParameterId, Valuation};
-use crate::reduction::{BoxEnd, Reduction, Side};
+use crate::reduction::Reduction;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 
 /// What a bound of the linear program stands for.
 enum Meaning {

@@ -5,7 +5,7 @@ use elbowroom_model::ground::{Body, Change, Condition, Effect};
 use super::super::dnf::{Alternatives, Wanted};
 use super::super::{Obligations, Refusal, Requirement};
 use super::{Compiler, Run, oblige};
-use crate::stn_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::{InstanceId, Node, NodeId};
 
 /// Which part of which effect's guard: effects of the start come before those of the end, and
 /// those before continuous ones.

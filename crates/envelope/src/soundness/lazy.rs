@@ -5,10 +5,9 @@ use elbowroom_model::Task;
 use super::bad_case::{Outcome, Schedules};
 use super::proof::{Attempt, Proof, Prover};
 use super::scale::{Exactly, Numbers, Whole};
-use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Obligations, OverAll, Refusal};
-use crate::parameter::ParametrizedPlan;
-use crate::reduction::{BoxEnd, Reduction};
+use crate::reduction::Reduction;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 /// The network of a box, made when first needed.
 pub(crate) enum Lazy<'a> {

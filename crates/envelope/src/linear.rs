@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use crate::parameter::{ParameterId, Valuation};
-use crate::stn_plan::NodeId;
+use elbowroom_plan::{NodeId, ParameterId, Valuation};
 
 /// A factor by which a parameter can be multiplied in a [`Linear`] expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

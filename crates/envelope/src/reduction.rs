@@ -3,62 +3,15 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::{Delta, End, Rational};
+use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Weight,
 };
 
-use crate::decoupled::DecoupledEnvelope;
 use crate::obligations::{BadCase, Substitution};
-use crate::parameter::{ParameterId, ParametrizedPlan};
-use crate::stn_plan::{Bound, NodeId};
-
-/// One end of one parameter's interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct BoxEnd {
-    /// The parameter.
-    pub parameter: ParameterId,
-    /// Which end.
-    pub side: Side,
-}
-
-/// The lower or the upper end of an interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Side {
-    /// The lower end.
-    Lower,
-    /// The upper end.
-    Upper,
-}
-
-impl BoxEnd {
-    /// How far out the end lies: the upper end itself, minus the lower end, `None` if infinite.
-    /// Widening the box makes it greater.
-    pub fn reach(self, envelope: &DecoupledEnvelope) -> Option<Rational> {
-        let interval = envelope.interval(self.parameter);
-        match self.side {
-            Side::Lower => interval.lower.value().map(|lower| -lower),
-            Side::Upper => interval.upper.value().cloned(),
-        }
-    }
-
-    /// The same interval with this end moved.
-    pub fn with_reach(
-        self,
-        envelope: &DecoupledEnvelope,
-        reach: Option<Rational>,
-    ) -> DecoupledEnvelope {
-        let mut moved = envelope.clone();
-        let interval = &mut moved.intervals[self.parameter.index()];
-        match self.side {
-            Side::Lower => {
-                interval.lower = reach.map_or(End::Infinite, |reach| End::Closed(-reach));
-            }
-            Side::Upper => interval.upper = reach.map_or(End::Infinite, End::Closed),
-        }
-        moved
-    }
-}
+use elbowroom_plan::{
+    Bound, BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side,
+};
 
 /// `t_to - t_from <= constant + reach(end)`, over classes.
 #[derive(Clone, Debug)]

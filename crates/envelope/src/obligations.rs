@@ -21,9 +21,9 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::Rational;
 
+use crate::guarantee::Guarantee;
 use crate::linear::Linear;
-use crate::parameter::{ParameterId, Valuation};
-use crate::stn_plan::{InstanceId, NodeId, StnPlan};
+use elbowroom_plan::{InstanceId, NodeId, ParameterId, StnPlan, Valuation};
 
 pub use over_all::OverAll;
 
@@ -162,6 +162,7 @@ pub struct Obligations {
 
 /// The exact method does not cover something in the plan or its problem.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Refusal {
     /// A product or quotient is neither linear nor bilinear.
     #[error(
@@ -218,6 +219,12 @@ pub enum Refusal {
     /// The plan's network has no schedule at the nominal values.
     #[error("the plan has no schedule at its nominal values")]
     NoNominalSchedule,
+    /// There is no check for that guarantee.
+    #[error("the guarantee `{guarantee}` cannot be checked in this version; use `weak`")]
+    Guarantee {
+        /// What was to be guaranteed.
+        guarantee: Guarantee,
+    },
 }
 
 impl Requirement {

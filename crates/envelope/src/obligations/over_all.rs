@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FactId};
@@ -10,7 +10,7 @@ use elbowroom_model::ground::{Condition, FactId};
 use super::dnf::{Alternatives, Wanted};
 use super::timeline::{Reading, Timeline};
 use super::{BadCase, Difference, Inequality, Refusal, Substitution};
-use crate::stn_plan::{InstanceId, NodeId, StnPlan};
+use elbowroom_plan::{InstanceId, NodeId, StnPlan};
 
 /// A numeric or compound over-all condition of one action.
 ///
@@ -33,8 +33,8 @@ pub struct OverAll {
     pub assumptions: Vec<Inequality>,
     /// Stands for the moment in differences and inequalities.
     pub moment: NodeId,
-    timeline: Rc<Timeline>,
-    substitution: Rc<Substitution>,
+    timeline: Arc<Timeline>,
+    substitution: Arc<Substitution>,
 }
 
 impl OverAll {
@@ -44,8 +44,8 @@ impl OverAll {
         instance: InstanceId,
         condition: &Condition,
         order: &[NodeId],
-        timeline: &Rc<Timeline>,
-        substitution: &Rc<Substitution>,
+        timeline: &Arc<Timeline>,
+        substitution: &Arc<Substitution>,
     ) -> Self {
         let mut touched = BTreeSet::new();
         task.visit_facts_of(condition, &mut |fact| {
@@ -66,8 +66,8 @@ impl OverAll {
                 .collect(),
             assumptions: timeline.assumptions.clone(),
             moment: NodeId::from(plan.nodes.len()),
-            timeline: Rc::clone(timeline),
-            substitution: Rc::clone(substitution),
+            timeline: Arc::clone(timeline),
+            substitution: Arc::clone(substitution),
         }
     }
 

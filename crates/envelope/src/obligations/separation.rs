@@ -6,7 +6,7 @@ use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
 use super::{BadCase, Difference, Obligation, Requirement};
-use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
+use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
 
 /// The separation of every two interfering happenings, less those implied by others.
 ///

@@ -20,23 +20,22 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
-use crate::decoupled::DecoupledEnvelope;
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
-use crate::parameter::{ParametrizedPlan, Valuation};
-use crate::reduction::{BoxEnd, Reduction};
-use crate::stn_plan::NodeId;
+use crate::reduction::Reduction;
 use bad_case::Outcome;
 use certificate::Certificate;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Valuation};
 use lazy::{Lazy, numbers};
 use proof::Proof;
 use scale::Numbers;
 
-/// Decides, box by box, whether every schedule is valid.
+/// Decides, box by box, whether every schedule of a plan is valid.
+///
+/// It does not hold the task and the plan, only what it has made of them: both are handed to it
+/// with each question, and must be those that it was made for.
 #[derive(Clone, Debug)]
-pub struct Soundness<'a> {
-    task: &'a Task,
-    plan: &'a ParametrizedPlan,
+pub(crate) struct Soundness {
     reduction: Reduction,
     obligations: Obligations,
     direct: Vec<DirectCase>,
@@ -77,30 +76,38 @@ pub struct Counterexample {
     pub moment: Option<Rational>,
 }
 
-impl<'a> Soundness<'a> {
-    /// Compiles a plan's obligations for boxes that hold its nominal values.
-    ///
-    /// # Errors
-    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
-    /// reasoning.
-    pub fn new(
-        task: &'a Task,
-        plan: &'a ParametrizedPlan,
-        epsilon: &Rational,
-    ) -> Result<Self, Refusal> {
-        Self::around(task, plan, epsilon, &plan.nominal())
-    }
+/// The first obligation that some schedule for some value in the box (not empty) breaks; `None` if
+/// every schedule is valid.
+///
+/// That there is a schedule for every value is not asked: see [`Oracle`](crate::Oracle) for the
+/// whole check.
+///
+/// # Errors
+/// When the plan has no schedule at the values in the box nearest to its nominal ones, or holds
+/// something beyond exact linear reasoning.
+pub fn broken_in(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    epsilon: &Rational,
+    envelope: &DecoupledEnvelope,
+) -> Result<Option<Broken>, Refusal> {
+    let nearest = envelope.nearest(&plan.nominal());
+    let mut soundness = Soundness::around(task, plan, epsilon, &nearest)?;
+    soundness.broken(task, plan, envelope, None)
+}
 
+impl Soundness {
     /// Compiles a plan's obligations for boxes that hold these values.
     ///
     /// Happenings are required to keep the order that they have there. That is no restriction in a
     /// box with these values in it; in others, a different order may work as well.
     ///
     /// # Errors
-    /// As [`new`](Self::new), with these values in place of the nominal ones.
-    pub fn around(
-        task: &'a Task,
-        plan: &'a ParametrizedPlan,
+    /// When the plan has no schedule at these values ([`Refusal::NoNominalSchedule`]), or holds
+    /// something beyond exact linear reasoning.
+    pub(crate) fn around(
+        task: &Task,
+        plan: &ParametrizedPlan,
         epsilon: &Rational,
         valuation: &[Rational],
     ) -> Result<Self, Refusal> {
@@ -126,8 +133,6 @@ impl<'a> Soundness<'a> {
         let over_all = vec![None; obligations.over_all.len()];
         let numbers = numbers(&reduction, &obligations);
         Ok(Self {
-            task,
-            plan,
             reduction,
             obligations,
             direct,
@@ -139,22 +144,17 @@ impl<'a> Soundness<'a> {
     }
 
     /// The plan's network with rigidly connected nodes taken together.
-    pub fn reduction(&self) -> &Reduction {
+    pub(crate) fn reduction(&self) -> &Reduction {
         &self.reduction
     }
 
-    /// The obligations.
-    pub fn obligations(&self) -> &Obligations {
-        &self.obligations
-    }
-
     /// How many bad cases have been refuted from scratch so far: a measure of work.
-    pub fn refutations(&self) -> usize {
+    pub(crate) fn refutations(&self) -> usize {
         self.refutations
     }
 
     /// The first obligation that some schedule for some value in the box breaks. The box contains
-    /// the plan's nominal values, or those that this was made [around](Self::around).
+    /// the values that this was made [around](Self::around).
     ///
     /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
     /// end, further out than before, from the last one for which the answer was `None`, and all
@@ -162,8 +162,10 @@ impl<'a> Soundness<'a> {
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
-    pub fn broken(
+    pub(crate) fn broken(
         &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
         envelope: &DecoupledEnvelope,
         moved: Option<BoxEnd>,
     ) -> Result<Option<Broken>, Refusal> {
@@ -175,7 +177,6 @@ impl<'a> Soundness<'a> {
             numbers,
             suspect,
             refutations,
-            ..
         } = self;
         let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
         let first = (*suspect).min(direct.len());
@@ -207,7 +208,7 @@ impl<'a> Soundness<'a> {
                 }
                 Outcome::Unknown(parameter) => {
                     return Err(Refusal::Coupled {
-                        name: self.plan.parameter(parameter).name.clone(),
+                        name: plan.parameter(parameter).name.clone(),
                     });
                 }
             }
@@ -226,7 +227,7 @@ impl<'a> Soundness<'a> {
                 return Ok(None);
             };
             *refutations += 1;
-            match schedules.prove(self.task, self.plan, over_all, proof.as_ref(), moved)? {
+            match schedules.prove(task, plan, over_all, proof.as_ref(), moved)? {
                 Ok(found) => *proof = Some(found),
                 Err(case) => {
                     return Ok(Some(Broken {
@@ -243,7 +244,7 @@ impl<'a> Soundness<'a> {
     }
 
     /// Values and a schedule in the box that break the obligation as said.
-    pub fn counterexample(
+    pub(crate) fn counterexample(
         &self,
         envelope: &DecoupledEnvelope,
         broken: &Broken,
@@ -267,7 +268,7 @@ impl<'a> Soundness<'a> {
     /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
     /// any does. Two happenings that should be apart may then be so far the wrong way round that
     /// it does no harm.
-    pub fn worst_case(
+    pub(crate) fn worst_case(
         &self,
         envelope: &DecoupledEnvelope,
         broken: &Broken,

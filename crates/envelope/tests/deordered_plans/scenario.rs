@@ -34,7 +34,9 @@ impl Scenario {
             .enumerate()
             .map(|(index, (start, duration))| Step {
                 start: start.clone(),
-                action: task.instantiate(SchemaId::from(index), &[]).unwrap(),
+                action: task
+                    .instantiate(SchemaId::from(index), &[])
+                    .expect("an action without arguments"),
                 duration: duration.clone(),
             });
         TimeTriggeredPlan {
@@ -99,7 +101,7 @@ fn effects(rng: &mut ChaCha8Rng, is_timeless: bool, is_end: bool) -> Vec<Effect>
             } else {
                 *[UpdateOperator::Assign, UpdateOperator::Decrease]
                     .choose(rng)
-                    .unwrap()
+                    .expect("something to choose from")
             },
             fluent: fluent(rng),
             value: match rng.random_range(0..6) {
@@ -137,7 +139,7 @@ fn duration_constraints(rng: &mut ChaCha8Rng, duration: &Rational) -> Vec<Durati
         2 => vec![DurationConstraint {
             comparison: *[Comparison::AtMost, Comparison::AtLeast]
                 .choose(rng)
-                .unwrap(),
+                .expect("something to choose from"),
             bound: Expression::Fluent(fluent(rng)),
             at_end: rng.random(),
         }],
@@ -232,7 +234,7 @@ fn condition(rng: &mut ChaCha8Rng) -> Condition {
         _ => Condition::Compare(
             *[Comparison::AtMost, Comparison::AtLeast, Comparison::Equal]
                 .choose(rng)
-                .unwrap(),
+                .expect("something to choose from"),
             Expression::Fluent(fluent(rng)),
             integer(rng.random_range(-2..12)),
         ),

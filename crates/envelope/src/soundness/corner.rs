@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use crate::decoupled::DecoupledEnvelope;
 use crate::linear::{Factor, Linear};
 use crate::obligations::Inequality;
-use crate::parameter::{ParameterId, Valuation};
+use elbowroom_plan::{DecoupledEnvelope, ParameterId, Valuation};
 
 /// The combinations of ends of the parameters' intervals. Where an end is infinite, the
 /// combination says what becomes of an expression as the parameter grows without bound.

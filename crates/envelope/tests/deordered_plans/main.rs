@@ -6,35 +6,44 @@
 
 mod scenario;
 
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::soundness::{Broken, broken_in};
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
+use elbowroom_plan::deorder::{Deordered, Settings, deorder, pin_until_sound, pinned_to};
+use elbowroom_plan::{
+    DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
+};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 use rand::SeedableRng;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
-use crate::deorder::{Deordered, Settings, deorder, pin_until_sound, pinned_to};
-use crate::soundness::Soundness;
-use crate::{DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node};
 use scenario::{scenario, time};
 
 /// A schedule whose nodes, in random order, take an end or a random point of their windows.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
-    let mut network = ConsistentNetwork::try_from(plan.network(&[])).unwrap();
+    let mut network =
+        ConsistentNetwork::try_from(plan.network(&[])).expect("a plan with a schedule");
     let mut nodes: Vec<_> = network.network().nodes().skip(1).collect();
     nodes.shuffle(rng);
     for node in nodes {
         let windows = network.windows(zero);
-        let earliest = windows[node].earliest.clone().unwrap();
+        let earliest = windows[node]
+            .earliest
+            .clone()
+            .expect("times are not negative");
         let latest = windows[node].latest.clone();
         let latest = latest.unwrap_or_else(|| &earliest + time(rng, 20));
-        let share = *[0, 0, 1, 2, 4, 4].choose(rng).unwrap();
+        let share = *[0, 0, 1, 2, 4, 4].choose(rng).expect("shares");
         let at = &earliest + (latest - &earliest) * Rational::new(share, 4);
         network
             .add(Constraint::at_least(zero, node, at.clone()))
-            .unwrap();
-        network.add(Constraint::at_most(zero, node, at)).unwrap();
+            .expect("inside its window");
+        network
+            .add(Constraint::at_most(zero, node, at))
+            .expect("inside its window");
     }
     network.schedule().relative_to(zero).times().to_vec()
 }
@@ -61,6 +70,13 @@ fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
     });
     let timed = format!("{:?}\n", task.timed());
     steps.chain(order).chain([timed]).collect()
+}
+
+/// What some schedule of the plan breaks.
+fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
+    let closed = ParametrizedPlan::closed(task, plan.clone());
+    let everything = DecoupledEnvelope::point(&[]);
+    broken_in(task, &closed, &Settings::default().epsilon, &everything)
 }
 
 fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
@@ -102,12 +118,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
         let Deordered { plan, nominal } =
             deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
         let sound = pin_until_sound(plan.clone(), &nominal, &mut |plan| {
-            let closed = ParametrizedPlan::closed(&task, plan.clone());
-            let mut soundness =
-                Soundness::new(&task, &closed, &Settings::default().epsilon).ok()?;
-            let broken = soundness
-                .broken(&DecoupledEnvelope::point(&[]), None)
-                .ok()??;
+            let broken = broken(&task, plan).ok()??;
             let differences = broken.case.differences.iter();
             let nodes = differences.flat_map(|difference| [difference.from, difference.to]);
             let inequalities = broken.case.inequalities.iter();
@@ -115,10 +126,7 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
             let all = nodes.chain(others.copied());
             Some(all.filter(|node| node.index() < plan.nodes.len()).collect())
         });
-        let is_told = {
-            let closed = ParametrizedPlan::closed(&task, plan.clone());
-            Soundness::new(&task, &closed, &Settings::default().epsilon).is_ok()
-        };
+        let is_told = broken(&task, &plan).is_ok();
         untold += usize::from(!is_told);
         let sound = match sound {
             Some(sound) if is_told => sound,

@@ -6,8 +6,8 @@
 use elbowroom_num::{Delta, Rational};
 use elbowroom_stn::Weight;
 
-use crate::decoupled::DecoupledEnvelope;
 use crate::reduction::{Edge, Reduction};
+use elbowroom_plan::DecoupledEnvelope;
 
 /// How bounds become weights. Sums and comparisons of weights are those of the bounds.
 pub(crate) trait Scale {
@@ -131,10 +131,8 @@ fn gcd(a: i64, b: i64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::{Delta, Numbers, Rational, Scale, Whole};
-    use crate::decoupled::DecoupledEnvelope;
-    use crate::parameter::ParametrizedPlan;
     use crate::reduction::Reduction;
-    use crate::stn_plan::StnPlan;
+    use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, StnPlan};
 
     /// The scale for these numbers in a plan without actions.
     fn fitting(inside: &[Rational], ends: &[Rational]) -> Option<Whole> {

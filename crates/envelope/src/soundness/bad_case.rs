@@ -12,11 +12,10 @@ use super::corner::corners;
 use super::flow;
 use super::linear_program;
 use super::scale::{Exactly, Scale};
-use crate::decoupled::DecoupledEnvelope;
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference, Inequality};
-use crate::parameter::{ParameterId, Valuation};
-use crate::reduction::{BoxEnd, Reduction, Side};
+use crate::reduction::Reduction;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 
 /// The schedules of a box: a network that can be tightened for a while.
 pub(crate) struct Schedules<'a, S: Scale> {
@@ -60,7 +59,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         let parameters = (0..envelope.intervals.len()).map(ParameterId::from);
         let reaches: Vec<[Option<S::Weight>; 2]> = parameters
             .map(|parameter| {
-                [Side::Lower, Side::Upper].map(|side| {
+                Side::BOTH.map(|side| {
                     let reach = BoxEnd { parameter, side }.reach(envelope)?;
                     Some(scale.weight(&Delta::from(reach)))
                 })
@@ -72,7 +71,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
             let constant = scale.weight(&Delta::from(edge.constant.clone()));
             let bound = match edge.end {
                 None => constant,
-                Some(end) => match &reaches[end.parameter.index()][end.side as usize] {
+                Some(end) => match &reaches[end.parameter.index()][end.side.index()] {
                     Some(reach) => constant.plus(reach),
                     None => continue,
                 },
@@ -206,9 +205,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
                 Some(mut certificate) => {
                     certificate.fixed = multiplied
                         .iter()
-                        .flat_map(|&parameter| {
-                            [Side::Lower, Side::Upper].map(|side| BoxEnd { parameter, side })
-                        })
+                        .flat_map(|&parameter| Side::BOTH.map(|side| BoxEnd { parameter, side }))
                         .collect();
                     certificates.push(certificate);
                 }
