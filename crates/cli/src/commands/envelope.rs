@@ -10,13 +10,13 @@ mod watch;
 use std::sync::Arc;
 
 use elbowroom::Explainer;
+use elbowroom::envelope::Oracle;
 use elbowroom::envelope::obligations::Refusal;
-use elbowroom::envelope::{Guarantee, Oracle};
 use elbowroom::flow::{self, FlowError};
 use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::parametrize::VarySpec;
 
-use crate::args::{self, EnvelopeArgs, Method};
+use crate::args::{EnvelopeArgs, Method};
 use crate::exit::{Answer, Failure};
 use crate::input::{self, AnyPlan};
 use watch::Watch;
@@ -48,7 +48,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
         explainer: Explainer::new(&task, &plan, &arguments.epsilon),
         task: &task,
     };
-    let oracle = match Oracle::new(&task, &plan, &arguments.epsilon, Guarantee::Weak) {
+    let oracle = match Oracle::new(&task, &plan, &arguments.epsilon, arguments.guarantee.into()) {
         Ok(oracle) => oracle,
         Err(Refusal::NoNominalSchedule) => return fails::without_schedule(&subject),
         Err(refusal) => return Err(refused(&refusal)),
@@ -101,17 +101,6 @@ fn refuse_what_is_not_there_yet(arguments: &EnvelopeArgs) -> Result<(), Failure>
         return Err(Failure::new(
             format!("--method {method} is not available in this version"),
             "use --method irr, which widens one end at a time",
-        ));
-    }
-    let guarantee = match arguments.guarantee {
-        args::Guarantee::Weak => None,
-        args::Guarantee::Dynamic => Some("dynamic"),
-        args::Guarantee::Strong => Some("strong"),
-    };
-    if let Some(guarantee) = guarantee {
-        return Err(Failure::new(
-            format!("--guarantee {guarantee} is not available in this version"),
-            "use --guarantee weak: for all values there is a schedule, and every schedule works",
         ));
     }
     Ok(())

@@ -99,6 +99,12 @@ impl<W: Weight> UncertainNetwork<W> {
         Ok(Dispatchable::new(self.clone(), graph))
     }
 
+    /// Why the network is not dynamically controllable; `None` if it is. Quicker than
+    /// [`dynamic`](Self::dynamic), because what only dispatching needs is left out.
+    pub fn conflict(&self) -> Option<Conflict<W>> {
+        self.search(false).err()
+    }
+
     /// Whether a strategy that decides with nothing but what has been observed satisfies every
     /// requirement whatever the world does.
     pub fn is_dynamically_controllable(&self) -> bool {

@@ -103,7 +103,7 @@ fn header(arguments: &EnvelopeArgs, task: &Task, answer: &str) -> Value {
         "plan": arguments.plan.display().to_string(),
         "settings": {
             "method": "irr",
-            "guarantee": "weak",
+            "guarantee": elbowroom::envelope::Guarantee::from(arguments.guarantee).name(),
             "growth": match arguments.growth {
                 Growth::Doubling => "doubling",
                 Growth::Constant => "constant",
