@@ -46,6 +46,17 @@ fn answer(subject: &Subject<'_>, why_not: Option<&Explanation>, look: Look) -> S
         subject.file()
     );
     push_wrapped(&mut text, &what(explanation), 2, look.width);
+    if !explanation.plays.is_empty() {
+        let _ = write!(
+            text,
+            "\n{}\n",
+            styled(STRONG, "Whatever an executor does, the world can spoil it")
+        );
+        for play in &explanation.plays {
+            push_wrapped(&mut text, play, 2, look.width);
+        }
+        return text;
+    }
     text.push_str(&example(subject, explanation, look));
     text
 }
