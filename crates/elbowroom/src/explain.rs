@@ -1,6 +1,7 @@
 //! What the library finds out about a plan, in words.
 
 mod conflict;
+mod control;
 mod timed;
 
 use elbowroom_envelope::obligations::Requirement;
@@ -86,6 +87,9 @@ impl<'a> Explainer<'a> {
                     .or_else(|| oracle.counterexample(refused, broken));
                 self.broken(broken, example)
             }
+            Objection::Uncontrollable(conflict) => {
+                self.without_example(self.uncontrollable_in(conflict, refused))
+            }
             other => self.without_example(other.to_string()),
         }
     }
@@ -112,6 +116,7 @@ impl<'a> Explainer<'a> {
             Limit::Objection { objection, .. } => Some(match objection {
                 Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
                 Objection::Broken(broken) => self.requirement(&broken.requirement),
+                Objection::Uncontrollable(conflict) => self.uncontrollable(conflict),
                 other => other.to_string(),
             }),
         }

@@ -1,12 +1,14 @@
 //! What is guaranteed inside a box, and the half of the box check that depends on it.
 
 use std::fmt;
+use std::sync::Arc;
 
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use serde::{Deserialize, Serialize};
 
 use crate::branching::{MOST_BRANCHES, TooManyBranches};
+use crate::control::{ControlConflict, dynamic_conflict, strong_conflict};
 use crate::feasibility::{Feasibility, Infeasible};
 use crate::obligations::Refusal;
 use crate::oracle::Objection;
@@ -23,11 +25,11 @@ use crate::reduction::Reduction;
 #[non_exhaustive]
 pub enum Guarantee {
     /// For all values there is a schedule, for an executor that knows them in advance (weak
-    /// controllability).
-    #[default]
+    /// controllability). What the papers compute.
     Weak,
     /// The plan can be executed by one who learns each value only as it comes about (dynamic
     /// controllability).
+    #[default]
     Dynamic,
     /// One schedule does for all values (strong controllability).
     Strong,
@@ -58,27 +60,41 @@ impl fmt::Display for Guarantee {
 #[derive(Clone, Debug)]
 pub(crate) enum Controllability {
     Weak(Feasibility),
+    Dynamic(Control),
+    Strong(Control),
+}
+
+/// What both of the guarantees that are more than weak go by.
+#[derive(Clone, Debug)]
+pub(crate) struct Control {
+    plan: Arc<ParametrizedPlan>,
+    /// That there is no schedule at all is the better reason, where it is one.
+    feasibility: Feasibility,
 }
 
 /// Why a plan cannot be scheduled as demanded; [`Controllability::objection`] works out the values.
 #[derive(Clone, Debug)]
 pub(crate) enum Uncontrollable {
     Weak(Infeasible),
+    Conflict(ControlConflict),
 }
 
 impl Controllability {
     /// For this plan.
-    ///
-    /// # Errors
-    /// When there is no answer for that guarantee.
     pub(crate) fn new(
         guarantee: Guarantee,
-        plan: &ParametrizedPlan,
+        plan: &Arc<ParametrizedPlan>,
         reduction: &Reduction,
-    ) -> Result<Self, Refusal> {
+    ) -> Self {
+        let feasibility = Feasibility::new(plan, reduction);
+        let control = |feasibility| Control {
+            plan: Arc::clone(plan),
+            feasibility,
+        };
         match guarantee {
-            Guarantee::Weak => Ok(Self::Weak(Feasibility::new(plan, reduction))),
-            Guarantee::Dynamic | Guarantee::Strong => Err(Refusal::Guarantee { guarantee }),
+            Guarantee::Weak => Self::Weak(feasibility),
+            Guarantee::Dynamic => Self::Dynamic(control(feasibility)),
+            Guarantee::Strong => Self::Strong(control(feasibility)),
         }
     }
 
@@ -103,6 +119,14 @@ impl Controllability {
                 })?;
                 Ok(found.map(Uncontrollable::Weak))
             }
+            Self::Dynamic(control) => {
+                let conflict = dynamic_conflict(&control.plan, envelope);
+                Ok(conflict.map(Uncontrollable::Conflict))
+            }
+            Self::Strong(control) => {
+                let conflict = strong_conflict(&control.plan, envelope);
+                Ok(conflict.map(Uncontrollable::Conflict))
+            }
         }
     }
 
@@ -112,9 +136,19 @@ impl Controllability {
         envelope: &DecoupledEnvelope,
         found: Uncontrollable,
     ) -> Objection {
-        match (self, found) {
-            (Self::Weak(feasibility), Uncontrollable::Weak(found)) => {
+        let (Self::Weak(feasibility)
+        | Self::Dynamic(Control { feasibility, .. })
+        | Self::Strong(Control { feasibility, .. })) = self;
+        match found {
+            Uncontrollable::Weak(found) => {
                 Objection::NoSchedule(feasibility.values(envelope, found))
+            }
+            Uncontrollable::Conflict(conflict) => {
+                let infeasible = feasibility.clone().infeasible(envelope, None);
+                match infeasible {
+                    Ok(Some(found)) => Objection::NoSchedule(feasibility.values(envelope, found)),
+                    _ => Objection::Uncontrollable(conflict),
+                }
             }
         }
     }

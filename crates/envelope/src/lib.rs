@@ -14,6 +14,7 @@
 //! are solved here, and nothing that decides while a plan is executed depends on them.
 
 mod branching;
+mod control;
 mod cycles;
 mod feasibility;
 mod frontier;
@@ -27,6 +28,7 @@ pub mod reduction;
 mod sharpen;
 pub mod soundness;
 
+pub use control::{ControlConflict, ControlGround};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};

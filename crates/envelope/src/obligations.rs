@@ -21,7 +21,6 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::Rational;
 
-use crate::guarantee::Guarantee;
 use crate::linear::Linear;
 use elbowroom_plan::{InstanceId, NodeId, ParameterId, StnPlan, Valuation};
 
@@ -219,12 +218,6 @@ pub enum Refusal {
     /// The plan's network has no schedule at the nominal values.
     #[error("the plan has no schedule at its nominal values")]
     NoNominalSchedule,
-    /// There is no check for that guarantee.
-    #[error("the guarantee `{guarantee}` cannot be checked in this version; use `weak`")]
-    Guarantee {
-        /// What was to be guaranteed.
-        guarantee: Guarantee,
-    },
 }
 
 impl Requirement {

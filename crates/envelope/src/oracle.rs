@@ -6,6 +6,7 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
+use crate::control::ControlConflict;
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::obligations::Refusal;
 use crate::soundness::{Broken, Counterexample, Soundness};
@@ -62,6 +63,9 @@ pub enum Objection {
     /// For some values, some schedule breaks an obligation.
     #[error("for some values in the box a schedule breaks the plan")]
     Broken(Broken),
+    /// For all values there is a schedule, but one that has to be known sooner than the values are.
+    #[error("{0}")]
+    Uncontrollable(ControlConflict),
 }
 
 /// The same, before the values are worked out.
@@ -77,7 +81,7 @@ impl Oracle {
     ///
     /// # Errors
     /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
-    /// reasoning, or when there is no check for that guarantee; the message names it.
+    /// reasoning; the message names it.
     pub fn new(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
@@ -86,7 +90,7 @@ impl Oracle {
     ) -> Result<Self, Refusal> {
         let around = plan.nominal();
         let soundness = Soundness::around(task, plan, epsilon, &around)?;
-        let controllability = Controllability::new(guarantee, plan, soundness.reduction())?;
+        let controllability = Controllability::new(guarantee, plan, soundness.reduction());
         Ok(Self {
             task: Arc::clone(task),
             plan: Arc::clone(plan),

@@ -16,9 +16,10 @@ pub enum Need {
     Orderings,
     /// The same, with as many differences of times fixed as it takes for every schedule to work.
     Network,
-    /// The same, with quantities left open.
+    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
+    /// that can be found out.
     OpenNetwork,
-    /// The same, and for which values the plan is guaranteed to work.
+    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
     Envelope,
 }
 

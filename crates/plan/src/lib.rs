@@ -8,6 +8,7 @@
 //! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
 //! - [`PartialOrderPlan`]: the orderings without which an action would spoil another.
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
+//! - [`uncertain`]: the network of a plan, with what the world decides in it.
 //! - [`mod@format`]: STN plan files.
 
 mod decoupled;
@@ -22,6 +23,7 @@ mod stn_plan;
 mod suggestion;
 #[cfg(test)]
 mod testing;
+pub mod uncertain;
 mod unknowns;
 
 pub use decoupled::{BoxEnd, DecoupledEnvelope, Side};

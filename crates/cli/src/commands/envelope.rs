@@ -27,6 +27,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
         name: arguments.plan.display().to_string(),
         vary,
         epsilon: arguments.epsilon.clone(),
+        guarantee: arguments.guarantee.into(),
         contains: arguments.contains.clone(),
         search: Search {
             precision: arguments.precision.clone(),
@@ -81,17 +82,6 @@ fn refuse_what_is_not_there_yet(arguments: &EnvelopeArgs) -> Result<(), Failure>
         return Err(Failure::new(
             format!("--method {method} is not available in this version"),
             "use --method irr, which widens one end at a time",
-        ));
-    }
-    let guarantee = match arguments.guarantee {
-        args::Guarantee::Weak => None,
-        args::Guarantee::Dynamic => Some("dynamic"),
-        args::Guarantee::Strong => Some("strong"),
-    };
-    if let Some(guarantee) = guarantee {
-        return Err(Failure::new(
-            format!("--guarantee {guarantee} is not available in this version"),
-            "use --guarantee weak: for all values there is a schedule, and every schedule works",
         ));
     }
     Ok(())

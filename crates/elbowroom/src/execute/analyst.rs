@@ -108,7 +108,8 @@ impl Preparer for Analyst {
         });
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan)?),
-            Need::Orderings | Need::Network | Need::OpenNetwork => None,
+            Need::OpenNetwork => self.envelope(task, &plan).ok(),
+            Need::Orderings | Need::Network => None,
         };
         Ok(Prepared {
             plan: Arc::unwrap_or_clone(plan),
