@@ -1,13 +1,12 @@
 //! From a plan with fixed times to the deviations it survives: the figure in ARCHITECTURE.md,
 //! left to right.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::Guarantee;
 use elbowroom_envelope::linear::Factor;
 use elbowroom_envelope::obligations::{Refusal, Requirement};
 use elbowroom_envelope::soundness::{Broken, broken_in};
-use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -15,6 +14,9 @@ use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder, pin_until_
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
 use elbowroom_plan::{DecoupledEnvelope, NodeId, ParametrizedPlan, StnPlan};
 use elbowroom_stn::ConsistentNetwork;
+
+use crate::answers::envelope::envelope;
+use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, Unwatched};
 
 /// What to leave open, and how to search.
 #[derive(Clone, Debug)]
@@ -41,15 +43,6 @@ impl Default for Settings {
     }
 }
 
-/// A plan with its envelope, and how it was found.
-#[derive(Clone, Debug)]
-pub struct RobustPlan {
-    /// The plan, with what is left open.
-    pub plan: Arc<ParametrizedPlan>,
-    /// The envelope.
-    pub run: IrrRun,
-}
-
 /// A plan that leaves no room to compute with.
 #[derive(Debug, thiserror::Error)]
 pub enum FlowError {
@@ -69,21 +62,20 @@ pub enum FlowError {
 
 /// From a plan with fixed times to the deviations it survives.
 ///
+/// The same as [`answers::envelope::envelope`](crate::answers::envelope::envelope) with nobody
+/// watching.
+///
 /// # Errors
-/// When the plan is not valid, when `settings.vary` names what the plan does not have, and when
-/// the plan is beyond exact analysis.
+/// When `settings.vary` names what the plan does not have, and when the plan is beyond exact
+/// analysis. That the plan does not work is an answer.
 pub fn robust_plan(
     task: &Arc<Task>,
     time_triggered: &TimeTriggeredPlan,
     settings: &Settings,
-) -> Result<RobustPlan, FlowError> {
-    let stn_plan = free(task, time_triggered, &settings.epsilon)?;
-    let plan = Arc::new(open(task, stn_plan, &settings.vary, &settings.epsilon)?);
-    let mut oracle = Oracle::new(task, &plan, &settings.epsilon, settings.guarantee)?;
-    let run = irr(&mut oracle, &settings.search, &mut |_| {
-        ControlFlow::Continue(())
-    })?;
-    Ok(RobustPlan { plan, run })
+) -> Result<EnvelopeOutcome, RequestError> {
+    let plan = time_triggered.clone();
+    let request = EnvelopeRequest::new(task, plan).with_settings(settings);
+    envelope(&request, &mut Unwatched)
 }
 
 /// A plan with only the orderings and bounds that it needs.

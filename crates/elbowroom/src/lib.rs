@@ -29,7 +29,7 @@
 //! let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &mut task)?;
 //!
 //! let robust = robust_plan(&Arc::new(task), &plan, &Settings::default())?;
-//! let envelope = robust.run.envelope.expect("the plan works as it is");
+//! let envelope = robust.envelope.expect("the plan works as it is");
 //! // The office closes at 30, and delivering may not take longer than that.
 //! assert!(envelope.intervals[0].contains(&28.into()));
 //! assert!(!envelope.intervals[0].contains(&30.into()));
@@ -50,6 +50,7 @@
 //! ([`parse_box`]), and draws pictures ([`graph`]). It does not look at clocks or files, and it
 //! does not print.
 
+pub mod answers;
 mod box_text;
 pub mod compare;
 pub mod execute;
@@ -74,7 +75,7 @@ pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;
-pub use plan_file::PlanKind;
+pub use plan_file::{AnyPlan, PlanKind};
 
 /// Longer reading. Its code is compiled and run with the tests.
 pub mod tutorial {
