@@ -111,6 +111,7 @@ impl Dispatch {
             let id = InstanceId(order.step.0);
             self.progress.ready.remove(&self.ends[id.index()][0]);
             self.progress.running.insert(id);
+            self.told.insert(id, now.clone());
         }
         let mut reason = Reason::new(Cause::Due);
         reason.action = orders.first().map(|order| order.action.name.clone());
