@@ -130,6 +130,7 @@ impl Scene {
             most_states: self.states,
             improve_states: 256,
             clock: None,
+            goes_on: None,
         }
     }
 
