@@ -40,7 +40,9 @@ pub(super) fn is_about_an_absent_action(
 ) -> bool {
     let schemas = &task.problem().schemas;
     if let Target::Unknown { name, .. } = &spec.target {
-        let short = name.rsplit_once('.').map_or(name.as_str(), |(_, short)| short);
+        let short = name
+            .rsplit_once('.')
+            .map_or(name.as_str(), |(_, short)| short);
         let mut numbers = schemas.iter().flat_map(|schema| &schema.unknowns);
         return matches!(error, ParametrizeError::UnknownName { .. })
             && numbers.any(|number| number.eq_ignore_ascii_case(short));

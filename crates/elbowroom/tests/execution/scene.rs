@@ -124,7 +124,7 @@ impl Scene {
         report
     }
 
-    fn planner(&self) -> Embedded<'static> {
+    pub(crate) fn planner(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
             most_states: self.states,
