@@ -61,7 +61,9 @@ impl Run<'_> {
             now: &self.now,
             known: BTreeMap::new(),
         };
-        let Some(lost) = past.unreachable_after(self.history.len()) else {
+        let mut present = past.after(self.history.len());
+        let _ = present.advance(&self.now);
+        let Some(lost) = unreachable(&present) else {
             return Vec::new();
         };
         if lost.is_empty() {
@@ -88,11 +90,7 @@ impl Past<'_> {
         if let Some(known) = self.known.get(&count) {
             return known.clone();
         }
-        let mut state = self.after(count);
-        if count == self.history.len() {
-            let _ = state.advance(self.now);
-        }
-        let found = unreachable(&state);
+        let found = unreachable(&self.after(count));
         self.known.insert(count, found.clone());
         found
     }
@@ -108,6 +106,9 @@ impl Past<'_> {
         let reason = Reason::new(Cause::NeverAgain).about(about);
         // Back in ever longer strides to where it was in reach, then halving.
         let mut lost = self.history.len();
+        if !self.is_lost_after(lost, goal) {
+            return self.between(lost, reason, goal);
+        }
         let mut stride = 1;
         let mut open = loop {
             let before = lost.saturating_sub(stride);
