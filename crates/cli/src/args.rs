@@ -234,6 +234,10 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "S", default_value = "3600", value_parser = positive)]
     #[arg(requires = "world_process")]
     pub(crate) answer_within: Rational,
+    /// End the run when that program says something that cannot be understood, or names what the
+    /// problem does not have; otherwise the trace has it, and the run goes on
+    #[arg(long, requires = "world_process")]
+    pub(crate) strict_world: bool,
     /// Who decides
     #[arg(long, value_name = "NAME", default_value = "guarded")]
     pub(crate) executor: String,
@@ -256,7 +260,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "B", default_value = "1", value_parser = positive)]
     pub(crate) precision: Rational,
     /// What becomes of running actions when a new plan is made
-    #[arg(long, value_enum, default_value_t = RunningChoice::Cancel)]
+    #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
     /// How long making a plan takes in the world: `measured`, or always so many seconds; by default
     /// 0, and with --realtime `measured`
@@ -299,6 +303,7 @@ const IN_THE_TRACE: &[&str] = &[
     "world",
     "world_process",
     "answer_within",
+    "strict_world",
     "executor",
     "likelihoods",
     "seed",

@@ -37,6 +37,12 @@ pub(crate) fn tell(text: &str) {
     let _ = writeln!(stderr, "{text}");
 }
 
+/// Writes a warning to standard error.
+pub(crate) fn warn(text: &str) {
+    let label = crate::look::styled(crate::look::WARNING, "warning");
+    tell(&format!("{label}: {text}"));
+}
+
 /// Writes a file; `-` is standard output.
 pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
