@@ -3,9 +3,9 @@
 //! [`read`] takes the bytes of a file in any of them and answers with a [`NetworkFile`]: time
 //! points with names, requirements, contingent links, and how their durations are distributed.
 //! Numbers are exact. What cannot be read is refused with the place in the text and what to do
-//! ([`Mistakes`]). [`write()`] writes networks so that [`read`] reads them back, [`words`] says what
-//! bounds mean in the file's own names, and [`weak`] decides whether there is a schedule for
-//! whatever the world does.
+//! ([`Mistakes`]). [`write_json`] and [`write_graphml`] write networks so that [`read()`] reads them
+//! back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
+//! [`weak()`] decides whether there is a schedule for whatever the world does.
 //!
 //! This crate looks at no files, no clock and no random numbers.
 //!
@@ -23,13 +23,20 @@
 //! ```
 
 mod builder;
+mod derive;
 mod file;
 mod json;
 mod mistake;
 mod number;
 mod read;
+pub mod weak;
+mod words;
+mod write;
 mod xml;
 
 pub use file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 pub use mistake::{Mistake, Mistakes};
 pub use read::read;
+pub use weak::{Weak, weak};
+pub use words::number;
+pub use write::{write_graphml, write_json};

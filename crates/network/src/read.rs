@@ -147,17 +147,15 @@ fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report<'_>) -> &'
     let Some(member) = required(parent, name, report) else {
         return &[];
     };
-    match member.list() {
-        Some(items) => items,
-        None => {
-            report.mistake(
-                member.at,
-                format!("`{name}` is {}, not a list", member.kind()),
-                format!("write `\"{name}\": [ … ]`"),
-            );
-            &[]
-        }
+    let items = member.list();
+    if items.is_none() {
+        report.mistake(
+            member.at,
+            format!("`{name}` is {}, not a list", member.kind()),
+            format!("write `\"{name}\": [ … ]`"),
+        );
     }
+    items.unwrap_or_default()
 }
 
 /// The member of that name; that it is missing is a mistake.

@@ -245,9 +245,8 @@ impl Reader<'_> {
         }
         self.at += 1;
         self.skip_space();
-        let quote = match self.rest().chars().next() {
-            Some(quote @ ('"' | '\'')) => quote,
-            _ => return self.wrong("this value stands in no quotes", "write `name=\"value\"`"),
+        let Some(quote @ ('"' | '\'')) = self.rest().chars().next() else {
+            return self.wrong("this value stands in no quotes", "write `name=\"value\"`");
         };
         let start = self.at + 1;
         let Some(length) = self.text[start..].find(quote) else {

@@ -12,7 +12,7 @@ fn folder() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    eprintln!("skipped: {} is not there", folder.display());
+    println!("skipped: {} is not there", folder.display());
     None
 }
 

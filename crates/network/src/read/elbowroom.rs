@@ -45,6 +45,9 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<Netwo
     for link in list(document, "links", report) {
         read_link(&mut builder, link, report);
     }
+    if report.is_failed() {
+        return None; // the links that the rest is about may be missing
+    }
     for wait in document
         .member("waits")
         .and_then(Json::list)
@@ -67,13 +70,11 @@ fn is_null(json: &Json<'_>) -> bool {
 }
 
 fn node(builder: &Builder, json: &Json<'_>, report: &mut Report<'_>) -> Option<NodeId> {
-    match json.text() {
-        Some(name) => builder.named(name, json.at, report),
-        None => {
-            report.mistake(json.at, "this is no name of a time point", "write a text");
-            None
-        }
-    }
+    let Some(name) = json.text() else {
+        report.mistake(json.at, "this is no name of a time point", "write a text");
+        return None;
+    };
+    builder.named(name, json.at, report)
 }
 
 fn ends(
@@ -212,17 +213,15 @@ fn read_correlation(builder: &mut Builder, json: &Json<'_>, report: &mut Report<
             matches!(builder.duration_of(link), Some(Duration::Normal { .. }))
                 && !links.contains(&link)
         };
-        match link.filter(is_normal) {
-            Some(link) => links.push(link),
-            None => {
-                report.mistake(
-                    end.at,
-                    "no link with a normal duration ends here, or it was named before",
-                    "name the ends of links with normal durations",
-                );
-                return;
-            }
-        }
+        let Some(link) = link.filter(is_normal) else {
+            report.mistake(
+                end.at,
+                "no link with a normal duration ends here, or it was named before",
+                "name the ends of links with normal durations",
+            );
+            return;
+        };
+        links.push(link);
     }
     let matrix = super::correlation_matrix(json, "matrix", links.len(), report);
     if let Some(matrix) = matrix {

@@ -151,28 +151,26 @@ enum Case {
 impl Edge {
     /// `None` after a mistake was noted.
     fn of(element: &Element, builder: &Builder, report: &mut Report<'_>) -> Option<Self> {
-        let mut end = |name| match element.attribute(name) {
-            Some(id) => builder.named(id, element.at, report),
-            None => {
+        let mut end = |name| {
+            let Some(id) = element.attribute(name) else {
                 report.mistake(
                     element.at,
                     format!("this edge has no {name}"),
                     "write `<edge source=\"…\" target=\"…\">`",
                 );
-                None
-            }
+                return None;
+            };
+            builder.named(id, element.at, report)
         };
         let (from, to) = (end("source"), end("target"));
-        let value = match data(element, "Value") {
-            None => None,
-            Some(data) => match Bound::parse(&data.text) {
-                Some(value) => Some(value),
-                None => {
-                    report.mistake(data.text_at, "this value is no number", "write a number");
-                    return None;
-                }
-            },
-        };
+        let mut value = None;
+        if let Some(data) = data(element, "Value") {
+            value = Bound::parse(&data.text);
+            if value.is_none() {
+                report.mistake(data.text_at, "this value is no number", "write a number");
+                return None;
+            }
+        }
         let labelled = match data(element, "LabeledValue") {
             None => None,
             Some(data) => Some(labelled(data, builder, report)?),
@@ -332,6 +330,8 @@ fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report<'_>) {
                     link,
                     delay: Some(-value),
                 }),
+                // Its link may be among the mistakes that were noted.
+                None if report.is_failed() => {}
                 None => report.mistake(
                     edge.at,
                     "this wait is for no contingent link that begins at the edge's target",

@@ -129,7 +129,10 @@ impl Reader {
         match section {
             None => {}
             Some(Section::Kind) => {
-                if !matches!(first.to_ascii_uppercase().as_str(), "STN" | "STNU") {
+                let is_known = ["STN", "STNU"]
+                    .iter()
+                    .any(|kind| kind.eq_ignore_ascii_case(first));
+                if !is_known {
                     report.mistake(
                         at,
                         format!("networks of the kind {first} are not supported"),
