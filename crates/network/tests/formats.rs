@@ -197,6 +197,10 @@ fn other_kinds_are_refused_by_name() {
 }
 
 #[test]
+#[allow(
+    clippy::too_many_lines,
+    reason = "a list of mistakes, and what is said of them"
+)]
 fn mistakes_say_where_and_what_to_do() {
     let mut messages = Vec::new();
     let mut wrong = |name: &str, text: &str, changes: &[(&str, &str)]| {
