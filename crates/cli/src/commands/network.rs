@@ -202,7 +202,9 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
         };
         let _ = writeln!(text, "  {}", styled(FAINT, &more));
     }
-    if !reason.durations.is_empty() {
+    // The other steps say at which end they take a link.
+    let are_fixed = reason.steps.iter().any(|step| step.given == "duration");
+    if are_fixed && !reason.durations.is_empty() {
         let ends = reason.durations.iter().map(|link| {
             let at = match link.at.as_str() {
                 "within" => "",
@@ -232,13 +234,9 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
         Durations::Given => "as the file says",
         Durations::Uniform => "evenly between their bounds",
     };
-    let executor = match (simulated.executor.as_str(), simulated.coverage) {
-        ("dispatchable", _) => "by the dispatchable network".to_owned(),
-        ("covering", Some(coverage)) => format!(
-            "by the dispatchable network for the likeliest {} of each random duration",
-            percent(coverage)
-        ),
-        _ => "as early as the windows allow, which promises nothing".to_owned(),
+    let executor = match simulated.executor.as_str() {
+        "dispatchable" => "by the dispatchable network",
+        _ => "as early as the windows allow, which promises nothing",
     };
     let mut line = format!(
         "{} of {} succeed: {}, with 95 % confidence between {} and {}. Durations are drawn \

@@ -189,11 +189,9 @@ pub struct Simulated {
     pub seed: u64,
     /// How durations were drawn.
     pub durations: Durations,
-    /// `dispatchable` (by the dispatchable network), `covering` (by the dispatchable network for
-    /// the durations that are likeliest), or `early-first` (as early as the windows allow).
+    /// `dispatchable` (by the dispatchable network) or `early-first` (as early as the windows
+    /// allow, as if the ends of links could be chosen).
     pub executor: String,
-    /// For `covering`: which share of the values of each random duration is planned for.
-    pub coverage: Option<f64>,
     /// In how many runs a duration lay outside the bounds of its link.
     pub outside: u64,
     /// The requirements that were broken most often.

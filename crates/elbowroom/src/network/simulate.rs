@@ -113,9 +113,12 @@ pub(super) fn run(
         share: proportion.share().unwrap_or_default(),
         interval: [lowest, highest],
         seed: simulation.seed,
-        durations: simulation.durations,
+        durations: if file.durations.iter().all(Option::is_none) {
+            Durations::Uniform
+        } else {
+            simulation.durations
+        },
         executor: name.to_owned(),
-        coverage: None,
         outside,
         broken: broken.collect(),
     })
