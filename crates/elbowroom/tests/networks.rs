@@ -36,11 +36,17 @@ fn told(answer: &Answer) -> String {
         lines.push(format!("{:?}", promise.verdict));
         if let Some(reason) = &promise.reason {
             lines.push(format!("  by {}", reason.by.exact));
-            lines.extend(reason.steps.iter().map(|step| format!("  {}", step.words)));
-            lines.extend(reason.durations.iter().map(|link| {
+            // A cycle has no first step.
+            let mut steps: Vec<_> = reason.steps.iter().map(|step| &step.words).collect();
+            steps.sort_unstable();
+            lines.extend(steps.into_iter().map(|words| format!("  {words}")));
+            let ends = reason.durations.iter().map(|link| {
                 let (from, to, value) = (&link.activation, &link.end, &link.value.exact);
                 format!("  at the {} end: {from} to {to}, {value}", link.at)
-            }));
+            });
+            let mut ends: Vec<_> = ends.collect();
+            ends.sort_unstable();
+            lines.extend(ends);
         }
     }
     lines.join("\n")
@@ -68,8 +74,8 @@ fn a_contradiction_is_told_in_the_names_of_the_file() {
     insta::assert_snapshot!(told(&examined(&file)), @r"
     No
       by 1
-      end at most 5 after start
       end at least 3 after lunch
+      end at most 5 after start
       lunch at least 3 after start
     ");
 }
@@ -87,17 +93,17 @@ fn who_would_have_to_know_a_duration_beforehand_is_told() {
     Yes
     No
       by 4
-      hatched at most 4 after film
-      hatched may come as late as 9 after laid
-      hatched may come as early as 3 after laid
       hatched at least 2 after film
-      at the upper end: laid to hatched, 9
+      hatched at most 4 after film
+      hatched may come as early as 3 after laid
+      hatched may come as late as 9 after laid
       at the lower end: laid to hatched, 3
+      at the upper end: laid to hatched, 9
     No
       by 4
       hatched at least 2 after film
-      hatched may come as early as 3 after laid
       hatched at most 4 after film
+      hatched may come as early as 3 after laid
       hatched may come as late as 9 after laid
       at the lower end: laid to hatched, 3
       at the upper end: laid to hatched, 9
@@ -106,10 +112,28 @@ fn who_would_have_to_know_a_duration_beforehand_is_told() {
 
 #[test]
 fn durations_without_a_schedule_are_told() {
-    let file = network("A C D", "C 0 D, A 7 D", "A 3 9 C");
-    let mut file = file;
-    file.name = "too late".to_owned();
-    insta::assert_snapshot!(told(&examined(&file)), @"");
+    let file = network("A C D", "D 0 C, A 7 D", "A 3 9 C");
+    insta::assert_snapshot!(told(&examined(&file)), @r"
+    Yes
+    No
+      by 2
+      C comes 9 after A
+      C not after D
+      D at most 7 after A
+      at the upper end: A to C, 9
+    No
+      by 2
+      C may come as late as 9 after A
+      C not after D
+      D at most 7 after A
+      at the upper end: A to C, 9
+    No
+      by 2
+      C may come as late as 9 after A
+      C not after D
+      D at most 7 after A
+      at the upper end: A to C, 9
+    ");
 }
 
 #[test]
