@@ -1,9 +1,12 @@
 //! How long the questions about a network take. `cargo bench -p elbowroom-network`
 
+use std::path::Path;
+
 use divan::Bencher;
-use elbowroom_network::NetworkFile;
-use elbowroom_network::{read, weak, write_json};
+use elbowroom_network::{NetworkFile, read, weak, write_json};
 use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::UncertainNetwork;
+use elbowroom_stn::{Constraint, NodeId};
 
 fn main() {
     divan::main();
@@ -81,22 +84,13 @@ fn not_dynamically_controllable(bencher: Bencher, (jobs, tasks): (usize, usize))
         .iter()
         .position(|point| point == "e0.1")
         .expect("a task");
-    let node = |index| elbowroom_stn::NodeId(u32::try_from(index).expect("few points"));
+    let node = |index| NodeId(u32::try_from(index).expect("few points"));
     let mut requirements = file.network.requirements().clone();
     let fixed = Rational::from(30);
-    requirements.add(elbowroom_stn::Constraint::at_most(
-        node(begin),
-        node(end),
-        fixed.clone(),
-    ));
-    requirements.add(elbowroom_stn::Constraint::at_least(
-        node(begin),
-        node(end),
-        fixed,
-    ));
+    requirements.add(Constraint::at_most(node(begin), node(end), fixed.clone()));
+    requirements.add(Constraint::at_least(node(begin), node(end), fixed));
     let links = file.network.links().to_vec();
-    file.network =
-        elbowroom_stn::uncertain::UncertainNetwork::new(requirements, links).expect("sound");
+    file.network = UncertainNetwork::new(requirements, links).expect("sound");
     assert!(!file.network.is_dynamically_controllable());
     bencher.bench_local(|| file.network.dynamic().is_err());
 }
@@ -117,4 +111,25 @@ fn weakly_controllable(bencher: Bencher, (jobs, tasks): (usize, usize)) {
 fn reading(bencher: Bencher, (jobs, tasks): (usize, usize)) {
     let text = write_json(&network(jobs, tasks, 20));
     bencher.bench_local(|| read("network", text.as_bytes()).is_ok());
+}
+
+/// The networks with published verdicts, where they are there: those of about 100 points, and all.
+#[divan::bench(args = ["about 100 points", "all"], sample_count = 20, sample_size = 1)]
+fn published(bencher: Bencher, which: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/stn");
+    let labels = std::fs::read_to_string(folder.join("labels.csv")).unwrap_or_default();
+    let mut files = Vec::new();
+    for line in labels.lines().skip(1) {
+        let name = line.split(',').next().unwrap_or_default();
+        let bytes = std::fs::read(folder.join(name)).expect("a published network");
+        let file = read(name, &bytes).expect("a published network");
+        if which == "all" || (90..=110).contains(&file.points.len()) {
+            files.push(file);
+        }
+    }
+    println!("{} networks: {which}", files.len());
+    bencher.bench_local(|| {
+        let verdicts = files.iter().map(|file| file.network.dynamic().is_ok());
+        verdicts.filter(|&is_controllable| is_controllable).count()
+    });
 }

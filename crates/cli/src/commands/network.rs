@@ -228,7 +228,7 @@ fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
 }
 
 fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
-    let percent = |share: f64| format!("{:.1} %", share * 100.0);
+    let percent = |share: f64| format!("{:.1}%", share * 100.0);
     let [least, most] = simulated.interval;
     let durations = match simulated.durations {
         Durations::Given => "as the file says",
@@ -239,7 +239,7 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
         _ => "as early as the windows allow, which promises nothing",
     };
     let mut line = format!(
-        "{} of {} succeed: {}, with 95 % confidence between {} and {}. Durations are drawn \
+        "{} of {} succeed: {}, with 95% confidence between {} and {}. Durations are drawn \
          {durations} (seed {}); points are dispatched {executor}.",
         simulated.successes,
         counted(usize::try_from(simulated.runs).unwrap_or(usize::MAX), "run"),
