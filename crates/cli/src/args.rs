@@ -1,9 +1,13 @@
 //! What can be said on the command line.
 
+mod network;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use elbowroom::num::Rational;
+
+pub(crate) use network::{DurationsChoice, NetworkArgs};
 
 /// How much elbow room does a temporal plan have?
 #[derive(Debug, Parser)]
@@ -41,6 +45,8 @@ pub(crate) enum Command {
     Run(Box<RunArgs>),
     /// Compare executors in many runs of an experiment
     Compare(CompareArgs),
+    /// Say what can be promised about a temporal network in a format of the field
+    Network(NetworkArgs),
 }
 
 /// The problem that every command is about.

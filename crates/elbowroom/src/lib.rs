@@ -45,6 +45,8 @@
 //! - [`stn`]: temporal networks.
 //! - [`plan`]: plans that leave room, and their parameters.
 //! - [`envelope`]: the box check, and the search for a box.
+//! - [`network`]: temporal networks in the formats of the field, and what can be promised about
+//!   them.
 //!
 //! What stands here adds words to what these find out ([`Explainer`]), reads and writes boxes
 //! ([`parse_box`]), and draws pictures ([`graph`]). It does not look at clocks or files, and it
@@ -58,6 +60,7 @@ mod explain;
 pub mod flow;
 pub mod graph;
 mod makespan;
+pub mod network;
 pub mod perturbed;
 mod plan_file;
 
