@@ -57,6 +57,7 @@ pub mod graph;
 mod makespan;
 pub mod perturbed;
 mod plan_file;
+mod room;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
