@@ -172,9 +172,8 @@ pub(crate) struct EnvelopeArgs {
     /// Finally move each end exactly onto its limit
     #[arg(long)]
     pub(crate) sharpen: bool,
-    /// What is guaranteed inside the envelope: `weak`, that a schedule exists for all values of
-    /// the parameters, and every schedule works
-    #[arg(long, value_enum, default_value_t = Guarantee::Weak, hide_possible_values = true)]
+    /// What is guaranteed inside the envelope
+    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
     /// How far apart interfering happenings must be
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
@@ -400,12 +399,22 @@ pub(crate) enum Growth {
 /// What is guaranteed inside an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Guarantee {
-    /// There is a schedule for all values, known in advance
+    /// For all values there is a schedule, if they are known in advance (as in the papers)
     Weak,
-    /// The plan can be executed without knowing the values in advance
+    /// An executor that learns each value only as it comes about reaches the goal
     Dynamic,
-    /// One schedule does for all values
+    /// Start times fixed beforehand do for all values
     Strong,
+}
+
+impl From<Guarantee> for elbowroom::envelope::Guarantee {
+    fn from(guarantee: Guarantee) -> Self {
+        match guarantee {
+            Guarantee::Weak => Self::Weak,
+            Guarantee::Dynamic => Self::Dynamic,
+            Guarantee::Strong => Self::Strong,
+        }
+    }
 }
 
 fn number(text: &str) -> Result<Rational, String> {

@@ -11,10 +11,11 @@
 mod shared;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use divan::Bencher;
 use elbowroom::flow;
-use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
@@ -40,7 +41,7 @@ fn names() -> Vec<String> {
         .collect()
 }
 
-fn read(name: &str) -> (Task, ParametrizedPlan) {
+fn read(name: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let instance = instances()
         .into_iter()
         .find(|i| i.name == name)
@@ -48,12 +49,13 @@ fn read(name: &str) -> (Task, ParametrizedPlan) {
     let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
     let plan = format::read(&bytes, &mut task).expect("a readable plan");
-    (task, plan)
+    (Arc::new(task), Arc::new(plan))
 }
 
 /// Searches until `enough` widenings.
-fn search(task: &Task, plan: &ParametrizedPlan, enough: usize) -> usize {
-    let mut oracle = Oracle::new(task, plan, &Rational::new(1, 1000)).expect("within reach");
+fn search(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>, enough: usize) -> usize {
+    let mut oracle =
+        Oracle::new(task, plan, &Rational::new(1, 1000), Guarantee::Weak).expect("within reach");
     let mut widenings = 0;
     let run = irr(&mut oracle, &Settings::default(), &mut |widening| {
         widenings += usize::from(widening.is_some());
@@ -79,7 +81,7 @@ fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
 }
 
 /// A delivery with so many durations left open.
-fn delivery(parameters: usize) -> (Task, ParametrizedPlan) {
+fn delivery(parameters: usize) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let (problem, plan) = shared::rounds::rounds(parameters / 4);
     let domain = Source::new("domain", shared::rounds::DOMAIN);
     let (problem, _) =
@@ -90,7 +92,7 @@ fn delivery(parameters: usize) -> (Task, ParametrizedPlan) {
     let freed = flow::free(&task, &plan, &epsilon).expect("a valid plan");
     let plan = flow::open(&task, freed, &[], &epsilon).expect("durations to leave open");
     assert_eq!(plan.parameters.len(), parameters);
-    (task, plan)
+    (Arc::new(task), Arc::new(plan))
 }
 
 #[divan::bench(args = [33, 65], sample_count = 20)]

@@ -1,18 +1,18 @@
 //! What the library finds out about a plan, in words.
 
 mod conflict;
+mod control;
 mod timed;
 
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::soundness::{Broken, Counterexample};
 use elbowroom_envelope::{Limit, Objection, Oracle};
 use elbowroom_model::Task;
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::obligations::Requirement;
-use elbowroom_plan::reduction::Side;
-use elbowroom_plan::soundness::{Broken, Counterexample};
 use elbowroom_plan::{
     DecoupledEnvelope, InstanceId, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan,
-    Schedule, Valuation, network_node,
+    Schedule, Side, Valuation, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 
@@ -74,7 +74,7 @@ impl<'a> Explainer<'a> {
     /// Why a box is not inside the envelope, with an example.
     pub fn objection(
         &self,
-        oracle: &Oracle<'_>,
+        oracle: &Oracle,
         refused: &DecoupledEnvelope,
         objection: &Objection,
     ) -> Explanation {
@@ -87,6 +87,10 @@ impl<'a> Explainer<'a> {
                     .or_else(|| oracle.counterexample(refused, broken));
                 self.broken(broken, example)
             }
+            Objection::Uncontrollable(conflict) => {
+                self.without_example(self.uncontrollable_in(conflict, refused))
+            }
+            other => self.without_example(other.to_string()),
         }
     }
 
@@ -109,9 +113,12 @@ impl<'a> Explainer<'a> {
         match limit {
             Limit::Unbounded => None,
             Limit::Range => Some(self.range(id, side)),
+            Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
             Limit::Objection { objection, .. } => Some(match objection {
                 Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
                 Objection::Broken(broken) => self.requirement(&broken.requirement),
+                Objection::Uncontrollable(conflict) => self.uncontrollable(conflict),
+                other => other.to_string(),
             }),
         }
     }
@@ -119,13 +126,7 @@ impl<'a> Explainer<'a> {
     fn broken(&self, broken: &Broken, example: Option<Counterexample>) -> Explanation {
         let reason = self.requirement(&broken.requirement);
         let Some(mut example) = example else {
-            return Explanation {
-                reason,
-                shortfall: None,
-                valuation: self.plan.nominal(),
-                schedule: None,
-                verdict: None,
-            };
+            return self.without_example(reason);
         };
         let shortfall = match &broken.requirement {
             Requirement::Separation { first, second } => {
@@ -145,6 +146,16 @@ impl<'a> Explainer<'a> {
             verdict: self.verdict(&example),
             valuation: example.valuation,
             schedule: Some(example.schedule),
+        }
+    }
+
+    fn without_example(&self, reason: String) -> Explanation {
+        Explanation {
+            reason,
+            shortfall: None,
+            valuation: self.plan.nominal(),
+            schedule: None,
+            verdict: None,
         }
     }
 
@@ -240,10 +251,7 @@ impl<'a> Explainer<'a> {
     /// Which values a parameter can take at all.
     fn range(&self, id: ParameterId, side: Side) -> String {
         let parameter = self.plan.parameter(id);
-        let end = match side {
-            Side::Lower => parameter.range.lower.value(),
-            Side::Upper => parameter.range.upper.value(),
-        };
+        let end = side.of(&parameter.range).value();
         let is_natural = parameter.range == Interval::at_least(Rational::ZERO);
         match (end, parameter.kind) {
             (Some(_), ParameterKind::Duration(_)) if is_natural => {

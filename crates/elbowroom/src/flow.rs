@@ -2,13 +2,14 @@
 //! left to right.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use elbowroom_envelope::{IrrRun, Oracle, irr};
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder};
-use elbowroom_plan::obligations::Refusal;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
 use elbowroom_plan::{NodeId, ParametrizedPlan};
 use elbowroom_stn::ConsistentNetwork;
@@ -22,16 +23,19 @@ pub struct Settings {
     pub epsilon: Rational,
     /// What to leave open; all durations if empty.
     pub vary: Vec<VarySpec>,
+    /// What to guarantee inside the envelope.
+    pub guarantee: Guarantee,
     /// How to search.
     pub search: elbowroom_envelope::Settings,
 }
 
 impl Default for Settings {
-    /// ε = 0.001, all durations, precision 1.
+    /// ε = 0.001, all durations, the weak guarantee, precision 1.
     fn default() -> Self {
         Self {
             epsilon: Rational::new(1, 1000),
             vary: Vec::new(),
+            guarantee: Guarantee::default(),
             search: elbowroom_envelope::Settings::default(),
         }
     }
@@ -41,7 +45,7 @@ impl Default for Settings {
 #[derive(Clone, Debug)]
 pub struct RobustPlan {
     /// The plan, with what is left open.
-    pub plan: ParametrizedPlan,
+    pub plan: Arc<ParametrizedPlan>,
     /// The envelope.
     pub run: IrrRun,
 }
@@ -69,13 +73,13 @@ pub enum FlowError {
 /// When the plan is not valid, when `settings.vary` names what the plan does not have, and when
 /// the plan is beyond exact analysis.
 pub fn robust_plan(
-    task: &Task,
+    task: &Arc<Task>,
     time_triggered: &TimeTriggeredPlan,
     settings: &Settings,
 ) -> Result<RobustPlan, FlowError> {
     let stn_plan = free(task, time_triggered, &settings.epsilon)?;
-    let plan = open(task, stn_plan, &settings.vary, &settings.epsilon)?;
-    let mut oracle = Oracle::new(task, &plan, &settings.epsilon)?;
+    let plan = Arc::new(open(task, stn_plan, &settings.vary, &settings.epsilon)?);
+    let mut oracle = Oracle::new(task, &plan, &settings.epsilon, settings.guarantee)?;
     let run = irr(&mut oracle, &settings.search, &mut |_| {
         ControlFlow::Continue(())
     })?;

@@ -5,6 +5,8 @@
 //! [`flow::robust_plan`] is the whole way; the [`tutorial`] walks it with an example.
 //!
 //! ```
+//! use std::sync::Arc;
+//!
 //! use elbowroom::flow::{Settings, robust_plan};
 //! use elbowroom::model::Task;
 //! use elbowroom::pddl::{self, Source};
@@ -26,7 +28,7 @@
 //! let mut task = Task::new(problem);
 //! let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &mut task)?;
 //!
-//! let robust = robust_plan(&task, &plan, &Settings::default())?;
+//! let robust = robust_plan(&Arc::new(task), &plan, &Settings::default())?;
 //! let envelope = robust.run.envelope.expect("the plan works as it is");
 //! // The office closes at 30, and delivering may not take longer than that.
 //! assert!(envelope.intervals[0].contains(&28.into()));

@@ -7,16 +7,15 @@
 //! the durations that are left open, as long as every schedule works. So neither the pins nor the
 //! durations take all the room that there is.
 
+use elbowroom_envelope::linear::Factor;
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
-use elbowroom_plan::linear::Factor;
-use elbowroom_plan::obligations::Requirement;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::soundness::{Broken, Soundness};
 use elbowroom_plan::{
-    Bound, DecoupledEnvelope, NodeId, Parameter, ParameterId, ParameterKind, ParametrizedPlan,
-    Reason, StnPlan,
+    Bound, BoxEnd, DecoupledEnvelope, NodeId, Parameter, ParameterId, ParameterKind,
+    ParametrizedPlan, Reason, Side, StnPlan,
 };
 
 /// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
@@ -77,8 +76,7 @@ fn pinned(
     let mut is_refused = false;
     let mut oracle = |fixed: &StnPlan| {
         let candidate = with_pins(fixed);
-        let broken = Soundness::new(task, &candidate, epsilon)
-            .and_then(|mut soundness| soundness.broken(&point, None));
+        let broken = broken_in(task, &candidate, epsilon, &point);
         is_refused |= broken.is_err();
         let broken = broken.ok().flatten()?;
         Some(nodes_of(&broken, candidate.plan.nodes.len()))
@@ -144,21 +142,19 @@ fn loosened(task: &Task, plan: ParametrizedPlan, epsilon: &Rational) -> Parametr
     if pins.is_empty() {
         return plan;
     }
-    let Ok(soundness) = Soundness::new(task, &open, epsilon) else {
+    let Ok(Some(sound)) = SoundBox::new(task, &open, epsilon) else {
         return plan;
     };
     let mut growth = Growth {
-        soundness,
-        envelope: DecoupledEnvelope::point(&open.nominal()),
+        sound,
         plan: &open,
         checks: 0,
     };
-    growth.begin();
     growth.run(epsilon);
     for &(_, id) in &pins {
         growth.beyond(id);
     }
-    let envelope = growth.envelope;
+    let envelope = growth.sound.envelope();
     let mut loose = plan;
     for &(index, id) in &pins {
         let bound = |end: &End| end.value().cloned().map_or(Bound::Infinite, Bound::Finite);
@@ -178,23 +174,17 @@ fn loosened(task: &Task, plan: ParametrizedPlan, epsilon: &Rational) -> Parametr
 /// How many boxes are looked at before the rest stays as it is.
 const MOST_CHECKS: usize = 2_000;
 
-/// A box, in which every schedule works, that grows.
+/// A box that grows as long as every schedule works.
 ///
 /// Unlike in an envelope, there need not be a schedule for each value of a pin: that the schedules
 /// with that value work is enough.
 struct Growth<'a> {
-    soundness: Soundness<'a>,
-    envelope: DecoupledEnvelope,
+    sound: SoundBox<'a>,
     plan: &'a ParametrizedPlan,
     checks: usize,
 }
 
 impl Growth<'_> {
-    /// Has the point checked, which is known to be sound, so that its proofs are known.
-    fn begin(&mut self) {
-        let _ = self.soundness.broken(&self.envelope, None);
-    }
-
     /// Moves all ends that are times out, by ever smaller steps, in turn: 500, 200, 100, 50, …
     /// down to ε, or to a thousandth of the greatest where there are others to share with.
     fn run(&mut self, epsilon: &Rational) {
@@ -228,7 +218,7 @@ impl Growth<'_> {
         parameters
             .filter(|(_, parameter)| is_time(parameter))
             .flat_map(|(index, _)| {
-                [Side::Upper, Side::Lower].map(|side| BoxEnd {
+                Side::BOTH.map(|side| BoxEnd {
                     parameter: ParameterId::from(index),
                     side,
                 })
@@ -237,37 +227,22 @@ impl Growth<'_> {
     }
 
     fn moves(&mut self, end: BoxEnd, step: &Rational) -> bool {
-        let Some(reach) = end.reach(&self.envelope) else {
+        let Some(reach) = end.reach(self.sound.envelope()) else {
             return false;
         };
-        self.accepts(end, Some(reach + step))
+        let reach = reach + step;
+        let border = end.side.reach(&self.plan.parameter(end.parameter).range);
+        border.is_none_or(|border| reach <= border) && self.accepts(end, Some(reach))
     }
 
     fn accepts(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
-        if self.checks >= MOST_CHECKS {
-            return false;
-        }
-        let candidate = end.with_reach(&self.envelope, reach);
-        let range = &self.plan.parameter(end.parameter).range;
-        let interval = candidate.interval(end.parameter);
-        let moved = match end.side {
-            Side::Lower => &interval.lower,
-            Side::Upper => &interval.upper,
-        };
-        if moved.value().is_some_and(|value| !range.contains(value)) {
-            return false;
-        }
         self.checks += 1;
-        let is_sound = matches!(self.soundness.broken(&candidate, Some(end)), Ok(None));
-        if is_sound {
-            self.envelope = candidate;
-        }
-        is_sound
+        self.checks <= MOST_CHECKS && self.sound.try_reach(end, reach).unwrap_or(false)
     }
 
     /// Takes away the ends of a pin that nothing limits.
     fn beyond(&mut self, pin: ParameterId) {
-        for side in [Side::Upper, Side::Lower] {
+        for side in Side::BOTH {
             let end = BoxEnd {
                 parameter: pin,
                 side,

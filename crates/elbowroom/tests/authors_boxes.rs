@@ -8,11 +8,11 @@ mod shared;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
-use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, format};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, format};
 use shared::instances::{Instance, figure_3};
 
 /// A box as the authors' tool printed it, by parameter name.
@@ -56,14 +56,17 @@ fn interval(text: &str) -> (String, (Rational, Rational)) {
 
 /// An instance, read.
 struct Case {
-    task: elbowroom_model::Task,
-    plan: ParametrizedPlan,
+    task: Arc<elbowroom_model::Task>,
+    plan: Arc<ParametrizedPlan>,
 }
 
 fn read(instance: &Instance, text: &str) -> Case {
     let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let plan = format::read(text.as_bytes(), &mut task).expect("a readable plan");
-    Case { task, plan }
+    Case {
+        task: Arc::new(task),
+        plan: Arc::new(plan),
+    }
 }
 
 fn plan_text(instance: &Instance) -> String {
@@ -100,14 +103,15 @@ fn every_recorded_box_is_inside_and_cannot_grow_by_what_its_run_left_open() {
             continue;
         };
         let Case { task, plan } = read(&instance, &plan_text(&instance));
-        let mut oracle = Oracle::new(&task, &plan, &epsilon()).expect("within reach");
+        let mut oracle =
+            Oracle::new(&task, &plan, &epsilon(), Guarantee::Weak).expect("within reach");
         for recorded in recorded {
             let envelope = envelope_of(&plan, recorded);
             let objection = oracle.objection(&envelope).expect("within reach");
             assert_eq!(objection, None, "{}: {recorded:?}", instance.name);
             inside += 1;
             for (index, parameter) in plan.parameters.iter().enumerate() {
-                for side in [Side::Lower, Side::Upper] {
+                for side in Side::BOTH {
                     let end = BoxEnd {
                         parameter: ParameterId::from(index),
                         side,
@@ -186,7 +190,8 @@ fn the_same_search_finds_the_same_fractions() {
 
 /// What the search with the authors' settings finds.
 fn search(case: &Case) -> Recorded {
-    let mut oracle = Oracle::new(&case.task, &case.plan, &epsilon()).expect("within reach");
+    let mut oracle =
+        Oracle::new(&case.task, &case.plan, &epsilon(), Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     })

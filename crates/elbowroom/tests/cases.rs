@@ -6,8 +6,9 @@
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use elbowroom::envelope::{self, Oracle, irr, sharpen};
+use elbowroom::envelope::{self, Guarantee, Oracle, irr, sharpen};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{self, Source};
@@ -60,14 +61,17 @@ fn number(text: &str) -> Rational {
 }
 
 /// How far the duration of the instance may deviate while all else is as planned.
-fn alone(task: &Task, time_triggered: &TimeTriggeredPlan, instance: usize) -> Interval {
+fn alone(task: &Arc<Task>, time_triggered: &TimeTriggeredPlan, instance: usize) -> Interval {
     let vary = format!("duration n{instance}");
-    let plan = opened(task, time_triggered, &[&vary]);
-    let mut oracle = Oracle::new(task, &plan, &epsilon()).expect("within exact reasoning");
+    let plan = Arc::new(opened(task, time_triggered, &[&vary]));
+    let mut oracle =
+        Oracle::new(task, &plan, &epsilon(), Guarantee::Weak).expect("within exact reasoning");
     let go_on = ControlFlow::Continue(());
     let run = irr(&mut oracle, &envelope::Settings::default(), &mut |_| go_on).expect("few cases");
     let found = run.envelope.expect("the plan works as planned");
-    let sharp = sharpen(&mut oracle, &found, &mut || go_on).expect("few cases");
+    let sharp = sharpen(&mut oracle, &found, &mut || go_on)
+        .expect("few cases")
+        .expect("what was found is inside");
     assert!(sharp.includes(&found));
     sharp.intervals[0].clone()
 }
@@ -76,14 +80,16 @@ fn alone(task: &Task, time_triggered: &TimeTriggeredPlan, instance: usize) -> In
 /// plan's actions by start, its interval with the others nominal; and the region.
 fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) {
     let (task, plan) = read(case);
+    let task = Arc::new(task);
     for (instance, expected) in intervals.iter().enumerate() {
         let found = alone(&task, &plan, instance).to_string();
         assert_eq!(found, *expected, "{case}: duration n{instance}");
     }
-    let opened = opened(&task, &plan, &[]);
+    let opened = Arc::new(opened(&task, &plan, &[]));
     let nominal = opened.nominal();
     assert!(region(&nominal), "{case}: the nominal point");
-    let mut oracle = Oracle::new(&task, &opened, &epsilon()).expect("within exact reasoning");
+    let mut oracle =
+        Oracle::new(&task, &opened, &epsilon(), Guarantee::Weak).expect("within exact reasoning");
     // All points whose coordinates are these shares of the nominal ones, and just beyond zero.
     let shares = ["0", "1/3", "3/4", "1", "7/6", "3/2", "2"].map(number);
     let mut inside = 0;
@@ -202,9 +208,10 @@ fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
     let (mut task, plan) = read("delivery");
     let text = fs::read(folder("delivery").join("plan.stn")).unwrap();
     let by_hand = plan::format::read(&text, &mut task).expect("an STN plan file without mistakes");
-    let derived = opened(&task, &plan, &[]);
-    let mut of_file = Oracle::new(&task, &by_hand, &epsilon()).unwrap();
-    let mut of_plan = Oracle::new(&task, &derived, &epsilon()).unwrap();
+    let (task, by_hand) = (Arc::new(task), Arc::new(by_hand));
+    let derived = Arc::new(opened(&task, &plan, &[]));
+    let oracle = |plan| Oracle::new(&task, plan, &epsilon(), Guarantee::Weak).unwrap();
+    let (mut of_file, mut of_plan) = (oracle(&by_hand), oracle(&derived));
     // The file leaves open first, second, handing and opening; the plan also the pick.
     for (first, second, handing, opening) in [
         (10, 15, 3, 6),

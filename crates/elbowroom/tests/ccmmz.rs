@@ -8,10 +8,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use elbowroom::parse_box;
+use elbowroom_envelope::obligations::Requirement;
 use elbowroom_num::Rational;
-use elbowroom_plan::ParameterId;
-use elbowroom_plan::obligations::Requirement;
-use elbowroom_plan::reduction::{BoxEnd, Side};
+use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use shared::case::Case;
 use shared::instances::figure_3;
 
@@ -136,7 +135,7 @@ fn every_box_it_found_is_inside_and_cannot_grow() {
             }
             let mut oracle = case.oracle();
             for index in 0..case.plan.parameters.len() {
-                for side in [Side::Lower, Side::Upper] {
+                for side in Side::BOTH {
                     let end = BoxEnd {
                         parameter: ParameterId::from(index),
                         side,

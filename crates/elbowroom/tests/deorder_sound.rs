@@ -11,14 +11,14 @@ mod shared;
 
 use std::path::Path;
 
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::soundness::broken_in;
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::read_plan;
 use elbowroom_plan::deorder::{self, Deordered, deorder, pin_until_sound, pinned_to};
-use elbowroom_plan::obligations::Requirement;
 use elbowroom_plan::parametrize::parametrize;
-use elbowroom_plan::soundness::Soundness;
 use elbowroom_plan::{
     DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
 };
@@ -81,9 +81,7 @@ fn pinned(task: &Task, deordered: &Deordered, epsilon: &Rational) -> Result<StnP
     let mut oracle = |plan: &StnPlan| {
         let closed = ParametrizedPlan::closed(task, plan.clone());
         let point = DecoupledEnvelope::point(&[]);
-        let broken = Soundness::new(task, &closed, epsilon)
-            .and_then(|mut soundness| soundness.broken(&point, None));
-        match broken {
+        match broken_in(task, &closed, epsilon, &point) {
             Ok(broken) => broken.map(|broken| {
                 let differences = broken.case.differences.iter();
                 let mut nodes: Vec<NodeId> = differences

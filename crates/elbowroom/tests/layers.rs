@@ -81,6 +81,35 @@ fn the_table_goes_upwards_only() {
     }
 }
 
+/// What decides while a plan is executed decides by what was worked out before: it could not ask
+/// for an envelope or a plan if it wanted to.
+#[test]
+fn what_executes_cannot_reach_a_solver() {
+    for name in ["probability", "execution", "sim", "report"] {
+        let reached = reachable(name);
+        for solver in ["envelope", "planner"] {
+            assert!(
+                !reached.contains(solver),
+                "`{name}` must not reach `{solver}`, but it does through {reached:?}"
+            );
+        }
+    }
+}
+
+/// The crates that a crate imports, and those that they import, by the table.
+fn reachable(name: &'static str) -> BTreeSet<&'static str> {
+    let mut reached = BTreeSet::new();
+    let mut open = vec![name];
+    while let Some(next) = open.pop() {
+        let (_, imports) = LAYERS
+            .iter()
+            .find(|(crate_name, _)| *crate_name == next)
+            .expect("a crate of the table");
+        open.extend(imports.iter().filter(|import| reached.insert(**import)));
+    }
+    reached
+}
+
 #[test]
 fn a_forbidden_import_is_found_wherever_it_is_written() {
     let forbidden = |manifest: &str| {

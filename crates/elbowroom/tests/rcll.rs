@@ -6,6 +6,7 @@
 mod shared;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use elbowroom::flow::{FlowError, free, open};
 use elbowroom::{Explainer, plan::parametrize::VarySpec};
@@ -14,8 +15,7 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::Change;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan};
-use elbowroom_plan::ParameterId;
-use elbowroom_plan::reduction::Side;
+use elbowroom_plan::{ParameterId, Side};
 use shared::case::{Case, epsilon, number};
 
 /// The four productions run side by side. Written for the domain with uncertain durations.
@@ -43,7 +43,10 @@ fn opened(domain: &Path, problem: &Path, plan: &str, specs: &[&str]) -> Result<C
     let specs: Result<Vec<VarySpec>, _> = specs.iter().map(|spec| spec.parse()).collect();
     let freed = free(&task, &plan, &epsilon())?;
     let plan = open(&task, freed, &specs?, &epsilon())?;
-    Ok(Case { task, plan })
+    Ok(Case {
+        task: Arc::new(task),
+        plan: Arc::new(plan),
+    })
 }
 
 const ALL_PRODUCTIONS: [&str; 4] = [
@@ -68,7 +71,7 @@ fn deadline(task: &Task) -> Rational {
 fn upper_limit(case: &Case, parameter: usize) -> String {
     let [_, sharp] = case.found("1");
     let mut oracle = case.oracle();
-    let all = limits(&mut oracle, &sharp, &Rational::ONE).expect("within reach");
+    let all = limits(&mut oracle, &sharp, &Rational::ONE);
     let limit: &Limit = all[parameter][1].as_ref().expect("something limits it");
     let epsilon = epsilon();
     Explainer::new(&case.task, &case.plan, &epsilon)

@@ -6,8 +6,9 @@
 mod shared;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::validate::{self, validate};
 use elbowroom_num::Rational;
 use elbowroom_plan::{ParametrizedPlan, format};
@@ -58,7 +59,9 @@ fn attack(instance: &Instance) -> bool {
     let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
     let plan: ParametrizedPlan = format::read(&bytes, &mut task).expect("a readable plan");
-    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 1000)).expect("within reach");
+    let (task, plan) = (Arc::new(task), Arc::new(plan));
+    let mut oracle =
+        Oracle::new(&task, &plan, &Rational::new(1, 1000), Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     })

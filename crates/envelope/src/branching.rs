@@ -10,11 +10,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use crate::reduction::Edge;
 use elbowroom_num::Rational;
-use elbowroom_plan::ParameterId;
-use elbowroom_plan::reduction::{Edge, Side};
-
-use crate::cycles::other_side;
+use elbowroom_plan::{ParameterId, Side};
 
 /// How many branches are looked at before the question is given up.
 pub(crate) const MOST_BRANCHES: usize = 1 << 14;
@@ -93,7 +91,7 @@ impl Branching<'_> {
             return edge.constant.clone();
         };
         let side = chosen.get(&end.parameter).copied();
-        let value = (self.value)(end.parameter, side.unwrap_or(other_side(end.side)));
+        let value = (self.value)(end.parameter, side.unwrap_or(end.side.opposite()));
         match end.side {
             Side::Upper => &edge.constant + value,
             Side::Lower => &edge.constant - value,
@@ -113,7 +111,7 @@ impl Branching<'_> {
             if chosen.contains_key(&end.parameter) {
                 continue;
             }
-            let worst = other_side(end.side);
+            let worst = end.side.opposite();
             if *sides.entry(end.parameter).or_insert(worst) != worst {
                 return Err(end.parameter);
             }

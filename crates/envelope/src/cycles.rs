@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::reduction::Edge;
 use elbowroom_num::Rational;
-use elbowroom_plan::ParameterId;
-use elbowroom_plan::reduction::{BoxEnd, Edge, Side};
+use elbowroom_plan::{BoxEnd, ParameterId, Side};
 use elbowroom_stn::NodeId as ClassId;
 
 /// Through which of its ends a parameter can make the network inconsistent.
@@ -54,7 +54,7 @@ pub(crate) fn own_limits(
         for (end, constant) in opposite {
             // The way there must not be shorter than the way back, at the end that shortens it.
             let inner = BoxEnd {
-                side: other_side(end.side),
+                side: end.side.opposite(),
                 ..*end
             };
             let limit = *constant + &edge.constant;
@@ -79,13 +79,6 @@ fn is_difference(edges: &[Edge], parameter: ParameterId) -> bool {
                 && there.constant == -&back.constant
         }
         _ => false,
-    }
-}
-
-pub(crate) fn other_side(side: Side) -> Side {
-    match side {
-        Side::Lower => Side::Upper,
-        Side::Upper => Side::Lower,
     }
 }
 

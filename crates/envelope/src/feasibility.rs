@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use crate::reduction::{Edge, Reduction};
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::reduction::{BoxEnd, Edge, Reduction, Side};
-use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, Valuation};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, Valuation};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
 use crate::branching::{Branching, TooManyBranches};
-use crate::cycles::{Cycles, Role, other_side, own_limits};
+use crate::cycles::{Cycles, Role, own_limits};
 
 /// How many corners are kept from one box to the next; if there are more, [`Branching`] looks for
 /// those that matter.
@@ -99,7 +99,7 @@ impl Feasibility {
     ) -> Result<Option<Infeasible>, TooManyBranches> {
         let ends = match moved {
             Some(end) => vec![end],
-            None => all_ends(envelope),
+            None => BoxEnd::all(envelope.intervals.len()).collect(),
         };
         for end in ends {
             match (end.reach(envelope), self.own_limits.get(&end)) {
@@ -201,7 +201,7 @@ impl Feasibility {
             .iter()
             .map(|interval| any_value(interval, Side::Lower))
             .collect();
-        let base = any_value(envelope.interval(end.parameter), other_side(end.side));
+        let base = any_value(envelope.interval(end.parameter), end.side.opposite());
         let mut step = Rational::ONE;
         loop {
             values[end.parameter.index()] = match end.side {
@@ -226,7 +226,7 @@ impl Feasibility {
                 Role::None => continue,
                 Role::Lower => &[Side::Lower],
                 Role::Upper => &[Side::Upper],
-                Role::Both => &[Side::Lower, Side::Upper],
+                Role::Both => &Side::BOTH,
             };
             let id = ParameterId::from(index);
             corners = corners
@@ -380,17 +380,7 @@ fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) 
 /// That end of the interval, or, if it is infinite, some value in it: that the plan has schedules
 /// in that direction for ever is asked apart.
 fn any_value(interval: &Interval, side: Side) -> Rational {
-    let (wanted, other) = match side {
-        Side::Lower => (&interval.lower, &interval.upper),
-        Side::Upper => (&interval.upper, &interval.lower),
-    };
+    let (wanted, other) = (side.of(interval), side.opposite().of(interval));
     let value = wanted.value().or(other.value());
     value.cloned().unwrap_or_default()
-}
-
-fn all_ends(envelope: &DecoupledEnvelope) -> Vec<BoxEnd> {
-    (0..envelope.intervals.len())
-        .map(ParameterId::from)
-        .flat_map(|parameter| [Side::Lower, Side::Upper].map(|side| BoxEnd { parameter, side }))
-        .collect()
 }

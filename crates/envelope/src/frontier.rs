@@ -1,8 +1,7 @@
 //! Which end moves next, and how far.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{ParameterId, ParametrizedPlan};
+use elbowroom_plan::{BoxEnd, ParameterId, ParametrizedPlan, Side};
 
 /// How steps change after a success.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -87,7 +86,7 @@ impl Frontier {
                 continue;
             }
             for side in [Side::Upper, Side::Lower] {
-                let place = position(side);
+                let place = side.index();
                 if progress.is_open[place] && !progress.is_done[place] {
                     self.next = index + 1;
                     let end = BoxEnd {
@@ -113,14 +112,14 @@ impl Frontier {
     /// they open again.
     pub(crate) fn reject(&mut self, end: BoxEnd) {
         let progress = &mut self.parameters[end.parameter.index()];
-        progress.is_open[position(end.side)] = false;
+        progress.is_open[end.side.index()] = false;
         progress.reopen_if_closed();
     }
 
     /// The end can go no further whatever the step: it is infinite, or at the border of its range.
     pub(crate) fn finish(&mut self, end: BoxEnd) {
         let progress = &mut self.parameters[end.parameter.index()];
-        progress.is_done[position(end.side)] = true;
+        progress.is_done[end.side.index()] = true;
         progress.reopen_if_closed();
     }
 }
@@ -133,12 +132,5 @@ impl Progress {
             self.is_open = [true; 2];
             self.has_halved = true;
         }
-    }
-}
-
-fn position(side: Side) -> usize {
-    match side {
-        Side::Lower => 0,
-        Side::Upper => 1,
     }
 }

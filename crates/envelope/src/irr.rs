@@ -1,11 +1,11 @@
 //! Incremental Rectangular Robustification.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
-use elbowroom_num::{End, Rational};
-use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId};
+use crate::obligations::Refusal;
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, Side};
 
 use crate::frontier::{Frontier, Growth};
 use crate::oracle::{Objection, Oracle};
@@ -53,7 +53,13 @@ pub enum StopReason {
     CheckLimit,
     /// The caller wanted no more.
     Cancelled,
+    /// Of some wider boxes it cannot be told whether they are inside: there are too many cases to
+    /// tell apart. The ends in question stay where they were.
+    Undecided,
 }
+
+/// How many boxes may be undecided before a search ends: each took long.
+const MOST_UNDECIDED: usize = 4;
 
 /// What keeps one end of the final box where it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +75,8 @@ pub enum Limit {
         /// Why.
         objection: Objection,
     },
+    /// Whether the box with this end moved out is inside the envelope cannot be told.
+    Undecided,
 }
 
 /// The result of [`irr`].
@@ -87,58 +95,58 @@ pub struct IrrRun {
 /// Incremental Rectangular Robustification: Algorithm 1 of Cashmore et al. (2020).
 ///
 /// Invariant: the box lies inside the robustness envelope at every iteration, the first included:
-/// the start point is checked like any other box. `on_widening` is called each time the box has
+/// the start point is checked like any other box. `on_step` is called each time the box has
 /// grown, and once more at every refusal with `None`, so that it can end the search at any moment.
+/// What was found stays found: a wider box of which nothing can be told is treated as refused.
 ///
 /// # Errors
-/// When there are too many cases to tell apart.
+/// When nothing can be told of the start point.
 #[doc(alias = "Incremental Rectangular-Robustification")]
 pub fn irr(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     settings: &Settings,
     on_step: &mut dyn FnMut(Option<&Widening<'_>>) -> ControlFlow<()>,
 ) -> Result<IrrRun, Refusal> {
-    let plan = oracle.plan();
+    let plan = Arc::clone(oracle.plan());
     let already = oracle.checks();
     let mut envelope = DecoupledEnvelope::point(&plan.nominal());
-    let run = |envelope, widenings, checks, stop| {
-        Ok(IrrRun {
-            envelope,
-            widenings,
-            checks: checks - already,
-            stop,
-        })
-    };
-    if let Some(objection) = oracle.objection(&envelope)? {
-        return run(Err(objection), 0, oracle.checks(), StopReason::Converged);
+    if let Some(objection) = oracle.start(&envelope)? {
+        return Ok(IrrRun {
+            envelope: Err(objection),
+            widenings: 0,
+            checks: oracle.checks() - already,
+            stop: StopReason::Converged,
+        });
     }
-    let mut frontier = Frontier::new(plan, &settings.precision, settings.growth);
+    let mut frontier = Frontier::new(&plan, &settings.precision, settings.growth);
     let mut widenings = 0;
-    while let Some((end, step)) = frontier.next_end() {
-        if settings
-            .most_checks
-            .is_some_and(|most| oracle.checks() - already >= most)
-        {
-            return run(
-                Ok(envelope),
-                widenings,
-                oracle.checks(),
-                StopReason::CheckLimit,
-            );
+    let mut undecided = 0;
+    let stop = loop {
+        if undecided >= MOST_UNDECIDED {
+            break StopReason::Undecided;
         }
-        let parameter = plan.parameter(end.parameter);
-        let widened = match widened(&envelope, parameter, end, &step) {
-            Some(candidate) if oracle.is_inside_after(&candidate, Some(end))? => Some(candidate),
-            _ => None,
+        let Some((end, step)) = frontier.next_end() else {
+            break match undecided {
+                0 => StopReason::Converged,
+                _ => StopReason::Undecided,
+            };
         };
-        let flow = if let Some(candidate) = widened {
-            envelope = candidate;
+        let checks = oracle.checks() - already;
+        if settings.most_checks.is_some_and(|most| checks >= most) {
+            break StopReason::CheckLimit;
+        }
+        let range = &plan.parameter(end.parameter).range;
+        let mut told = |answer: Result<bool, Refusal>| {
+            undecided += usize::from(answer.is_err());
+            answer.unwrap_or(false)
+        };
+        let flow = if told(widen(oracle, &envelope, range, end, &step)) {
             frontier.accept(end);
-            if let Some(farthest) = farthest(&envelope, parameter, end)
-                && oracle.is_inside_after(&farthest, Some(end))?
-            {
-                envelope = farthest;
+            if matches!(end.side.of(range), End::Infinite) && told(oracle.try_reach(end, None)) {
                 frontier.finish(end);
+            }
+            if let Some(accepted) = oracle.accepted() {
+                envelope.clone_from(accepted);
             }
             widenings += 1;
             on_step(Some(&Widening {
@@ -151,103 +159,80 @@ pub fn irr(
             on_step(None)
         };
         if flow.is_break() {
-            return run(
-                Ok(envelope),
-                widenings,
-                oracle.checks(),
-                StopReason::Cancelled,
-            );
+            break StopReason::Cancelled;
         }
-    }
-    run(
-        Ok(envelope),
+    };
+    Ok(IrrRun {
+        envelope: Ok(envelope),
         widenings,
-        oracle.checks(),
-        StopReason::Converged,
-    )
+        checks: oracle.checks() - already,
+        stop,
+    })
+}
+
+/// Moves one end of the accepted box, `envelope`, out by a step; whether it could be, within the
+/// parameter's range.
+fn widen(
+    oracle: &mut Oracle,
+    envelope: &DecoupledEnvelope,
+    range: &Interval,
+    end: BoxEnd,
+    step: &Rational,
+) -> Result<bool, Refusal> {
+    let Some(reach) = end.reach(envelope) else {
+        return Ok(false);
+    };
+    let reach = reach + step;
+    let value = match end.side {
+        Side::Lower => -&reach,
+        Side::Upper => reach.clone(),
+    };
+    Ok(range.contains(&value) && oracle.try_reach(end, Some(reach))?)
 }
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
 /// can still move by less than `step` is asked what would stop it at `step`.
-///
-/// # Errors
-/// When there are too many cases to tell apart.
 pub fn limits(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     step: &Rational,
-) -> Result<Vec<[Option<Limit>; 2]>, Refusal> {
-    let plan = oracle.plan();
+) -> Vec<[Option<Limit>; 2]> {
+    let plan = Arc::clone(oracle.plan());
     let mut limits = Vec::with_capacity(plan.parameters.len());
     for (index, parameter) in plan.parameters.iter().enumerate() {
         let mut pair = [None, None];
-        for (place, side) in [Side::Lower, Side::Upper].into_iter().enumerate() {
+        for side in Side::BOTH {
             let end = BoxEnd {
                 parameter: ParameterId::from(index),
                 side,
             };
-            pair[place] = limit(oracle, envelope, parameter, end, step)?;
+            pair[side.index()] = limit(oracle, envelope, parameter, end, step);
         }
         limits.push(pair);
     }
-    Ok(limits)
+    limits
 }
 
 fn limit(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     parameter: &Parameter,
     end: BoxEnd,
     step: &Rational,
-) -> Result<Option<Limit>, Refusal> {
+) -> Option<Limit> {
     let Some(reach) = end.reach(envelope) else {
-        return Ok(Some(Limit::Unbounded));
+        return Some(Limit::Unbounded);
     };
-    let range = DecoupledEnvelope {
-        intervals: vec![parameter.range.clone()],
-    };
-    let border = BoxEnd {
-        parameter: ParameterId(0),
-        ..end
-    }
-    .reach(&range);
+    let border = end.side.reach(&parameter.range);
     if border.as_ref().is_some_and(|border| reach >= *border) {
-        return Ok(Some(Limit::Range));
+        return Some(Limit::Range);
     }
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
     let refused = end.with_reach(envelope, Some(target));
-    Ok(oracle
-        .objection(&refused)?
-        .map(|objection| Limit::Objection { refused, objection }))
-}
-
-/// The box with one end moved by a step; `None` if that would leave the parameter's range.
-fn widened(
-    envelope: &DecoupledEnvelope,
-    parameter: &Parameter,
-    end: BoxEnd,
-    step: &Rational,
-) -> Option<DecoupledEnvelope> {
-    let reach = end.reach(envelope)? + step;
-    let widened = end.with_reach(envelope, Some(reach));
-    let interval = widened.interval(end.parameter);
-    let moved = match end.side {
-        Side::Lower => &interval.lower,
-        Side::Upper => &interval.upper,
-    };
-    parameter.range.contains(moved.value()?).then_some(widened)
-}
-
-/// The box with one end as far out as the parameter's range goes, if that is infinitely far.
-fn farthest(
-    envelope: &DecoupledEnvelope,
-    parameter: &Parameter,
-    end: BoxEnd,
-) -> Option<DecoupledEnvelope> {
-    let border = match end.side {
-        Side::Lower => &parameter.range.lower,
-        Side::Upper => &parameter.range.upper,
-    };
-    matches!(border, End::Infinite).then(|| end.with_reach(envelope, None))
+    match oracle.objection(&refused) {
+        Ok(None) => None,
+        Ok(Some(objection)) => Some(Limit::Objection { refused, objection }),
+        Err(_) => Some(Limit::Undecided),
+    }
 }

@@ -1,74 +1,107 @@
 //! The exact box check.
 
+use std::sync::Arc;
+
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
-use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::reduction::BoxEnd;
-use elbowroom_plan::soundness::{Broken, Counterexample, Soundness};
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
-use crate::branching::{MOST_BRANCHES, TooManyBranches};
-use crate::feasibility::{Feasibility, Infeasible};
+use crate::control::ControlConflict;
+use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
+use crate::obligations::Refusal;
+use crate::soundness::{Broken, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
-/// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1).
+/// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a
+/// schedule" is read as a [`Guarantee`] demands.
 ///
-/// It remembers proofs from one box to the next, so a box that differs in one end from the last
-/// one accepted costs little.
+/// It keeps one box that it has [accepted](Self::accepted), and remembers why. To move one end of
+/// that box ([`try_reach`](Self::try_reach)) costs little: only the proofs that use the end are
+/// looked for again. Since it is the oracle that makes the wider box, nobody can tell it something
+/// wrong about how two boxes differ. Other boxes can be asked about at any time
+/// ([`objection`](Self::objection)); that takes longer, and leaves the accepted box as it is.
+///
+/// A box that merely differs in one end from another one cannot be passed off as such:
+///
+/// ```compile_fail
+/// # use elbowroom_envelope::Oracle;
+/// # use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
+/// fn check(oracle: &mut Oracle, somewhere_else: &DecoupledEnvelope, end: BoxEnd) {
+///     let _ = oracle.objection_after(somewhere_else, Some(end));
+/// }
+/// ```
 #[doc(alias = "CheckInEnvelope")]
 #[derive(Clone, Debug)]
-pub struct Oracle<'a> {
-    task: &'a Task,
-    plan: &'a ParametrizedPlan,
+pub struct Oracle {
+    task: Arc<Task>,
+    plan: Arc<ParametrizedPlan>,
     epsilon: Rational,
-    feasibility: Feasibility,
-    soundness: Soundness<'a>,
+    guarantee: Guarantee,
+    controllability: Controllability,
+    soundness: Soundness,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
     /// How many bad cases had been refuted from scratch before `around` changed last.
     refuted_before: usize,
-    /// Whether all proofs that `soundness` knows hold in the last box accepted.
+    accepted: Option<DecoupledEnvelope>,
+    /// Whether `accepted` is the last box that was found inside, so that what is remembered is
+    /// about it.
+    remembers_accepted: bool,
+    /// Whether all proofs that `soundness` knows hold in the last box found inside.
     proofs_hold_in_last: bool,
     checks: usize,
     without_schedule: usize,
 }
 
 /// Why a box is not inside the envelope.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Objection {
     /// For these values of the parameters the plan has no schedule.
+    #[error("for some values in the box the plan has no schedule")]
     NoSchedule(Valuation),
     /// For some values, some schedule breaks an obligation.
+    #[error("for some values in the box a schedule breaks the plan")]
     Broken(Broken),
+    /// For all values there is a schedule, but one that has to be known sooner than the values are.
+    #[error("{0}")]
+    Uncontrollable(ControlConflict),
 }
 
-/// The same, before the values without a schedule are worked out.
+/// The same, before the values are worked out.
 enum Reason {
-    NoSchedule(Infeasible),
+    /// The plan has no schedule at these values.
+    NoSchedule(Valuation),
+    Uncontrollable(Uncontrollable),
     Broken(Broken),
 }
 
-impl<'a> Oracle<'a> {
+impl Oracle {
     /// The oracle for a plan.
     ///
     /// # Errors
     /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
     /// reasoning; the message names it.
     pub fn new(
-        task: &'a Task,
-        plan: &'a ParametrizedPlan,
+        task: &Arc<Task>,
+        plan: &Arc<ParametrizedPlan>,
         epsilon: &Rational,
+        guarantee: Guarantee,
     ) -> Result<Self, Refusal> {
-        let soundness = Soundness::new(task, plan, epsilon)?;
-        let feasibility = Feasibility::new(plan, soundness.reduction());
+        let around = plan.nominal();
+        let soundness = Soundness::around(task, plan, epsilon, &around)?;
+        let controllability = Controllability::new(guarantee, plan, soundness.reduction());
         Ok(Self {
-            task,
-            plan,
+            task: Arc::clone(task),
+            plan: Arc::clone(plan),
             epsilon: epsilon.clone(),
-            feasibility,
+            guarantee,
+            controllability,
             soundness,
-            around: plan.nominal(),
+            around,
             refuted_before: 0,
+            accepted: None,
+            remembers_accepted: false,
             proofs_hold_in_last: true,
             checks: 0,
             without_schedule: 0,
@@ -76,8 +109,18 @@ impl<'a> Oracle<'a> {
     }
 
     /// The plan it was made for.
-    pub fn plan(&self) -> &'a ParametrizedPlan {
-        self.plan
+    pub fn plan(&self) -> &Arc<ParametrizedPlan> {
+        &self.plan
+    }
+
+    /// What it checks.
+    pub fn guarantee(&self) -> Guarantee {
+        self.guarantee
+    }
+
+    /// The box that was accepted by [`start`](Self::start), as widened since; `None` before that.
+    pub fn accepted(&self) -> Option<&DecoupledEnvelope> {
+        self.accepted.as_ref()
     }
 
     /// How many boxes have been checked.
@@ -95,7 +138,48 @@ impl<'a> Oracle<'a> {
         self.refuted_before + self.soundness.refutations()
     }
 
-    /// Why the box is not inside the envelope; `None` if it is.
+    /// Takes a box for the one to widen, unless it is not inside the envelope, which the answer
+    /// then says. A box accepted earlier stays the accepted one in that case.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn start(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Objection>, Refusal> {
+        let reason = self.check_afresh(envelope)?;
+        if reason.is_none() {
+            self.accepted = Some(envelope.clone());
+            self.remembers_accepted = true;
+        }
+        Ok(reason.map(|reason| self.objection_of(envelope, reason)))
+    }
+
+    /// Moves one end of the accepted box out so that it reaches that far ([`BoxEnd::reach`];
+    /// `None` is infinitely far), if the box stays inside the envelope: whether it does.
+    ///
+    /// An end that reaches so far already stays where it is. If no box has been accepted yet, the
+    /// nominal values are the box to start from; if not even they are inside, neither is a wider
+    /// box.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn try_reach(&mut self, end: BoxEnd, reach: Option<Rational>) -> Result<bool, Refusal> {
+        Ok(self.widen(end, reach)?.is_none())
+    }
+
+    /// Like [`try_reach`](Self::try_reach), with the reason if the box cannot be widened so, which
+    /// can take some time to work out.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn objection_to_reach(
+        &mut self,
+        end: BoxEnd,
+        reach: Option<Rational>,
+    ) -> Result<Option<Objection>, Refusal> {
+        let refused = self.widen(end, reach)?;
+        Ok(refused.map(|(envelope, reason)| self.objection_of(&envelope, reason)))
+    }
+
+    /// Why the box is not inside the envelope; `None` if it is. The accepted box stays what it is.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.
@@ -103,109 +187,15 @@ impl<'a> Oracle<'a> {
         &mut self,
         envelope: &DecoupledEnvelope,
     ) -> Result<Option<Objection>, Refusal> {
-        self.objection_after(envelope, None)
-    }
-
-    /// Like [`objection`](Self::objection), for a box that differs from the last one accepted only
-    /// in `moved`, which lies further out.
-    ///
-    /// # Errors
-    /// When there are too many cases to tell apart.
-    pub fn objection_after(
-        &mut self,
-        envelope: &DecoupledEnvelope,
-        moved: Option<BoxEnd>,
-    ) -> Result<Option<Objection>, Refusal> {
-        let reason = self.check(envelope, moved)?;
-        Ok(reason.map(|reason| match reason {
-            Reason::Broken(broken) => Objection::Broken(broken),
-            Reason::NoSchedule(found) => {
-                Objection::NoSchedule(self.feasibility.values(envelope, found))
-            }
-        }))
-    }
-
-    /// Whether there is no [objection](Self::objection_after), which need not be worked out then.
-    ///
-    /// # Errors
-    /// When there are too many cases to tell apart.
-    pub fn is_inside_after(
-        &mut self,
-        envelope: &DecoupledEnvelope,
-        moved: Option<BoxEnd>,
-    ) -> Result<bool, Refusal> {
-        Ok(self.check(envelope, moved)?.is_none())
-    }
-
-    fn check(
-        &mut self,
-        envelope: &DecoupledEnvelope,
-        moved: Option<BoxEnd>,
-    ) -> Result<Option<Reason>, Refusal> {
-        self.checks += 1;
-        // Proofs found for a box that was refused, and is not the last accepted one with an end
-        // moved out, may not hold in the last accepted one: then the hint says nothing about them.
-        let trusted = moved.filter(|_| self.proofs_hold_in_last);
-        let reason = self.sound_and_feasible(envelope, moved, trusted);
-        self.proofs_hold_in_last = match &reason {
-            Ok(None) => true,
-            _ => moved.is_some() && self.proofs_hold_in_last,
-        };
-        reason
-    }
-
-    fn sound_and_feasible(
-        &mut self,
-        envelope: &DecoupledEnvelope,
-        moved: Option<BoxEnd>,
-        trusted: Option<BoxEnd>,
-    ) -> Result<Option<Reason>, Refusal> {
-        if !envelope.contains(&self.around)
-            && let Some(without_schedule) = self.move_to(envelope)?
-        {
-            let found = Infeasible::At(without_schedule);
-            return Ok(Some(Reason::NoSchedule(found)));
+        let reason = self.check_afresh(envelope)?;
+        if reason.is_none() {
+            self.remembers_accepted = self.accepted.as_ref() == Some(envelope);
         }
-        // A sound box with an infeasible one rejected afterwards would leave the networks of the
-        // feasibility check ahead of the accepted box, so soundness comes first.
-        if let Some(broken) = self.soundness.broken(envelope, trusted)? {
-            return Ok(Some(Reason::Broken(broken)));
-        }
-        let infeasible = self.feasibility.infeasible(envelope, moved);
-        let infeasible = infeasible.map_err(|TooManyBranches| Refusal::TooManyCases {
-            place: "parameters on constraints in both directions".to_owned(),
-            limit: MOST_BRANCHES,
-        })?;
-        if let Some(found) = infeasible {
-            self.without_schedule += 1;
-            return Ok(Some(Reason::NoSchedule(found)));
-        }
-        Ok(None)
+        Ok(reason.map(|reason| self.objection_of(envelope, reason)))
     }
 
-    /// Goes by the order that happenings have in the box from now on. The box need not hold the
-    /// nominal values, and elsewhere a plan may work in another order.
-    ///
-    /// Values in the box that have no schedule, if that shows already.
-    fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
-        let nearest = envelope.nearest(&self.plan.nominal());
-        match Soundness::around(self.task, self.plan, &self.epsilon, &nearest) {
-            Ok(soundness) => {
-                self.refuted_before += self.soundness.refutations();
-                self.soundness = soundness;
-                self.around = nearest;
-                Ok(None)
-            }
-            Err(Refusal::NoNominalSchedule) => {
-                self.without_schedule += 1;
-                Ok(Some(nearest))
-            }
-            Err(refusal) => Err(refusal),
-        }
-    }
-
-    /// Values and a schedule in the box that break the obligation by as much as any do; see
-    /// [`Soundness::worst_case`].
+    /// Values and a schedule in the box that break the obligation by as much as any do. Two
+    /// happenings that should be apart may then be so far the wrong way round that it does no harm.
     pub fn worst_case(
         &self,
         envelope: &DecoupledEnvelope,
@@ -221,5 +211,144 @@ impl<'a> Oracle<'a> {
         broken: &Broken,
     ) -> Option<Counterexample> {
         self.soundness.counterexample(envelope, broken)
+    }
+
+    /// The accepted box with an end moved out, and why that is refused; `None` if it is not, and
+    /// is the accepted box now.
+    fn widen(
+        &mut self,
+        end: BoxEnd,
+        reach: Option<Rational>,
+    ) -> Result<Option<(DecoupledEnvelope, Reason)>, Refusal> {
+        let accepted = match self.accepted.take() {
+            Some(accepted) => accepted,
+            None => match self.start_at_nominal()? {
+                Ok(point) => point,
+                Err(refused) => return Ok(Some(refused)),
+            },
+        };
+        let is_reached = match (end.reach(&accepted), &reach) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(present), Some(wanted)) => present >= *wanted,
+        };
+        if is_reached {
+            self.accepted = Some(accepted);
+            return Ok(None);
+        }
+        let candidate = end.with_reach(&accepted, reach);
+        let reason = self.check_moved(&accepted, &candidate, end);
+        match reason {
+            Ok(None) => {
+                self.accepted = Some(candidate);
+                self.remembers_accepted = true;
+                Ok(None)
+            }
+            refused => {
+                self.accepted = Some(accepted);
+                Ok(refused?.map(|reason| (candidate, reason)))
+            }
+        }
+    }
+
+    /// The nominal values as a box, if they are inside.
+    fn start_at_nominal(
+        &mut self,
+    ) -> Result<Result<DecoupledEnvelope, (DecoupledEnvelope, Reason)>, Refusal> {
+        let point = DecoupledEnvelope::point(&self.plan.nominal());
+        if let Some(reason) = self.check_afresh(&point)? {
+            return Ok(Err((point, reason)));
+        }
+        self.remembers_accepted = true;
+        Ok(Ok(point))
+    }
+
+    /// Checks `accepted` with `end` moved out.
+    fn check_moved(
+        &mut self,
+        accepted: &DecoupledEnvelope,
+        candidate: &DecoupledEnvelope,
+        end: BoxEnd,
+    ) -> Result<Option<Reason>, Refusal> {
+        if !self.remembers_accepted {
+            // Another box has been found inside since, so what is remembered is about that one.
+            let again = self.check_afresh(accepted);
+            self.checks -= 1;
+            self.remembers_accepted = again?.is_none();
+        }
+        if !self.remembers_accepted {
+            return self.check_afresh(candidate);
+        }
+        self.checks += 1;
+        // Proofs found for a box that was refused, and is not the last accepted one with an end
+        // moved out, may not hold in the last accepted one: then which end has moved says nothing
+        // about them.
+        let trusted = self.proofs_hold_in_last.then_some(end);
+        let reason = self.sound_and_controllable(candidate, Some(end), trusted);
+        if let Ok(None) = &reason {
+            self.proofs_hold_in_last = true;
+        }
+        reason
+    }
+
+    /// Checks a box that need not have anything to do with the one before.
+    fn check_afresh(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Reason>, Refusal> {
+        self.checks += 1;
+        let reason = self.sound_and_controllable(envelope, None, None);
+        self.proofs_hold_in_last = matches!(&reason, Ok(None));
+        reason
+    }
+
+    fn sound_and_controllable(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+        trusted: Option<BoxEnd>,
+    ) -> Result<Option<Reason>, Refusal> {
+        if !envelope.contains(&self.around)
+            && let Some(without_schedule) = self.move_to(envelope)?
+        {
+            return Ok(Some(Reason::NoSchedule(without_schedule)));
+        }
+        // A sound box with an infeasible one rejected afterwards would leave the networks of the
+        // feasibility check ahead of the accepted box, so soundness comes first.
+        let soundness = &mut self.soundness;
+        if let Some(broken) = soundness.broken(&self.task, &self.plan, envelope, trusted)? {
+            return Ok(Some(Reason::Broken(broken)));
+        }
+        if let Some(found) = self.controllability.refuses(envelope, moved)? {
+            self.without_schedule += 1;
+            return Ok(Some(Reason::Uncontrollable(found)));
+        }
+        Ok(None)
+    }
+
+    /// Goes by the order that happenings have in the box from now on. The box need not hold the
+    /// nominal values, and elsewhere a plan may work in another order.
+    ///
+    /// Values in the box that have no schedule, if that shows already.
+    fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
+        let nearest = envelope.nearest(&self.plan.nominal());
+        match Soundness::around(&self.task, &self.plan, &self.epsilon, &nearest) {
+            Ok(soundness) => {
+                self.refuted_before += self.soundness.refutations();
+                self.soundness = soundness;
+                self.around = nearest;
+                Ok(None)
+            }
+            Err(Refusal::NoNominalSchedule) => {
+                self.without_schedule += 1;
+                Ok(Some(nearest))
+            }
+            Err(refusal) => Err(refusal),
+        }
+    }
+
+    fn objection_of(&self, envelope: &DecoupledEnvelope, reason: Reason) -> Objection {
+        match reason {
+            Reason::NoSchedule(values) => Objection::NoSchedule(values),
+            Reason::Uncontrollable(found) => self.controllability.objection(envelope, found),
+            Reason::Broken(broken) => Objection::Broken(broken),
+        }
     }
 }

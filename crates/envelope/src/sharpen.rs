@@ -2,10 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_num::{End, Rational};
-use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{DecoupledEnvelope, ParameterId};
+use crate::obligations::Refusal;
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 
 use crate::oracle::Oracle;
 
@@ -17,59 +16,52 @@ const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 ///
 /// A limit is a fraction, mostly one with a small denominator or few decimals. Halving encloses it;
 /// the simplest fraction and the shortest decimal that are enclosed are tried as well, and one of
-/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope in any case, and less than 10⁻¹² from the limit.
+/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope in
+/// any case, and less than 10⁻¹² from the limit.
 ///
-/// `envelope` must lie inside the robustness envelope. `on_step` is called after every check and
-/// can end the work at any moment.
+/// `None` if `envelope` is not inside the robustness envelope. `on_step` is called after every check
+/// and can end the work at any moment.
 ///
 /// # Errors
 /// When there are too many cases to tell apart.
 pub fn sharpen(
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     on_step: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Result<DecoupledEnvelope, Refusal> {
-    let mut envelope = envelope.clone();
-    // From here on the oracle's last accepted box is `envelope`.
-    oracle.objection(&envelope)?;
-    for index in 0..oracle.plan().parameters.len() {
-        for side in [Side::Upper, Side::Lower] {
-            let end = BoxEnd {
-                parameter: ParameterId::from(index),
-                side,
-            };
-            if push(oracle, &mut envelope, end, on_step)?.is_break() {
-                return Ok(envelope);
-            }
+) -> Result<Option<DecoupledEnvelope>, Refusal> {
+    if oracle.start(envelope)?.is_some() {
+        return Ok(None);
+    }
+    let parameters = (0..oracle.plan().parameters.len()).map(ParameterId::from);
+    let ends = parameters
+        .flat_map(|parameter| [Side::Upper, Side::Lower].map(|side| BoxEnd { parameter, side }));
+    for end in ends {
+        if push(oracle, end, on_step).is_break() {
+            break;
         }
     }
-    Ok(envelope)
+    Ok(oracle.accepted().cloned())
 }
 
-/// Moves one end out to its limit.
+/// Moves one end of the accepted box out to its limit.
 fn push(
-    oracle: &mut Oracle<'_>,
-    envelope: &mut DecoupledEnvelope,
+    oracle: &mut Oracle,
     end: BoxEnd,
     on_step: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Result<ControlFlow<()>, Refusal> {
-    let Some(mut inside) = end.reach(envelope) else {
-        return Ok(ControlFlow::Continue(()));
+) -> ControlFlow<()> {
+    let Some(mut inside) = oracle.accepted().and_then(|accepted| end.reach(accepted)) else {
+        return ControlFlow::Continue(());
     };
-    let border = border(oracle, end);
+    let border = end
+        .side
+        .reach(&oracle.plan().parameter(end.parameter).range);
     if border.as_ref() == Some(&inside) {
-        return Ok(ControlFlow::Continue(()));
+        return ControlFlow::Continue(());
     }
-    let mut accepts = |reach: Option<Rational>| -> Result<bool, Refusal> {
-        let candidate = end.with_reach(envelope, reach);
-        let is_inside = oracle.is_inside_after(&candidate, Some(end))?;
-        if is_inside {
-            *envelope = candidate;
-        }
-        Ok(is_inside)
-    };
-    if accepts(border.clone())? {
-        return Ok(on_step());
+    // Of where nothing can be told, the end stays away.
+    let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
+    if accepts(border.clone()) {
+        return on_step();
     }
     let mut outside = if let Some(border) = border {
         border
@@ -78,13 +70,13 @@ fn push(
         let mut step = Rational::ONE;
         loop {
             let farther = &inside + &step;
-            if !accepts(Some(farther.clone()))? {
+            if !accepts(Some(farther.clone())) {
                 break farther;
             }
             inside = farther;
             step = &step + &step;
             if on_step().is_break() {
-                return Ok(ControlFlow::Break(()));
+                return ControlFlow::Break(());
             }
         }
     };
@@ -97,26 +89,16 @@ fn push(
             Some(2) => shortest_decimal_between(&inside, &outside),
             _ => &(&inside + &outside) * &half,
         };
-        if accepts(Some(candidate.clone()))? {
+        if accepts(Some(candidate.clone())) {
             inside = candidate;
         } else {
             outside = candidate;
         }
         if on_step().is_break() {
-            return Ok(ControlFlow::Break(()));
+            return ControlFlow::Break(());
         }
     }
-    Ok(ControlFlow::Continue(()))
-}
-
-/// How far out the parameter's range goes; `None` if infinitely far.
-fn border(oracle: &Oracle<'_>, end: BoxEnd) -> Option<Rational> {
-    let range = &oracle.plan().parameter(end.parameter).range;
-    match (end.side, &range.lower, &range.upper) {
-        (Side::Lower, End::Closed(lower) | End::Open(lower), _) => Some(-lower),
-        (Side::Upper, _, End::Closed(upper) | End::Open(upper)) => Some(upper.clone()),
-        _ => None,
-    }
+    ControlFlow::Continue(())
 }
 
 /// The fraction with the smallest denominator strictly between two numbers, `low < high`.

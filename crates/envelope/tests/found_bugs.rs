@@ -1,116 +1,13 @@
 //! Mistakes found in the box check, most of them by the second oracle, and limits that it once had,
 //! each as a small case.
 
-use elbowroom_envelope::{Objection, Oracle};
-use elbowroom_model::Task;
-use elbowroom_num::{End, Interval, Rational};
-use elbowroom_pddl::{Source, read_problem};
-use elbowroom_plan::obligations::Refusal;
-use elbowroom_plan::parametrize::vary;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::soundness::Counterexample;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+mod given;
 
-/// A problem over the facts `(p)`, `(q)`, `(r)` and the numbers `(x)`, `(y)`, and an STN plan.
-#[derive(Default)]
-struct Given<'a> {
-    /// `:synth-parameters` and actions.
-    domain: &'a str,
-    /// What holds in the beginning, and what happens by itself. `(x)` and `(y)` begin at 5, `(z)`
-    /// has no value.
-    init: &'a str,
-    /// The goal; `(and)` if empty.
-    goal: &'a str,
-    /// An STN plan file.
-    plan: &'a str,
-    /// What else to leave open.
-    vary: &'a [&'a str],
-}
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, Side};
 
-impl Given<'_> {
-    fn task_and_plan(&self) -> (Task, ParametrizedPlan) {
-        let domain = format!(
-            "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
-            self.domain
-        );
-        let goal = if self.goal.is_empty() {
-            "(and)"
-        } else {
-            self.goal
-        };
-        let problem = format!(
-            "(define (problem d) (:domain d) (:init (= (x) 5) (= (y) 5) {}) (:goal {goal}))",
-            self.init
-        );
-        let (problem, _) = read_problem(
-            &Source::new("domain", domain),
-            &Source::new("problem", problem),
-        )
-        .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
-        let mut task = Task::new(problem);
-        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &mut task).expect("a plan");
-        let specs: Vec<_> = self
-            .vary
-            .iter()
-            .map(|spec| spec.parse().expect("a quantity"))
-            .collect();
-        let nominal = vec![Rational::ZERO; plan.plan.nodes.len()];
-        let plan = vary(&task, plan, &nominal, &specs).expect("quantities of the plan");
-        (task, plan)
-    }
-
-    /// What one oracle with ε = 1/4 says of these boxes, one after the other: `inside`, or why not.
-    fn answers(&self, boxes: &[&str]) -> Vec<String> {
-        let (task, plan) = self.task_and_plan();
-        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).expect("within reach");
-        boxes
-            .iter()
-            .map(
-                |text| match oracle.objection(&envelope(text)).expect("few cases") {
-                    None => "inside".to_owned(),
-                    Some(Objection::NoSchedule(_)) => "no schedule".to_owned(),
-                    Some(Objection::Broken(broken)) => {
-                        broken.requirement.describe(&task, &plan.plan)
-                    }
-                },
-            )
-            .collect()
-    }
-
-    /// What shows that the box is not inside.
-    fn counterexample(&self, text: &str) -> Counterexample {
-        let (task, plan) = self.task_and_plan();
-        let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).expect("within reach");
-        match oracle.objection(&envelope(text)).expect("few cases") {
-            Some(Objection::Broken(broken)) => oracle
-                .counterexample(&envelope(text), &broken)
-                .expect("it breaks"),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn answer(&self, envelope: &str) -> String {
-        self.answers(&[envelope]).remove(0)
-    }
-}
-
-/// `[1, 3/2] [-inf, 0]`: an interval for each parameter.
-fn envelope(text: &str) -> DecoupledEnvelope {
-    let end = |text: &str| match text.trim() {
-        "inf" | "-inf" => End::Infinite,
-        number => End::Closed(number.parse().expect("a number")),
-    };
-    let intervals = text.split(']').filter_map(|interval| {
-        let (lower, upper) = interval.trim().strip_prefix('[')?.split_once(',')?;
-        Some(Interval {
-            lower: end(lower),
-            upper: end(upper),
-        })
-    });
-    DecoupledEnvelope {
-        intervals: intervals.collect(),
-    }
-}
+use given::{Given, envelope, oracle};
 
 #[test]
 fn a_fact_deleted_and_added_at_once_stays_true_inside_an_action() {
@@ -214,7 +111,7 @@ fn two_numbers_that_a_parameter_multiplies_are_not_decided_at_corners() {
         ..Given::default()
     };
     let (task, plan) = given.task_and_plan();
-    let refusal = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap_err();
+    let refusal = oracle(&task, &plan).unwrap_err();
     assert_eq!(
         refusal,
         Refusal::Coupled {
@@ -332,18 +229,17 @@ fn proofs_found_for_a_refused_box_are_not_taken_to_hold_in_the_last_accepted_one
         ..Given::default()
     };
     let (task, plan) = given.task_and_plan();
-    let mut oracle = Oracle::new(&task, &plan, &Rational::new(1, 4)).unwrap();
-    let mut is_inside = |text: &str, moved: Option<BoxEnd>| {
-        let objection = oracle.objection_after(&envelope(text), moved).unwrap();
-        objection.is_none()
-    };
-    assert!(is_inside("[8, 8] [8, 20] [1, 1]", None));
-    assert!(!is_inside("[8, 20] [8, 8] [1, 30]", None));
-    let moved = BoxEnd {
+    let mut oracle = oracle(&task, &plan).unwrap();
+    let accepted = envelope("[8, 8] [8, 20] [1, 1]");
+    assert_eq!(oracle.start(&accepted), Ok(None));
+    let elsewhere = envelope("[8, 20] [8, 8] [1, 30]");
+    assert_ne!(oracle.objection(&elsewhere), Ok(None));
+    let a = BoxEnd {
         parameter: plan.find("?a").unwrap(),
         side: Side::Upper,
     };
-    assert!(!is_inside("[8, 12] [8, 20] [1, 1]", Some(moved)));
+    assert_eq!(oracle.try_reach(a, Some(Rational::from(12))), Ok(false));
+    assert_eq!(oracle.accepted(), Some(&accepted));
 }
 
 #[test]
@@ -395,7 +291,7 @@ fn a_parameter_times_itself_is_not_decided_at_corners() {
             ..Given::default()
         };
         let (task, plan) = given.task_and_plan();
-        let oracle = Oracle::new(&task, &plan, &Rational::new(1, 4));
+        let oracle = oracle(&task, &plan);
         oracle.map(|_| given.answers(&["[-7, 7]", "[-8, 7]"]))
     };
     assert_eq!(

@@ -125,7 +125,7 @@ fn execute(mut executor: Box<dyn Executor>, belief: &Progression) -> Rational {
 struct Everywhere;
 
 impl Region for Everywhere {
-    fn objection(&mut self, _: &Task, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
+    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
         None
     }
 }

@@ -19,11 +19,12 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body};
 use elbowroom_num::Rational;
+use elbowroom_plan::uncertain::{Impossible, Reading};
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
 use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::executor::{Mission, Planned, StepId};
-use crate::horizon::Horizon;
+use crate::horizon::{Behind, Horizon};
 use crate::reason::{Cause, Reason};
 use progress::Progress;
 use retry::Retry;
@@ -38,6 +39,35 @@ pub(crate) enum Sight {
     OneHop,
 }
 
+/// Which of the plan's constraints the parts of its network come from, by position.
+#[derive(Clone, Debug)]
+struct Sources {
+    /// For each constraint of the network; `None` if it comes from none.
+    requirements: Vec<Option<usize>>,
+    /// For each contingent link.
+    links: Vec<usize>,
+}
+
+impl Sources {
+    fn of(&self, behind: Behind) -> Option<usize> {
+        match behind {
+            Behind::Constraint(id) => self.requirements.get(id.index()).copied().flatten(),
+            Behind::Link(link) => self.links.get(link.index()).copied(),
+        }
+    }
+}
+
+/// No executor could keep to the plan's network.
+fn contradiction(mission: &Mission, sources: &Sources, behind: &[Behind]) -> Reason {
+    let mut reason = Reason::new(Cause::Late).about("no times satisfy the plan's constraints");
+    let indices = behind.iter().filter_map(|behind| sources.of(*behind));
+    reason.behind = indices
+        .map(|index| explain::words(&mission.task, &mission.plan.plan, index))
+        .collect();
+    reason.behind.dedup();
+    reason
+}
+
 /// A plan being dispatched.
 #[derive(Clone, Debug)]
 pub(crate) struct Dispatch {
@@ -50,17 +80,14 @@ pub(crate) struct Dispatch {
     origin: Rational,
     epsilon: Rational,
     horizon: Horizon,
-    /// For each constraint of the network, the plan's constraint that it comes from.
-    sources: Vec<Option<usize>>,
+    sources: Sources,
     /// For each instance its start and end; twice the same if it is instantaneous.
     ends: Vec<[NodeId; 2]>,
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
-    /// For each instance, the plan's constraints that bound its duration.
-    bounding: Vec<Vec<usize>>,
-    /// What the durations of some instances may be once they run.
-    when_running: BTreeMap<InstanceId, Bounds>,
     progress: Progress,
+    /// Timed initials that have not happened, the last one first, with their times.
+    timed: Vec<(Rational, NodeId)>,
     /// Instances that were under way before the plan began: of these it knows the rest.
     resumed: BTreeSet<InstanceId>,
     /// Starts that have failed and are to be tried again.
@@ -68,7 +95,8 @@ pub(crate) struct Dispatch {
 }
 
 impl Dispatch {
-    /// Takes up a plan. `bounds` says what a constraint of the plan is taken for.
+    /// Takes up a plan. `bounds` says what a constraint of the plan is taken for; all windows are
+    /// taken for the executor's to choose from.
     ///
     /// # Errors
     /// When no times satisfy these.
@@ -77,37 +105,160 @@ impl Dispatch {
         sight: Sight,
         bounds: &dyn Fn(&Constraint) -> Bounds,
     ) -> Result<Self, Box<Reason>> {
-        let plan = mission.plan.plan.clone();
-        let at_nominal = plan.at(&mission.plan.nominal());
-        let ends = ends_of(&plan);
-        let (network, sources) = network(&plan, bounds);
-        let mut durations = vec![(None, None); plan.instances.len()];
-        let mut bounding = vec![Vec::new(); plan.instances.len()];
-        for (index, constraint) in plan.constraints.iter().enumerate() {
-            if let Some(id) = duration_of(&plan, constraint) {
-                bounding[id.index()].push(index);
-                let known: &mut Bounds = &mut durations[id.index()];
-                *known = both(std::mem::take(known), bounds(constraint));
-            }
-        }
+        let plan = &mission.plan.plan;
+        let (network, sources) = network(plan, bounds);
+        let sources = Sources {
+            requirements: sources,
+            links: Vec::new(),
+        };
         let horizon = match sight {
             Sight::OneHop => Horizon::one_hop(network),
             Sight::Whole => match ConsistentNetwork::try_from(network) {
                 Ok(network) => Horizon::whole(network),
                 Err(cycle) => {
-                    let ids = cycle.constraints.iter();
-                    let behind = ids.filter_map(|id| sources.get(id.index()).copied().flatten());
-                    let mut reason =
-                        Reason::new(Cause::Late).about("no times satisfy the plan's constraints");
-                    reason.behind = behind
-                        .map(|index| explain::words(&mission.task, &plan, index))
+                    let behind: Vec<Behind> = cycle
+                        .constraints
+                        .iter()
+                        .copied()
+                        .map(Behind::Constraint)
                         .collect();
+                    let mut reason = contradiction(mission, &sources, &behind);
                     reason.by = Some(-cycle.total);
                     return Err(Box::new(reason));
                 }
             },
         };
+        Ok(Self::with_horizon(mission, horizon, sources, bounds))
+    }
+
+    /// Takes up a plan in which the world decides on what `reading` says is contingent.
+    ///
+    /// # Errors
+    /// When no executor could be sure to keep to it: the constraints that stand against each other.
+    pub(crate) fn controlled(
+        mission: &Mission,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Result<Self, Box<Reason>> {
+        let plan = &mission.plan.plan;
+        let network = plan
+            .uncertain_network(reading)
+            .map_err(|Impossible(index)| {
+                let mut reason = Reason::new(Cause::Late).about("nothing satisfies a constraint");
+                reason.behind = vec![explain::words(&mission.task, plan, index)];
+                Box::new(reason)
+            })?;
+        let sources = Sources {
+            requirements: network.requirements,
+            links: network.links,
+        };
+        let horizon = Horizon::dispatchable(&network.network)
+            .map_err(|behind| Box::new(contradiction(mission, &sources, &behind)))?;
+        let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
+        Ok(Self::with_horizon(mission, horizon, sources, &bounds))
+    }
+
+    /// Goes by other readings of the constraints from now on; what has happened stays, and nothing
+    /// else happens before now.
+    ///
+    /// # Errors
+    /// When no executor could be sure to keep to it: the plan's constraints that stand against each
+    /// other, in words.
+    pub(crate) fn rebound(
+        &mut self,
+        now: &Rational,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Result<(), Vec<String>> {
+        let has_happened = |node: NodeId| self.happened(node).is_some();
+        let mut plan = self.plan.clone();
+        let since = |node: NodeId, least: &Rational, most: Bound| Constraint {
+            from: NodeId::ZERO,
+            to: node,
+            lower: Bound::Finite(least.clone()),
+            upper: most,
+            reason: elbowroom_plan::Reason::Given,
+        };
+        for (node, what) in self.plan.nodes().skip(1) {
+            match (self.happened(node), what) {
+                (_, Node::Zero | Node::Timed(_)) | (None, Node::End(_)) => {}
+                (Some(time), _) => {
+                    let fixed = since(node, time, Bound::Finite(time.clone()));
+                    plan.constraints.push(fixed);
+                }
+                (None, _) => plan.constraints.push(since(node, now, Bound::Infinite)),
+            }
+        }
+        let known = self.plan.constraints.len();
+        let network = plan.uncertain_network(&|constraint| {
+            if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
+            {
+                // Of these some are the plan's own, which say what they say.
+                let (lower, upper) = given(constraint);
+                return Reading::Requirement { lower, upper };
+            }
+            if has_happened(constraint.from) && has_happened(constraint.to) {
+                return Reading::Requirement {
+                    lower: None,
+                    upper: None,
+                };
+            }
+            reading(constraint)
+        });
+        let words = |index: usize| explain::words(&self.task, &self.plan, index);
+        let network = network.map_err(|Impossible(index)| vec![words(index)])?;
+        let own = |index: &usize| *index < known;
+        let sources = Sources {
+            requirements: network
+                .requirements
+                .iter()
+                .map(|index| index.filter(own))
+                .collect(),
+            links: network.links,
+        };
+        let mut horizon = Horizon::dispatchable(&network.network).map_err(|behind| {
+            let mut words: Vec<String> = behind
+                .iter()
+                .filter_map(|behind| sources.of(*behind))
+                .map(words)
+                .collect();
+            words.dedup();
+            words
+        })?;
+        for (node, _) in self.plan.nodes() {
+            if let Some(time) = self.happened(node) {
+                let _ = horizon.fix(network_node(node), time);
+            }
+        }
+        let pending = |node: &NodeId| !self.timed.iter().any(|(_, timed)| timed == node);
+        for (node, what) in self.plan.nodes() {
+            if matches!(what, Node::Timed(_)) && pending(&node) {
+                let _ = horizon.fix(network_node(node), self.nominal_time(node));
+            }
+        }
+        self.horizon = horizon;
+        self.sources = sources;
+        let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
+        self.durations = durations(&self.plan, &bounds);
+        Ok(())
+    }
+
+    fn with_horizon(
+        mission: &Mission,
+        horizon: Horizon,
+        sources: Sources,
+        bounds: &dyn Fn(&Constraint) -> Bounds,
+    ) -> Self {
+        let plan = mission.plan.plan.clone();
+        let at_nominal = plan.at(&mission.plan.nominal());
+        let ends = ends_of(&plan);
+        let durations = durations(&plan, bounds);
         let progress = Progress::new(&plan, &at_nominal.constraints);
+        let timed = plan
+            .nodes()
+            .filter(|(_, what)| matches!(what, Node::Timed(_)));
+        let mut timed: Vec<_> = timed
+            .map(|(node, _)| (mission.nominal[node.index()].clone(), node))
+            .collect();
+        timed.sort_by(|one, other| other.cmp(one));
         let mut dispatch = Self {
             task: Arc::clone(&mission.task),
             actions: at_nominal
@@ -123,9 +274,8 @@ impl Dispatch {
             sources,
             ends,
             durations,
-            bounding,
-            when_running: BTreeMap::new(),
             progress,
+            timed,
             resumed: mission
                 .running
                 .keys()
@@ -134,11 +284,17 @@ impl Dispatch {
             retries: BTreeMap::new(),
         };
         dispatch.begin(&mission.running);
-        Ok(dispatch)
+        dispatch
     }
 
     /// Time 0 has happened, and so have the starts of what is running.
     fn begin(&mut self, running: &BTreeMap<StepId, crate::event::Ticket>) {
+        if let Horizon::Dispatchable(_) = self.horizon {
+            // To the others the origin has always happened.
+            let _ = self
+                .horizon
+                .fix(network_node(NodeId::ZERO), &Rational::ZERO);
+        }
         self.progress
             .happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
         for step in running.keys() {
@@ -149,6 +305,15 @@ impl Dispatch {
             self.progress.happen(&self.plan, start, &Rational::ZERO);
             self.progress.ready.remove(&start);
             self.progress.running.insert(id);
+        }
+    }
+
+    /// It is `now`, by the plan's clock: timed initials have happened by then, as the problem says.
+    fn pass_time(&mut self, now: &Rational) {
+        while let Some((time, node)) = self.timed.pop_if(|(time, _)| *time <= *now) {
+            if let Horizon::Dispatchable(_) = self.horizon {
+                let _ = self.horizon.fix(network_node(node), &time);
+            }
         }
     }
 
@@ -220,89 +385,25 @@ impl Dispatch {
         let (earliest, latest) = self.window_of(node);
         Some(Planned { earliest, latest })
     }
+}
 
-    /// Once an instance runs, its duration is what the plan leaves open of it and may be anything
-    /// within these bounds.
-    pub(crate) fn leave_open_when_running(&mut self, id: InstanceId, bounds: Bounds) {
-        self.when_running.insert(id, bounds);
-    }
-
-    /// An instance runs: see [`Dispatch::leave_open_when_running`].
-    fn leave_open(&mut self, id: InstanceId) {
-        let Some((lower, upper)) = self.when_running.remove(&id) else {
-            return;
-        };
-        let mut duration = (lower.clone(), upper.clone());
-        for index in &self.bounding[id.index()] {
-            let constraint = &self.plan.constraints[*index];
-            if !is_open(constraint) {
-                duration = both(duration, given(constraint));
-            }
-        }
-        self.durations[id.index()] = duration;
-        for (id, is_upper) in self.open_bounds(id) {
-            let bound = if is_upper {
-                upper.clone()
-            } else {
-                lower.as_ref().map(|lower| -lower)
-            };
-            self.horizon.loosen(id, bound);
+/// For each instance, the bounds on its duration.
+fn durations(plan: &StnPlan, bounds: &dyn Fn(&Constraint) -> Bounds) -> Vec<Bounds> {
+    let mut durations = vec![(None, None); plan.instances.len()];
+    for constraint in &plan.constraints {
+        if let Some(id) = duration_of(plan, constraint) {
+            let known: &mut Bounds = &mut durations[id.index()];
+            *known = both(std::mem::take(known), bounds(constraint));
         }
     }
+    durations
+}
 
-    /// The network's constraints that come from what the plan leaves open of a duration, and
-    /// whether each is its upper bound.
-    fn open_bounds(&self, id: InstanceId) -> Vec<(elbowroom_stn::ConstraintId, bool)> {
-        let [start, _] = self.ends[id.index()];
-        let start = network_node(start);
-        let network = self.horizon.network();
-        let at_start = network.leaving(start).map(|id| (id, true));
-        let at_start = at_start.chain(network.entering(start).map(|id| (id, false)));
-        let is_own = |(own, _): &(elbowroom_stn::ConstraintId, bool)| {
-            let index = self.sources.get(own.index()).copied().flatten();
-            index.is_some_and(|index| {
-                let is_own = self.bounding[id.index()].contains(&index);
-                is_own && is_open(&self.plan.constraints[index])
-            })
-        };
-        at_start.filter(is_own).collect()
-    }
-
-    /// Goes by other bounds from now on; what has happened stays.
-    ///
-    /// # Errors
-    /// When no times satisfy these: the plan's constraints that contradict each other, in words.
-    pub(crate) fn rebound(
-        &mut self,
-        bounds: &dyn Fn(&Constraint) -> Bounds,
-    ) -> Result<(), Vec<String>> {
-        let (mut network, sources) = network(&self.plan, bounds);
-        let zero = network_node(NodeId::ZERO);
-        for (node, _) in self.plan.nodes().skip(1) {
-            if let Some(time) = self.happened(node) {
-                let node = network_node(node);
-                network.add(elbowroom_stn::Constraint::at_least(
-                    zero,
-                    node,
-                    time.clone(),
-                ));
-                network.add(elbowroom_stn::Constraint::at_most(zero, node, time.clone()));
-            }
-        }
-        self.sources = sources;
-        match ConsistentNetwork::try_from(network) {
-            Ok(network) => {
-                self.horizon = Horizon::whole(network);
-                Ok(())
-            }
-            Err(cycle) => {
-                let ids = cycle.constraints.iter();
-                let behind = ids.filter_map(|id| self.sources.get(id.index()).copied().flatten());
-                Err(behind
-                    .map(|index| explain::words(&self.task, &self.plan, index))
-                    .collect())
-            }
-        }
+fn bounds_of(reading: Reading) -> Bounds {
+    match reading {
+        Reading::Requirement { lower, upper } => (lower, upper),
+        Reading::Contingent { lower, upper } => (Some(lower), upper),
+        Reading::Impossible => (None, None),
     }
 }
 
@@ -310,14 +411,6 @@ impl Dispatch {
 fn both(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())
-}
-
-/// Whether a constraint says nothing but what a parameter is.
-fn is_open(constraint: &Constraint) -> bool {
-    matches!(
-        (&constraint.lower, &constraint.upper),
-        (Bound::Parameter(lower), Bound::Parameter(upper)) if lower == upper
-    )
 }
 
 /// The instance whose duration a constraint bounds.

@@ -1,6 +1,9 @@
 //! How far an executor looks when it asks when a time point may happen.
 
+use std::sync::Arc;
+
 use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{Dispatcher, Ground, LinkId, Step, UncertainNetwork};
 use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
 };
@@ -16,6 +19,18 @@ pub(crate) enum Horizon {
     /// What follows from each single constraint with a time point that has happened: what paper
     /// 1's dispatcher and `ROSPlan`'s see.
     OneHop(OneHop),
+    /// What follows from the network in a form in which that shows at each time point's neighbours,
+    /// the world deciding on some of them.
+    Dispatchable(Box<Dispatcher>),
+}
+
+/// What one end of a window comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Behind {
+    /// A constraint of the network.
+    Constraint(ConstraintId),
+    /// What the world may do.
+    Link(LinkId),
 }
 
 /// See [`Horizon::OneHop`].
@@ -45,10 +60,33 @@ impl Horizon {
         Self::OneHop(OneHop { network, happened })
     }
 
-    pub(crate) fn network(&self) -> &Network {
+    /// The network, ready to be dispatched.
+    ///
+    /// # Errors
+    /// Why it is not dynamically controllable.
+    pub(crate) fn dispatchable(network: &UncertainNetwork) -> Result<Self, Vec<Behind>> {
+        match network.dynamic() {
+            Ok(form) => Ok(Self::Dispatchable(Box::new(Dispatcher::new(Arc::new(
+                form,
+            ))))),
+            Err(conflict) => Err(grounds(&conflict.steps)),
+        }
+    }
+
+    /// Whether all that must come before a time point has happened, as far as that is known here.
+    pub(crate) fn is_ready(&self, node: NodeId) -> bool {
         match self {
-            Self::Whole(windows) => windows.network(),
-            Self::OneHop(one_hop) => &one_hop.network,
+            Self::Whole(_) | Self::OneHop(_) => true,
+            Self::Dispatchable(dispatcher) => dispatcher.is_ready(node),
+        }
+    }
+
+    /// When a time point that is ready may happen if nothing happens before. `Err` if it has to
+    /// wait for the end of that link, however late it comes.
+    pub(crate) fn earliest(&self, node: NodeId) -> Result<Option<Rational>, LinkId> {
+        match self {
+            Self::Whole(_) | Self::OneHop(_) => Ok(self.window(node).0),
+            Self::Dispatchable(dispatcher) => Ok(dispatcher.earliest(node)?.cloned()),
         }
     }
 
@@ -59,10 +97,12 @@ impl Horizon {
                 (window.earliest.clone(), window.latest.clone())
             }
             Self::OneHop(one_hop) => one_hop.window(node),
+            Self::Dispatchable(dispatcher) => dispatcher.bounds(node),
         }
     }
 
-    /// The node happens, or happened, at `time`. With [`Horizon::OneHop`] it does in any case.
+    /// The node happens, or happened, at `time`. But for [`Horizon::Whole`], it
+    /// does in any case.
     pub(crate) fn fix(&mut self, node: NodeId, time: &Rational) -> Result<(), Missed> {
         match self {
             Self::Whole(windows) => windows.fix(node, time).map_err(|out| Missed {
@@ -86,27 +126,62 @@ impl Horizon {
                 }
                 Ok(())
             }
+            Self::Dispatchable(dispatcher) => {
+                dispatcher.happen(node, time).map_err(|missed| Missed {
+                    end: missed.end,
+                    by: missed.by,
+                })
+            }
         }
     }
 
-    /// From now on a constraint demands only `bound`, or nothing. Who looks one hop far goes by
-    /// the bounds that the plan began with.
-    pub(crate) fn loosen(&mut self, id: ConstraintId, bound: Option<Rational>) {
-        if let Self::Whole(windows) = self {
-            windows.loosen(id, bound);
-        }
-    }
-
-    /// The constraints behind one end of a window, beginning far away from the node.
-    pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<ConstraintId> {
+    /// What stands behind one end of a window, beginning far away from the node.
+    pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<Behind> {
         match self {
             Self::Whole(windows) => windows
                 .grounds(node, end)
-                .map(|grounds| grounds.constraints)
+                .map(|grounds| {
+                    grounds
+                        .constraints
+                        .into_iter()
+                        .map(Behind::Constraint)
+                        .collect()
+                })
                 .unwrap_or_default(),
-            Self::OneHop(one_hop) => one_hop.grounds(node, end).into_iter().collect(),
+            Self::OneHop(one_hop) => {
+                let grounds = one_hop.grounds(node, end).into_iter();
+                grounds.map(Behind::Constraint).collect()
+            }
+            Self::Dispatchable(dispatcher) => behind(dispatcher, node, end),
         }
     }
+}
+
+/// What stands behind one end of a window of a node, or behind its link if that says more.
+fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<Behind> {
+    let (earliest, latest) = dispatcher.window(node);
+    let (least, most) = dispatcher.bounds(node);
+    let is_link = match end {
+        WindowEnd::Earliest => least.as_ref() != earliest,
+        WindowEnd::Latest => most.as_ref() != latest,
+    };
+    if is_link && let Some(link) = dispatcher.form().network().ending_at(node) {
+        return vec![Behind::Link(link)];
+    }
+    let mut behind = grounds(&dispatcher.behind(node, end));
+    if end == WindowEnd::Earliest {
+        // These lead from the node back to the event.
+        behind.reverse();
+    }
+    behind
+}
+
+fn grounds(steps: &[Step]) -> Vec<Behind> {
+    let ground = |step: &Step| match step.ground {
+        Ground::Requirement(id) => Behind::Constraint(id),
+        Ground::Early(link) | Ground::Late(link) => Behind::Link(link),
+    };
+    steps.iter().map(ground).collect()
 }
 
 impl OneHop {

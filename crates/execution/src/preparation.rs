@@ -16,9 +16,10 @@ pub enum Need {
     Orderings,
     /// The same, with as many differences of times fixed as it takes for every schedule to work.
     Network,
-    /// The same, with quantities left open.
+    /// The same, with quantities left open, and for which values the plan is guaranteed to work if
+    /// that can be found out.
     OpenNetwork,
-    /// The same, and for which values the plan is guaranteed to work.
+    /// The same; without knowing for which values the plan is guaranteed to work it is of no use.
     Envelope,
 }
 
@@ -52,7 +53,7 @@ pub trait Region {
     /// Why the plan is not guaranteed to work for these values; `None` if it is.
     fn objection(
         &mut self,
-        task: &Task,
+        task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &[Rational],
     ) -> Option<String>;

@@ -1,12 +1,17 @@
 //! A state that follows what happens: progression, as planners call it.
 //!
-//! The same type is what an executor's side *believes* and what a simulated world *is*. It applies
-//! the effects of happenings one by one; two happenings at one time do not interfere, or else the
-//! executed plan is not valid, which the judge says.
+//! The same type is what an executor's side *believes* and what a simulated world *is*. As for the
+//! judge, all that happens at one time is a group: conditions, guards and amounts are read in the
+//! state on arrival, before anything of that time has changed it, and over-all conditions count
+//! strictly between start and end, at the time of a group in between as it leaves things. Whether
+//! two happenings of a group interfere is not asked here: that makes the executed plan invalid,
+//! which the judge says.
 
 mod effects;
 mod motion;
+mod polynomial;
 mod reading;
+mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -20,7 +25,7 @@ use elbowroom_num::{Interval, Rational};
 pub use reading::Unreadable;
 
 use crate::event::{Measured, Ticket};
-use motion::Rate;
+use motion::{Motion, Rate};
 
 /// The state at one moment, with what is under way.
 #[derive(Clone, Debug)]
@@ -29,6 +34,12 @@ pub struct Progression {
     time: Rational,
     facts: Vec<bool>,
     values: Vec<Option<Rational>>,
+    /// The time of the present group: [`Progression::time`], or earlier for what is told late.
+    group: Rational,
+    /// What was true on arrival at the present group, where that has changed since.
+    facts_on_arrival: BTreeMap<FactId, bool>,
+    /// The values on arrival, likewise.
+    values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
     /// Facts about which reports contradict each other.
     doubtful_facts: BTreeSet<FactId>,
     /// Fluents about which reports contradict each other.
@@ -51,6 +62,20 @@ pub struct Underway {
     end_guards: Vec<bool>,
     /// For each continuous effect, whether it is at work.
     continuous: Vec<bool>,
+    /// The conjuncts of the over-all condition that have not held at some moment since the start.
+    broken: BTreeSet<usize>,
+}
+
+impl Underway {
+    /// The parts of the over-all condition that have not held at some moment since the start.
+    pub fn broken_parts(&self) -> Vec<&Condition> {
+        let Some(body) = self.action.durative() else {
+            return Vec::new();
+        };
+        let parts = body.over_all.conjuncts().into_iter().enumerate();
+        let broken = parts.filter(|(index, _)| self.broken.contains(index));
+        broken.map(|(_, part)| part).collect()
+    }
 }
 
 impl Progression {
@@ -69,6 +94,9 @@ impl Progression {
             time: Rational::ZERO,
             facts,
             values,
+            group: Rational::ZERO,
+            facts_on_arrival: BTreeMap::new(),
+            values_on_arrival: BTreeMap::new(),
             doubtful_facts: BTreeSet::new(),
             doubtful_values: BTreeSet::new(),
             timed: 0,
@@ -111,6 +139,14 @@ impl Progression {
         self.values.get(fluent.index()).and_then(Option::as_ref)
     }
 
+    /// A fluent's value on arrival at the present moment, before anything happened at it.
+    pub fn value_on_arrival(&self, fluent: FluentId) -> Option<&Rational> {
+        match self.values_on_arrival.get(&fluent) {
+            Some(value) => value.as_ref(),
+            None => self.value(fluent),
+        }
+    }
+
     /// Facts and values as the model knows them.
     pub fn state(&self) -> State {
         let facts = self.facts.iter().enumerate().filter(|(_, truth)| **truth);
@@ -135,16 +171,39 @@ impl Progression {
     pub fn advance(&mut self, to: &Rational) -> Result<(), Unreadable> {
         let mut outcome = Ok(());
         while let Some(timed) = self.task.timed().get(self.timed).filter(|t| t.time <= *to) {
-            let (time, changes) = (timed.time.clone(), timed.changes.clone());
+            let (time, mut changes) = (timed.time.clone(), timed.changes.clone());
             outcome = outcome.and(self.drift(&time));
+            changes.sort_by_key(|change| matches!(change, Change::Add(_)));
             for change in &changes {
                 let (change, amount) = self.amount(change, None, &[]);
                 outcome = outcome.and(amount.and_then(|amount| self.apply(change, &amount)));
             }
             self.timed += 1;
-            self.check_guards();
         }
         outcome.and(self.drift(to))
+    }
+
+    /// What comes next happened at `time`: lets time pass until then, or, if that is past, begins a
+    /// group of its own for it. Time is never taken back.
+    ///
+    /// # Errors
+    /// As [`Progression::advance`].
+    pub fn arrive(&mut self, time: &Rational) -> Result<(), Unreadable> {
+        if *time >= self.time {
+            let outcome = self.advance(time);
+            self.begin_group(time);
+            return outcome;
+        }
+        self.begin_group(time);
+        Ok(())
+    }
+
+    fn begin_group(&mut self, time: &Rational) {
+        if self.group != *time {
+            self.group.clone_from(time);
+            self.facts_on_arrival.clear();
+            self.values_on_arrival.clear();
+        }
     }
 
     /// An action starts now, or happens, if it is instantaneous. `measured` overrides the amounts
@@ -163,7 +222,7 @@ impl Progression {
         match &action.body {
             Body::Instantaneous(snap) => self.happen(snap, None, None, measured),
             Body::Durative(body) => {
-                let guards = |condition: &Condition| self.holds(condition, Some(planned));
+                let guards = |condition: &Condition| self.held_on_arrival(condition, Some(planned));
                 let end_guards = body.end.effects.iter();
                 let continuous = body.continuous.iter();
                 let underway = Underway {
@@ -174,12 +233,12 @@ impl Progression {
                         .map(|effect| guards(&effect.guard.at_start).unwrap_or(false))
                         .collect(),
                     action: Arc::clone(&action),
-                    start: self.time.clone(),
+                    start: self.group.clone(),
                     planned: planned.clone(),
+                    broken: BTreeSet::new(),
                 };
                 let outcome = self.happen(&body.start, Some(planned), None, measured);
                 self.running.insert(ticket, underway);
-                self.check_guards();
                 outcome
             }
         }
@@ -196,7 +255,7 @@ impl Progression {
         let Some(body) = underway.action.durative() else {
             return Ok(());
         };
-        let duration = &self.time - &underway.start;
+        let duration = &self.group - &underway.start;
         self.happen(
             &body.end,
             Some(&duration),
@@ -210,22 +269,33 @@ impl Progression {
         self.running.remove(&ticket);
     }
 
-    /// A fact is seen; whether that is news.
+    /// A fact is seen; whether that is news. It counts as having been so on arrival.
     pub fn see_fact(&mut self, fact: FactId, truth: bool) -> bool {
         let was_doubtful = self.doubtful_facts.remove(&fact);
         let is_news = self.fact(fact) != truth;
         self.set_fact(fact, truth);
-        self.check_guards();
+        self.facts_on_arrival.remove(&fact);
         is_news || was_doubtful
     }
 
-    /// A value is seen; whether that is news.
+    /// A value is seen; whether that is news. It counts as having been so on arrival.
     pub fn see_value(&mut self, fluent: FluentId, value: &Rational) -> bool {
         let was_doubtful = self.doubtful_values.remove(&fluent);
         let is_news = self.value(fluent) != Some(value);
         self.set_value(fluent, Some(value.clone()));
-        self.check_guards();
+        self.values_on_arrival.remove(&fluent);
         is_news || was_doubtful
+    }
+
+    /// A fact becomes true or false by itself.
+    pub fn change_fact(&mut self, fact: FactId, truth: bool) {
+        self.set_fact(fact, truth);
+    }
+
+    /// A fluent gets a value by itself.
+    pub fn change_value(&mut self, fluent: FluentId, value: &Rational) {
+        self.doubtful_values.remove(&fluent);
+        self.set_value(fluent, Some(value.clone()));
     }
 
     /// Nobody knows any more what these effects have done: what they write says nothing until it
@@ -248,18 +318,13 @@ impl Progression {
         !self.doubtful_facts.is_empty() || !self.doubtful_values.is_empty()
     }
 
-    /// The first running action whose over-all condition is not fulfilled.
+    /// The first running action whose over-all condition has not held at some moment that has
+    /// passed since it started; [`Underway::broken_parts`] has what. What fails just now has not
+    /// failed yet, as long as more can happen at this moment: see [`Progression::breaking`].
     pub fn broken(&self) -> Option<(Ticket, &Underway)> {
-        let is_broken = |(_, underway): &(&Ticket, &Underway)| {
-            let body = underway.action.durative();
-            body.is_some_and(|body| {
-                !body.over_all.is_trivial()
-                    && self.holds(&body.over_all, Some(&underway.planned)) != Ok(true)
-            })
-        };
         let mut running = self.running.iter();
         running
-            .find(is_broken)
+            .find(|(_, underway)| !underway.broken.is_empty())
             .map(|(ticket, underway)| (*ticket, underway))
     }
 
@@ -276,12 +341,28 @@ impl Progression {
         }
     }
 
+    /// From the present group on until `to`, where another one may come.
     fn drift(&mut self, to: &Rational) -> Result<(), Unreadable> {
         if *to <= self.time {
             return Ok(());
         }
         let elapsed = to - &self.time;
-        self.time = to.clone();
+        let motion = self.motion();
+        let (motion, outcome) = match motion {
+            Ok(motion) => (motion, Ok(())),
+            Err(why) => (Motion::default(), Err(why)),
+        };
+        self.watch(&motion, &elapsed);
+        for (fluent, value) in motion.after(&elapsed) {
+            self.set_value(fluent, Some(value));
+        }
+        self.time.clone_from(to);
+        self.begin_group(to);
+        outcome
+    }
+
+    /// What the continuous effects at work bring about.
+    fn motion(&self) -> Result<Motion, Unreadable> {
         let mut rates = Vec::new();
         for underway in self.running.values() {
             let Some(body) = underway.action.durative() else {
@@ -294,25 +375,19 @@ impl Progression {
                 duration: Some(&underway.planned),
             }));
         }
-        if rates.is_empty() {
-            return Ok(());
-        }
         let now = |fluent| {
             let value = self.value(fluent).cloned();
             value.ok_or(Unreadable::Undefined(fluent))
         };
-        for (fluent, value) in motion::moved(&rates, &elapsed, &now)? {
-            self.set_value(fluent, Some(value));
-        }
-        self.check_guards();
-        Ok(())
+        Motion::of(&rates, &now)
     }
 
     fn set_fact(&mut self, fact: FactId, truth: bool) {
         if self.facts.len() <= fact.index() {
             self.facts.resize(fact.index() + 1, false);
         }
-        self.facts[fact.index()] = truth;
+        let old = std::mem::replace(&mut self.facts[fact.index()], truth);
+        self.facts_on_arrival.entry(fact).or_insert(old);
         self.doubtful_facts.remove(&fact);
     }
 
@@ -320,7 +395,8 @@ impl Progression {
         if self.values.len() <= fluent.index() {
             self.values.resize(fluent.index() + 1, None);
         }
-        self.values[fluent.index()] = value;
+        let old = std::mem::replace(&mut self.values[fluent.index()], value);
+        self.values_on_arrival.entry(fluent).or_insert(old);
     }
 }
 

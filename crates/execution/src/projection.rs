@@ -107,7 +107,7 @@ fn ticket_of(
 fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
     let underway = state.running().get(&ticket)?;
     let body = underway.action.durative()?;
-    let unmet = state.unmet(&body.end.condition, Some(&underway.planned));
+    let unmet = state.unmet_on_arrival(&body.end.condition, Some(&underway.planned));
     (!unmet.is_empty()).then(|| Failure {
         action: Some(underway.action.name.clone()),
         condition: in_words(state, &unmet),
@@ -116,10 +116,8 @@ fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
 
 fn broken(state: &Progression) -> Option<Failure> {
     let (_, underway) = state.broken()?;
-    let body = underway.action.durative()?;
-    let unmet = state.unmet(&body.over_all, Some(&underway.planned));
     Some(Failure {
         action: Some(underway.action.name.clone()),
-        condition: in_words(state, &unmet),
+        condition: in_words(state, &underway.broken_parts()),
     })
 }

@@ -24,6 +24,38 @@ pub struct Reason {
     pub by: Option<Rational>,
     /// Since when this has been so.
     pub since: Option<Rational>,
+    /// What is still promised of the rest of the plan, if the executor makes promises.
+    pub promise: Option<Promise>,
+}
+
+/// What an executor can promise of the rest of a plan, the strongest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Promise {
+    /// It works whatever the world does within the envelope.
+    Envelope,
+    /// It works whatever the world does within a part of the envelope around what is planned.
+    PartOfEnvelope,
+    /// It works if what is still to begin takes as long as planned, however long it takes what is
+    /// under way to end.
+    Planned,
+    /// It can still work.
+    Luck,
+}
+
+impl Promise {
+    /// All of them, with the words by which traces name them.
+    pub const NAMES: &[(Self, &str)] = &[
+        (Self::Envelope, "envelope"),
+        (Self::PartOfEnvelope, "part-of-envelope"),
+        (Self::Planned, "planned"),
+        (Self::Luck, "luck"),
+    ];
+
+    /// The word by which traces name it.
+    pub fn name(self) -> &'static str {
+        let found = Self::NAMES.iter().find(|(promise, _)| *promise == self);
+        found.map_or("unknown", |(_, name)| name)
+    }
 }
 
 /// Kinds of [`Reason`].
@@ -106,6 +138,7 @@ impl Reason {
             behind: Vec::new(),
             by: None,
             since: None,
+            promise: None,
         }
     }
 

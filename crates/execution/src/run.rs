@@ -224,7 +224,10 @@ impl<'a> Run<'a> {
     /// Waits until the executor wants to be asked again, or somebody's patience ends.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
         let silence = self.next_silence();
-        let until = until.into_iter().chain(silence).min();
+        // More of what happens now may still come in; if not, some condition has failed.
+        let breaking =
+            (!self.belief.breaking().is_empty()).then(|| &self.now + &self.settings.epsilon);
+        let until = until.into_iter().chain(silence).chain(breaking).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
             return self.replan(&Reason::new(Cause::Late).about("the plan waits for nothing"));

@@ -1,6 +1,6 @@
 //! Boxes: an interval for each parameter.
 
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::{End, Interval, Rational};
 
 use crate::parameter::{ParameterId, Valuation};
 
@@ -59,5 +59,94 @@ impl DecoupledEnvelope {
             .iter()
             .zip(&other.intervals)
             .all(|(mine, theirs)| mine.intersection(theirs) == *theirs)
+    }
+}
+
+/// The lower or the upper end of an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// The lower end.
+    Lower,
+    /// The upper end.
+    Upper,
+}
+
+impl Side {
+    /// Both, the lower first: the order of an array with one entry for each.
+    pub const BOTH: [Self; 2] = [Self::Lower, Self::Upper];
+
+    /// The other one.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Lower => Self::Upper,
+            Self::Upper => Self::Lower,
+        }
+    }
+
+    /// Its position in [`BOTH`](Self::BOTH).
+    pub fn index(self) -> usize {
+        match self {
+            Self::Lower => 0,
+            Self::Upper => 1,
+        }
+    }
+
+    /// This end of an interval.
+    pub fn of(self, interval: &Interval) -> &End {
+        match self {
+            Self::Lower => &interval.lower,
+            Self::Upper => &interval.upper,
+        }
+    }
+
+    /// How far out this end of an interval lies: the upper end itself, minus the lower end, `None`
+    /// if infinite. Widening the interval makes it greater.
+    pub fn reach(self, interval: &Interval) -> Option<Rational> {
+        let value = self.of(interval).value()?;
+        Some(match self {
+            Self::Lower => -value,
+            Self::Upper => value.clone(),
+        })
+    }
+}
+
+/// One end of one parameter's interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BoxEnd {
+    /// The parameter.
+    pub parameter: ParameterId,
+    /// Which end.
+    pub side: Side,
+}
+
+impl BoxEnd {
+    /// All ends of boxes with that many parameters: lower and upper, parameter by parameter.
+    pub fn all(parameters: usize) -> impl Iterator<Item = Self> {
+        (0..parameters)
+            .map(ParameterId::from)
+            .flat_map(|parameter| Side::BOTH.map(|side| Self { parameter, side }))
+    }
+
+    /// How far out the end lies: see [`Side::reach`].
+    pub fn reach(self, envelope: &DecoupledEnvelope) -> Option<Rational> {
+        self.side.reach(envelope.interval(self.parameter))
+    }
+
+    /// The same box with this end moved.
+    pub fn with_reach(
+        self,
+        envelope: &DecoupledEnvelope,
+        reach: Option<Rational>,
+    ) -> DecoupledEnvelope {
+        let mut moved = envelope.clone();
+        let interval = &mut moved.intervals[self.parameter.index()];
+        match self.side {
+            Side::Lower => {
+                interval.lower = reach.map_or(End::Infinite, |reach| End::Closed(-reach));
+            }
+            Side::Upper => interval.upper = reach.map_or(End::Infinite, End::Closed),
+        }
+        moved
     }
 }

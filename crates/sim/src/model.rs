@@ -149,8 +149,8 @@ impl WorldModel {
             Some(rule) => rule.draw(planned, &self.resolution, rng),
             None => planned.clone(),
         };
-        // An action that takes time takes some.
-        duration.max(self.resolution.clone())
+        // An action that is planned to take time takes some.
+        duration.max(planned.min(&self.resolution).clone())
     }
 
     /// How long after its command an action starts.

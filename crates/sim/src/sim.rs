@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use elbowroom_execution::{Ending, Event, Measured, Observation, Progression, Ticket};
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body, Change, Effect, FactId, FluentId, SnapAction};
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, Effect, FactId, FluentId, SnapAction,
+};
 use elbowroom_num::Rational;
 use rand::Rng;
 
@@ -16,9 +18,14 @@ use crate::model::{ExogenousChange, Failure, WorldModel};
 
 /// A simulated world: true state, and what is going to happen.
 ///
-/// It is PDDL that happens. An action whose start condition does not hold does not start; one
-/// whose over-all or end condition does not hold when something happens, fails then. (An over-all
-/// condition on a number that moves is looked at whenever something happens, and at the end.)
+/// It is PDDL that happens, as the judge sees it: all that happens at one time is a group, whose
+/// conditions and amounts are read in the state on arrival. What is started at a moment belongs to
+/// its group, as long as the world has not been told to go on.
+///
+/// An action whose start condition does not hold does not start; one whose end condition does not
+/// hold fails when it would have ended; one whose over-all condition does not hold at some moment
+/// strictly between start and end, fails at once, or, where numbers move, at the next multiple of
+/// the world's resolution, unless something happens before that.
 #[derive(Debug)]
 pub struct SimWorld<'a> {
     model: &'a WorldModel,
@@ -100,34 +107,67 @@ impl<'a> SimWorld<'a> {
         });
     }
 
-    /// Something happens at `time`; conditions over intervals are looked at before and after.
-    fn happen(&mut self, time: Rational, coming: Option<&Coming>) {
-        // A fluent without a value that should move stays without.
-        let _ = self.truth.advance(&time);
-        self.now = time;
-        self.fail_broken();
-        match coming {
-            None => {}
-            Some(Coming::Start(ticket)) => self.start(*ticket),
-            Some(Coming::End(ticket)) => self.end(*ticket),
-            Some(Coming::Fail(ticket)) => self.fail(*ticket, "it broke down"),
-            Some(Coming::Exogenous(index)) => self.change(*index),
+    /// Time passes until `until`, or until something is told, if that `is_enough`.
+    fn proceed(&mut self, until: &Rational, is_enough: bool) {
+        loop {
+            self.happen_now();
+            let is_told = |world: &Self| is_enough && !world.untold.is_empty();
+            if is_told(self) || self.now >= *until {
+                return;
+            }
+            // Nothing more happens at this moment.
+            while let Some((ticket, why)) = self.first_broken() {
+                self.fail(ticket, &why);
+            }
+            if is_told(self) {
+                return;
+            }
+            let coming = self.agenda.keys().next().map(|(time, _)| time);
+            // Timed initials can break what is under way.
+            let next = coming.into_iter().chain(self.truth.next_timed());
+            let next = next.chain([until]).min().unwrap_or(until).clone();
+            let broken = self.truth.next_break(&next, &self.model.resolution);
+            let next = broken.into_iter().chain([next]).min().unwrap_or_default();
+            // A fluent without a value that should move stays without.
+            let _ = self.truth.advance(&next);
+            self.now = next;
         }
-        self.fail_broken();
     }
 
-    fn fail_broken(&mut self) {
-        while let Some((ticket, underway)) = self.truth.broken() {
-            let body = underway.action.durative();
-            let why = body.map_or_else(String::new, |body| {
-                let unmet = self.truth.unmet(&body.over_all, Some(&underway.planned));
-                let words = unmet
-                    .iter()
-                    .map(|condition| self.truth.task().describe_condition(condition));
-                format!("{} no longer held", words.collect::<Vec<_>>().join(" and "))
-            });
-            self.fail(ticket, &why);
+    /// All that is due by now happens.
+    fn happen_now(&mut self) {
+        let _ = self.truth.advance(&self.now);
+        while let Some(entry) = self.agenda.first_entry() {
+            if entry.key().0 > self.now {
+                break;
+            }
+            match entry.remove() {
+                Coming::Start(ticket) => self.start(ticket),
+                Coming::End(ticket) => self.end(ticket),
+                Coming::Fail(ticket) => self.fail(ticket, "it broke down"),
+                Coming::Exogenous(index) => self.change(index),
+            }
         }
+    }
+
+    /// An action whose over-all condition has failed, or fails from now on.
+    fn first_broken(&self) -> Option<(Ticket, String)> {
+        if let Some((ticket, underway)) = self.truth.broken() {
+            return Some((ticket, self.no_longer(&underway.broken_parts())));
+        }
+        let (ticket, parts) = self.truth.breaking().into_iter().next()?;
+        Some((ticket, self.no_longer(&parts)))
+    }
+
+    fn no_longer(&self, conditions: &[&Condition]) -> String {
+        format!("{} no longer held", self.in_words(conditions))
+    }
+
+    fn in_words(&self, conditions: &[&Condition]) -> String {
+        let words = conditions
+            .iter()
+            .map(|condition| self.truth.task().describe_condition(condition));
+        words.collect::<Vec<_>>().join(" and ")
     }
 
     fn start(&mut self, ticket: Ticket) {
@@ -151,12 +191,9 @@ impl<'a> SimWorld<'a> {
             .failing(&action.name)
             .filter(|failing| failure.random::<f64>() < failing.probability)
             .map(|failing| failing.when);
-        let unmet = self.truth.unmet(&snap.condition, Some(&planned));
+        let unmet = self.truth.unmet_on_arrival(&snap.condition, Some(&planned));
         if !unmet.is_empty() {
-            let words = unmet
-                .iter()
-                .map(|condition| self.truth.task().describe_condition(condition));
-            let why = format!("it needs {}", words.collect::<Vec<_>>().join(" and "));
+            let why = format!("it needs {}", self.in_words(&unmet));
             return self.fail(ticket, &why);
         }
         let is_instantaneous = matches!(action.body, Body::Instantaneous(_));
@@ -196,21 +233,22 @@ impl<'a> SimWorld<'a> {
         let Some(commanded) = self.actions.get(&ticket).cloned() else {
             return;
         };
-        let Some(body) = commanded.action.durative() else {
+        let (Some(body), Some(underway)) = (
+            commanded.action.durative(),
+            self.truth.running().get(&ticket),
+        ) else {
             return;
         };
-        let started = self
-            .truth
-            .running()
-            .get(&ticket)
-            .map(|underway| underway.start.clone());
-        let duration = &self.now - started.unwrap_or_default();
-        let unmet = self.truth.unmet(&body.end.condition, Some(&duration));
+        let broken = underway.broken_parts();
+        if !broken.is_empty() {
+            let why = self.no_longer(&broken);
+            return self.fail(ticket, &why);
+        }
+        let duration = &self.now - &underway.start;
+        let condition = &body.end.condition;
+        let unmet = self.truth.unmet_on_arrival(condition, Some(&duration));
         if !unmet.is_empty() {
-            let words = unmet
-                .iter()
-                .map(|condition| self.truth.task().describe_condition(condition));
-            let why = format!("its end needs {}", words.collect::<Vec<_>>().join(" and "));
+            let why = format!("its end needs {}", self.in_words(&unmet));
             return self.fail(ticket, &why);
         }
         let measured = self.measured(&commanded, &body.end, 1);
@@ -249,7 +287,7 @@ impl<'a> SimWorld<'a> {
             let rule = self.model.amount(action, &name)?;
             let nominal = value.evaluate(&mut |leaf| match leaf {
                 elbowroom_model::ground::Expression::Fluent(fluent) => {
-                    self.truth.value(*fluent).cloned()
+                    self.truth.value_on_arrival(*fluent).cloned()
                 }
                 elbowroom_model::ground::Expression::Duration => commanded.planned.clone(),
                 _ => None,
@@ -275,7 +313,7 @@ impl<'a> SimWorld<'a> {
                 let Some(fact) = fact_named(&task, name) else {
                     return;
                 };
-                self.truth.see_fact(fact, *truth);
+                self.truth.change_fact(fact, *truth);
                 Event::Fact {
                     fact,
                     truth: *truth,
@@ -285,7 +323,7 @@ impl<'a> SimWorld<'a> {
                 let Some(fluent) = fluent_named(&task, name) else {
                     return;
                 };
-                self.truth.see_value(fluent, value);
+                self.truth.change_value(fluent, value);
                 Event::Value {
                     fluent,
                     value: value.clone(),

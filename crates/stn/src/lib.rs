@@ -20,6 +20,8 @@
 //! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
 //! - [`MovingWindows`]: windows that follow as one time after another becomes known.
 //!
+//! Where the world decides some of the times, [`uncertain`] asks which promises can be kept.
+//!
 //! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
 //! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a
 //! [`Weight`] too. Every answer is exact, and the same on each run.
@@ -56,6 +58,7 @@ mod paths;
 mod schedule;
 #[cfg(feature = "testing")]
 pub mod testing;
+pub mod uncertain;
 mod weight;
 mod windows;
 

@@ -7,14 +7,16 @@ mod search;
 mod text;
 mod watch;
 
+use std::sync::Arc;
+
 use elbowroom::Explainer;
 use elbowroom::envelope::Oracle;
+use elbowroom::envelope::obligations::Refusal;
 use elbowroom::flow::{self, FlowError};
 use elbowroom::plan::ParametrizedPlan;
-use elbowroom::plan::obligations::Refusal;
 use elbowroom::plan::parametrize::VarySpec;
 
-use crate::args::{EnvelopeArgs, Guarantee, Method};
+use crate::args::{EnvelopeArgs, Method};
 use crate::exit::{Answer, Failure};
 use crate::input::{self, AnyPlan};
 use watch::Watch;
@@ -39,13 +41,14 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
             Err(error) => return Err(failure(error)),
         },
     };
+    let (task, plan) = (Arc::new(task), Arc::new(plan));
     let subject = Subject {
         arguments,
         plan: &plan,
         explainer: Explainer::new(&task, &plan, &arguments.epsilon),
         task: &task,
     };
-    let oracle = match Oracle::new(&task, &plan, &arguments.epsilon) {
+    let oracle = match Oracle::new(&task, &plan, &arguments.epsilon, arguments.guarantee.into()) {
         Ok(oracle) => oracle,
         Err(Refusal::NoNominalSchedule) => return fails::without_schedule(&subject),
         Err(refusal) => return Err(refused(&refusal)),
@@ -98,17 +101,6 @@ fn refuse_what_is_not_there_yet(arguments: &EnvelopeArgs) -> Result<(), Failure>
         return Err(Failure::new(
             format!("--method {method} is not available in this version"),
             "use --method irr, which widens one end at a time",
-        ));
-    }
-    let guarantee = match arguments.guarantee {
-        Guarantee::Weak => None,
-        Guarantee::Dynamic => Some("dynamic"),
-        Guarantee::Strong => Some("strong"),
-    };
-    if let Some(guarantee) = guarantee {
-        return Err(Failure::new(
-            format!("--guarantee {guarantee} is not available in this version"),
-            "use --guarantee weak: for all values there is a schedule, and every schedule works",
         ));
     }
     Ok(())

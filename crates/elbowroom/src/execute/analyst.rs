@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_envelope::{Oracle, irr};
+use elbowroom_envelope::{Guarantee, Oracle, irr};
 use elbowroom_execution::{Need, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -70,9 +70,14 @@ impl Analyst {
         })
     }
 
-    fn envelope(&self, task: &Task, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, String> {
+    fn envelope(
+        &self,
+        task: &Arc<Task>,
+        plan: &Arc<ParametrizedPlan>,
+    ) -> Result<DecoupledEnvelope, String> {
+        let (epsilon, guarantee) = (&self.settings.epsilon, self.settings.guarantee);
         let mut oracle =
-            Oracle::new(task, plan, &self.settings.epsilon).map_err(|error| error.to_string())?;
+            Oracle::new(task, plan, epsilon, guarantee).map_err(|error| error.to_string())?;
         let search = &self.settings.search;
         let run = irr(&mut oracle, search, &mut |_| ControlFlow::Continue(()));
         let run = run.map_err(|error| error.to_string())?;
@@ -97,16 +102,17 @@ impl Preparer for Analyst {
             return self.orderings(task, plan);
         }
         let nominal = freed.deordered.nominal.clone();
-        let plan = match need {
+        let plan = Arc::new(match need {
             Need::Orderings | Need::Network => flow::closed(task, freed, epsilon),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
-        };
+        });
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan)?),
-            Need::Orderings | Need::Network | Need::OpenNetwork => None,
+            Need::OpenNetwork => self.envelope(task, &plan).ok(),
+            Need::Orderings | Need::Network => None,
         };
         Ok(Prepared {
-            plan,
+            plan: Arc::unwrap_or_clone(plan),
             nominal,
             envelope,
         })
@@ -123,7 +129,7 @@ pub struct WholeRegion {
 impl Region for WholeRegion {
     fn objection(
         &mut self,
-        task: &Task,
+        task: &Arc<Task>,
         plan: &ParametrizedPlan,
         values: &[Rational],
     ) -> Option<String> {
@@ -135,7 +141,8 @@ impl Region for WholeRegion {
         for (parameter, value) in plan.parameters.iter_mut().zip(values) {
             parameter.nominal = value.clone();
         }
-        let mut oracle = match Oracle::new(task, &plan, &self.epsilon) {
+        let plan = Arc::new(plan);
+        let mut oracle = match Oracle::new(task, &plan, &self.epsilon, Guarantee::Weak) {
             Ok(oracle) => oracle,
             Err(refusal) => return Some(refusal.to_string()),
         };

@@ -2,13 +2,14 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 use elbowroom::{Explainer, Explanation, parse_box, write_box};
-use elbowroom_envelope::{Objection, Oracle, Settings, irr, sharpen};
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::{Guarantee, Objection, Oracle, Settings, irr, sharpen};
 use elbowroom_model::validate::{self, validate};
 use elbowroom_model::{Task, Verdict};
 use elbowroom_num::Rational;
-use elbowroom_plan::obligations::Requirement;
 use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan, format};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,8 +18,8 @@ use super::draw;
 
 /// An STN plan with its problem.
 pub(crate) struct Case {
-    pub(crate) task: Task,
-    pub(crate) plan: ParametrizedPlan,
+    pub(crate) task: Arc<Task>,
+    pub(crate) plan: Arc<ParametrizedPlan>,
 }
 
 /// The least separation in all of the authors' runs.
@@ -44,11 +45,14 @@ impl Case {
         let mut task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
         let plan =
             format::read(plan.as_bytes(), &mut task).unwrap_or_else(|error| panic!("{error}"));
-        Self { task, plan }
+        Self {
+            task: Arc::new(task),
+            plan: Arc::new(plan),
+        }
     }
 
-    pub(crate) fn oracle(&self) -> Oracle<'_> {
-        Oracle::new(&self.task, &self.plan, &epsilon()).expect("within reach")
+    pub(crate) fn oracle(&self) -> Oracle {
+        Oracle::new(&self.task, &self.plan, &epsilon(), Guarantee::Weak).expect("within reach")
     }
 
     /// Whether the plan works everywhere in the box (`dur_0=[7/4,9]`; what is left out is nominal).
@@ -78,7 +82,7 @@ impl Case {
     pub(crate) fn broken(&self) -> Option<Requirement> {
         match self.objection(&DecoupledEnvelope::point(&self.plan.nominal()))? {
             (Objection::Broken(broken), _) => Some(broken.requirement),
-            (Objection::NoSchedule(_), explanation) => panic!("{explanation:?}"),
+            (_, explanation) => panic!("{explanation:?}"),
         }
     }
 
@@ -103,7 +107,8 @@ impl Case {
             irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).expect("within reach");
         let envelope = run.envelope.expect("the start point is inside");
         let sharp = sharpen(&mut oracle, &envelope, &mut || ControlFlow::Continue(()))
-            .expect("within reach");
+            .expect("within reach")
+            .expect("a box that was found is inside");
         assert!(sharp.includes(&envelope));
         self.assert_withstands(&envelope);
         self.assert_withstands(&sharp);

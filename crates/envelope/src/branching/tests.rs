@@ -1,7 +1,7 @@
 //! Against the plain way: all corners, one after the other.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::reduction::BoxEnd;
+use elbowroom_plan::BoxEnd;
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId as ClassId};
 use proptest::prelude::*;
 

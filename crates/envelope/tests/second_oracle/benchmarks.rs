@@ -8,13 +8,13 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
-use elbowroom_envelope::{Oracle, Settings, irr};
+use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, format};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, format};
 
 use crate::instances::{Instance, figure_3, figure_4};
 use crate::setting;
@@ -51,7 +51,8 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
         if is_generator && nodes > most_nodes {
             continue;
         }
-        let mut oracle = Oracle::new(&task, &plan, &epsilon).expect("within reach");
+        let mut oracle =
+            Oracle::new(&task, &plan, &epsilon, Guarantee::Weak).expect("within reach");
         let run = irr(&mut oracle, &Settings::default(), &mut |_| {
             ControlFlow::Continue(())
         });
@@ -116,7 +117,7 @@ struct Tally {
 }
 
 /// `None` for a plan file without a plan.
-fn read(instance: &Instance) -> Option<(Task, ParametrizedPlan)> {
+fn read(instance: &Instance) -> Option<(Arc<Task>, Arc<ParametrizedPlan>)> {
     let bytes = |path: &Path| std::fs::read(path).expect("a benchmark file");
     let text = bytes(&instance.plan);
     if text.iter().all(u8::is_ascii_whitespace) {
@@ -127,5 +128,5 @@ fn read(instance: &Instance) -> Option<(Task, ParametrizedPlan)> {
         .expect("a readable problem");
     let mut task = Task::new(problem);
     let plan = format::read(&text, &mut task).expect("a readable plan");
-    Some((task, plan))
+    Some((Arc::new(task), Arc::new(plan)))
 }

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
-use elbowroom_envelope::{Objection, Oracle};
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::soundness::Broken;
+use elbowroom_envelope::{Guarantee, Objection, Oracle};
 use elbowroom_model::Task;
 use elbowroom_model::validate::Verdict;
 use elbowroom_num::Rational;
-use elbowroom_plan::obligations::Requirement;
-use elbowroom_plan::reduction::{BoxEnd, Side};
-use elbowroom_plan::soundness::Broken;
 use elbowroom_plan::{
-    DecoupledEnvelope, Node, NodeId, Parameter, ParameterId, ParametrizedPlan, Valuation,
+    BoxEnd, DecoupledEnvelope, Node, NodeId, Parameter, ParameterId, ParametrizedPlan, Side,
+    Valuation,
 };
 
 use crate::case::{Case, show};
@@ -28,15 +29,14 @@ const MOST_GROUPS: usize = 1500;
 /// A box to ask about.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
-    /// This one.
+    /// This one, as the box to widen from now on.
     Jump(DecoupledEnvelope),
-    /// The last one accepted with one end moved out by so much, or to infinity. `is_hinted`: the
-    /// oracle is told which end.
-    Widen {
-        end: BoxEnd,
-        by: Option<Rational>,
-        is_hinted: bool,
-    },
+    /// This one, whatever box is being widened.
+    Look(DecoupledEnvelope),
+    /// The box that is being widened with one end moved out by so much, or to infinity.
+    Widen { end: BoxEnd, by: Option<Rational> },
+    /// The same, but only to know; the box is not widened.
+    LookWider { end: BoxEnd, by: Option<Rational> },
 }
 
 /// What came of it all.
@@ -93,6 +93,7 @@ impl Script {
     /// Asks about all boxes, one after the other, the same fast oracle.
     pub(crate) fn run(&self, solver: Option<&mut Z3>) -> Result<Tally, Mismatch> {
         let (task, plan) = self.case.build();
+        let (task, plan) = (Arc::new(task), Arc::new(plan));
         let mut contest = Contest {
             case: &self.case,
             task: &task,
@@ -102,7 +103,7 @@ impl Script {
             dice: Dice::new(1),
             tally: Tally::default(),
         };
-        let mut oracle = match Oracle::new(&task, &plan, &self.case.epsilon) {
+        let mut oracle = match Oracle::new(&task, &plan, &self.case.epsilon, Guarantee::Weak) {
             Ok(oracle) => oracle,
             Err(refusal) => {
                 contest.tally.count("plans refused");
@@ -113,17 +114,20 @@ impl Script {
             }
         };
         contest.tally.count("plans");
-        let mut accepted: Option<DecoupledEnvelope> = None;
         for step in &self.steps {
-            let Some((envelope, hint)) = next_box(step, accepted.as_ref(), &plan.parameters) else {
+            let Some(envelope) = next_box(step, oracle.accepted(), &plan.parameters) else {
                 continue;
             };
-            let Some(is_inside) = contest.ask(&mut oracle, &envelope, hint)? else {
+            let before = oracle.accepted().cloned();
+            let Some(is_inside) = contest.ask(&mut oracle, step, &envelope)? else {
                 break;
             };
-            if is_inside {
-                accepted = Some(envelope);
-            }
+            let is_kept = match step {
+                Step::Jump(_) | Step::Widen { .. } => is_inside,
+                Step::Look(_) | Step::LookWider { .. } => false,
+            };
+            let expected = if is_kept { Some(envelope) } else { before };
+            assert_eq!(oracle.accepted(), expected.as_ref(), "{step:?}");
         }
         Ok(contest.tally)
     }
@@ -133,17 +137,17 @@ fn next_box(
     step: &Step,
     accepted: Option<&DecoupledEnvelope>,
     parameters: &[Parameter],
-) -> Option<(DecoupledEnvelope, Option<BoxEnd>)> {
+) -> Option<DecoupledEnvelope> {
     match step {
-        Step::Jump(envelope) => Some((envelope.clone(), None)),
-        Step::Widen { end, by, is_hinted } => {
+        Step::Jump(envelope) | Step::Look(envelope) => Some(envelope.clone()),
+        Step::Widen { end, by } | Step::LookWider { end, by } => {
             let accepted = accepted?;
             let reach = end.reach(accepted)?;
             let widened = end.with_reach(accepted, by.as_ref().map(|by| reach + by));
             let range = &parameters[end.parameter.index()].range;
             let interval = widened.interval(end.parameter);
             let is_in_range = range.intersection(interval) == *interval;
-            is_in_range.then_some((widened, is_hinted.then_some(*end)))
+            is_in_range.then_some(widened)
         }
     }
 }
@@ -158,7 +162,7 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
     for _ in 0..length {
         let end = BoxEnd {
             parameter: ParameterId::from(dice.below(parameters.len())),
-            side: *dice.pick(&[Side::Lower, Side::Upper]),
+            side: *dice.pick(&Side::BOTH),
         };
         let by = (!dice.chance(8)).then(|| {
             dice.pick(&[
@@ -171,17 +175,12 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
             .clone()
         });
         steps.push(match dice.below(8) {
-            0 => Step::Jump(random_box(dice, &nominal, parameters)),
-            1 => Step::Widen {
-                end,
-                by,
-                is_hinted: false,
+            0 => match random_box(dice, &nominal, parameters) {
+                envelope if dice.chance(50) => Step::Jump(envelope),
+                envelope => Step::Look(envelope),
             },
-            _ => Step::Widen {
-                end,
-                by,
-                is_hinted: true,
-            },
+            1 => Step::LookWider { end, by },
+            _ => Step::Widen { end, by },
         });
     }
     steps
@@ -232,12 +231,17 @@ impl Contest<'_> {
     /// Whether the box is inside; `None` if the fast oracle has no answer.
     fn ask(
         &mut self,
-        oracle: &mut Oracle<'_>,
+        oracle: &mut Oracle,
+        step: &Step,
         envelope: &DecoupledEnvelope,
-        hint: Option<BoxEnd>,
     ) -> Result<Option<bool>, Mismatch> {
         self.tally.count("boxes");
-        let fast = match oracle.objection_after(envelope, hint) {
+        let fast = match step {
+            Step::Jump(_) => oracle.start(envelope),
+            Step::Look(_) | Step::LookWider { .. } => oracle.objection(envelope),
+            Step::Widen { end, .. } => oracle.objection_to_reach(*end, end.reach(envelope)),
+        };
+        let fast = match fast {
             Ok(fast) => fast,
             Err(refusal) => {
                 let reason = format!("{refusal:?}");
@@ -254,6 +258,7 @@ impl Contest<'_> {
                 self.confirm_no_schedule(envelope, valuation)?;
             }
             Some(Objection::Broken(broken)) => self.confirm(oracle, envelope, broken)?,
+            Some(other) => panic!("{other:?}"),
         }
         self.compare_with_solver(envelope, is_inside)?;
         Ok(Some(is_inside))
@@ -316,7 +321,7 @@ impl Contest<'_> {
     /// The counterexample is a schedule in the box, and the judge refuses it.
     fn confirm(
         &mut self,
-        oracle: &Oracle<'_>,
+        oracle: &Oracle,
         envelope: &DecoupledEnvelope,
         broken: &Broken,
     ) -> Result<(), Mismatch> {

@@ -1,8 +1,7 @@
 //! Smaller cases with the same mistake.
 
 use elbowroom_model::problem::{Body, Condition, Effect, Expression, Unknown};
-use elbowroom_plan::reduction::BoxEnd;
-use elbowroom_plan::{Bound, InstanceId, Node, ParameterId, ParameterKind};
+use elbowroom_plan::{Bound, BoxEnd, InstanceId, Node, ParameterId, ParameterKind};
 
 use crate::case::{Case, instance_of};
 use crate::contest::{Script, Step};
@@ -160,11 +159,11 @@ fn without_parameter(script: &Script, removed: usize) -> Script {
         *id = moved(*id);
     }
     script.steps.retain_mut(|step| match step {
-        Step::Jump(envelope) => {
+        Step::Jump(envelope) | Step::Look(envelope) => {
             envelope.intervals.remove(removed);
             true
         }
-        Step::Widen { end, .. } => {
+        Step::Widen { end, .. } | Step::LookWider { end, .. } => {
             let keeps = end.parameter != gone;
             *end = BoxEnd {
                 parameter: moved(end.parameter),

@@ -7,6 +7,7 @@ use elbowroom_plan::{InstanceId, NodeId, StnPlan, network_node};
 use elbowroom_stn::WindowEnd;
 
 use super::{Bounds, Dispatch, duration_of};
+use crate::horizon::Behind;
 
 /// How many constraints of a long chain are named.
 const MOST_NAMED: usize = 4;
@@ -43,9 +44,13 @@ impl Dispatch {
     /// The plan's constraints behind one end of a node's window, in words. Of a long chain only
     /// the ends are named: the deadline, or whatever it begins with, and what is next to the node.
     pub(super) fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<String> {
-        let ids = self.horizon.grounds(network_node(node), end);
-        let named = |id: &elbowroom_stn::ConstraintId| {
-            let index = self.sources.get(id.index()).copied().flatten()?;
+        self.in_words(&self.horizon.grounds(network_node(node), end))
+    }
+
+    /// The plan's constraints behind something, in words.
+    fn in_words(&self, behind: &[Behind]) -> Vec<String> {
+        let named = |behind: &Behind| {
+            let index = self.sources.of(*behind)?;
             let timed = match self.plan.constraints[index].reason {
                 elbowroom_plan::Reason::Timed(timed) => Some(timed),
                 _ => None,
@@ -59,7 +64,7 @@ impl Dispatch {
                 None => words,
             })
         };
-        let mut chain: Vec<String> = ids.iter().filter_map(named).collect();
+        let mut chain: Vec<String> = behind.iter().filter_map(named).collect();
         chain.dedup();
         if chain.len() > MOST_NAMED {
             let last = chain.split_off(chain.len() - MOST_NAMED / 2);
@@ -72,11 +77,9 @@ impl Dispatch {
 
     /// Whether what limits an end is the duration of its own action.
     pub(super) fn is_limited_by_duration(&self, id: InstanceId, end: WindowEnd) -> bool {
-        let ids = self
-            .horizon
-            .grounds(network_node(self.ends[id.index()][1]), end);
-        let last = ids.last();
-        let index = last.and_then(|id| self.sources.get(id.index()).copied().flatten());
+        let node = network_node(self.ends[id.index()][1]);
+        let behind = self.horizon.grounds(node, end);
+        let index = behind.last().and_then(|behind| self.sources.of(*behind));
         index
             .is_some_and(|index| duration_of(&self.plan, &self.plan.constraints[index]) == Some(id))
     }

@@ -61,7 +61,6 @@ impl Dispatch {
         let local = self.local(time);
         let fixed = self.horizon.fix(network_node(start), &local);
         self.progress.happen(&self.plan, start, &local);
-        self.leave_open(id);
         self.progress.ready.remove(&start);
         self.retries.remove(&start);
         if start == end {

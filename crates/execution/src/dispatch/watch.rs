@@ -28,6 +28,7 @@ impl Dispatch {
             return at_the_end(moment);
         }
         let now = self.local(moment.now);
+        self.pass_time(&now);
         let mut orders = Vec::new();
         let mut wake: Option<(Rational, NodeId)> = None;
         let mut wake_at = |time: Rational, node: NodeId| {
@@ -36,11 +37,20 @@ impl Dispatch {
             }
         };
         for node in self.progress.ready.iter().copied() {
-            let (earliest, latest) = self.horizon.window(network_node(node));
-            let earliest = earliest.max(self.held_until(node));
-            match earliest.filter(|earliest| *earliest > now) {
-                Some(earliest) => wake_at(earliest, node),
-                None => orders.push(node),
+            if !self.horizon.is_ready(network_node(node)) {
+                if let Some((time, timed)) = self.timed.last() {
+                    wake_at(time.clone(), *timed);
+                }
+                continue;
+            }
+            let (_, latest) = self.horizon.window(network_node(node));
+            // Who waits for something that the world does is woken up by it.
+            if let Ok(earliest) = self.horizon.earliest(network_node(node)) {
+                let earliest = earliest.max(self.held_until(node));
+                match earliest.filter(|earliest| *earliest > now) {
+                    Some(earliest) => wake_at(earliest, node),
+                    None => orders.push(node),
+                }
             }
             if let Some(latest) = latest.filter(|latest| *latest >= now) {
                 wake_at(latest + &self.epsilon, node);
@@ -126,7 +136,7 @@ impl Dispatch {
     /// The windows are exact, so comparing each time point that is awaited with its own window
     /// finds out whether all of them can still happen now or later. They are not moved on by the
     /// mere passing of time, because something that has happened may be reported later.
-    fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
+    pub(crate) fn overdue(&self, moment: &Moment<'_>) -> Option<Reason> {
         let now = self.local(moment.now);
         for &id in &self.progress.running {
             let node = self.awaited(id);

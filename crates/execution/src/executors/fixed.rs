@@ -1,7 +1,7 @@
 //! `fixed:X`: paper 1's baseline BLEX(X).
 
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::Constraint;
+use elbowroom_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, duration_of, given, replan};
@@ -45,8 +45,52 @@ impl Fixed {
     }
 }
 
+/// When timed initials happen is known from the beginning: what keeps its distance from one of
+/// them, keeps it from time 0, which is one hop away.
+fn place_timed(plan: &mut StnPlan, nominal: &[Rational]) {
+    let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
+    let shifted = |bound: &Bound, by: &Rational| match bound {
+        Bound::Finite(value) => Some(Bound::Finite(value + by)),
+        Bound::Infinite => Some(Bound::Infinite),
+        Bound::Parameter(_) => None,
+    };
+    let negated = |bound: &Bound| match bound {
+        Bound::Finite(value) => Bound::Finite(-value),
+        other => other.clone(),
+    };
+    let placed = plan.constraints.iter().map(|constraint| {
+        let (from, to) = (constraint.from, constraint.to);
+        // In either direction: as bounds on what is not timed, counted from what is.
+        let (timed, other, lower, upper) = match (is_timed(from), is_timed(to)) {
+            (true, false) => (from, to, constraint.lower.clone(), constraint.upper.clone()),
+            (false, true) => (
+                to,
+                from,
+                negated(&constraint.upper),
+                negated(&constraint.lower),
+            ),
+            _ => return constraint.clone(),
+        };
+        let time = &nominal[timed.index()];
+        match (shifted(&lower, time), shifted(&upper, time)) {
+            (Some(lower), Some(upper)) if other != NodeId::ZERO => Constraint {
+                from: NodeId::ZERO,
+                to: other,
+                lower,
+                upper,
+                reason: constraint.reason.clone(),
+            },
+            _ => constraint.clone(),
+        }
+    });
+    plan.constraints = placed.collect();
+}
+
 impl Executor for Fixed {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let mut mission = mission.clone();
+        place_timed(&mut mission.plan.plan, &mission.nominal);
+        let mission = &mission;
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
             let Some(instance) = duration_of(plan, constraint) else {

@@ -1,10 +1,10 @@
 //! `guarded`: paper 1's executor DREEX.
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParameterId};
+use elbowroom_plan::{Constraint, DecoupledEnvelope};
 
 use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, replan};
+use crate::dispatch::{Dispatch, replan};
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::quantities::{Reading, amounts};
@@ -41,9 +41,9 @@ impl Executor for Guarded {
             let about = "the plan has no envelope";
             return Err(Box::new(Reason::new(Cause::GuaranteeLost).about(about)));
         };
-        let bounds = |constraint: &Constraint| bounds(constraint, &envelope);
+        let reading = |constraint: &Constraint| mission.plan.reading(constraint, &envelope);
         self.state = Some(Guard {
-            dispatch: Dispatch::new(mission, Sight::Whole, &bounds)?,
+            dispatch: Dispatch::controlled(mission, &reading)?,
             mission: mission.clone(),
             envelope,
         });
@@ -132,29 +132,4 @@ fn moved(end: &End, by: &End, slope: &Rational) -> End {
         }
         _ => End::Infinite,
     }
-}
-
-/// What the network is told of a constraint. A duration, and whatever else is one parameter
-/// exactly, may be anything in the parameter's interval; a constraint with a parameter on one side
-/// must hold whatever the parameter is.
-fn bounds(constraint: &Constraint, envelope: &DecoupledEnvelope) -> Bounds {
-    let least = |id: ParameterId| envelope.interval(id).lower.value().cloned();
-    let greatest = |id: ParameterId| envelope.interval(id).upper.value().cloned();
-    if let (Bound::Parameter(lower), Bound::Parameter(upper)) =
-        (&constraint.lower, &constraint.upper)
-        && lower == upper
-    {
-        return (least(*lower), greatest(*upper));
-    }
-    let lower = match &constraint.lower {
-        Bound::Infinite => None,
-        Bound::Finite(value) => Some(value.clone()),
-        Bound::Parameter(id) => greatest(*id),
-    };
-    let upper = match &constraint.upper {
-        Bound::Infinite => None,
-        Bound::Finite(value) => Some(value.clone()),
-        Bound::Parameter(id) => least(*id),
-    };
-    (lower, upper)
 }

@@ -1,6 +1,7 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
 mod limits;
+mod promise;
 
 use std::collections::BTreeMap;
 
@@ -11,21 +12,22 @@ use elbowroom_plan::{
 };
 
 use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, replan};
+use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
-use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
 use crate::odds::{Odds, Remainder};
 use crate::preparation::{Need, Region};
 use crate::quantities::{amounts, duration_parameters, places};
-use crate::reason::{Cause, Reason};
+use crate::reason::{Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "live",
     argument: Some("number of percentage points"),
     is_optional: true,
-    summary: "Holds the rest of the plan against its whole envelope after every observation, with \
-              the observed values fixed, and replans only when the rest is no longer guaranteed \
-              even if nothing deviates any more. With a number, also when nothing is under way and \
+    summary: "Dispatches so that the rest of the plan works whatever happens within its envelope. \
+              When something leaves it, makes the widest promise of the rest that still holds, with \
+              the observed values fixed, and replans only when the rest does not work even if \
+              nothing deviates any more. With a number, also when nothing is under way and \
               another plan is at least so many percentage points likelier to succeed in the world \
               that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
@@ -51,6 +53,8 @@ struct Live {
 /// A plan, and what is known of its open quantities.
 struct Rest {
     dispatch: Dispatch,
+    /// What holds of what is left.
+    promise: Promise,
     mission: Mission,
     /// What was observed, and for the rest what is planned.
     values: Valuation,
@@ -66,22 +70,17 @@ struct Rest {
 impl Executor for Live {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan;
-        let values = plan.nominal();
-        let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
-        let bounds = |constraint: &Constraint| bounds(plan, constraint, &values, &runs);
-        let mut dispatch = Dispatch::new(mission, Sight::Whole, &bounds)?;
-        for (parameter, instance) in duration_parameters(plan) {
-            dispatch.leave_open_when_running(instance, range(plan, parameter));
-        }
+        let (dispatch, promise) = promise::begin(mission)?;
         let reads_numbers = plan.reads_numbers(&mission.task);
         let mut rest = Rest {
             dispatch,
+            promise,
             mission: mission.clone(),
             amounts: Vec::new(),
             reads_numbers,
             durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
-            values,
+            values: plan.nominal(),
         };
         rest.find_limits(&mission.now, self.region.as_mut());
         self.state = Some(rest);
@@ -105,8 +104,18 @@ impl Executor for Live {
         if let Some(reason) = rest.outlived(moment.now) {
             return replan(reason);
         }
+        if let Some(reason) = rest.dispatch.overdue(moment)
+            && let Err(reason) = rest.weaken(moment.now, reason)
+        {
+            return replan(*reason);
+        }
         let decided = rest.dispatch.next(moment);
-        rest.waking(decided)
+        let mut decided = rest.waking(decided);
+        decided.reason.promise = match decided.decision {
+            Decision::Start(_) | Decision::Wait { .. } => Some(rest.promise),
+            _ => None,
+        };
+        decided
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
@@ -117,16 +126,21 @@ impl Executor for Live {
 impl Rest {
     /// Takes note of what is new, and asks whether the rest is still guaranteed.
     fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
-        if let Some(reason) = self.dispatch.take(moment) {
-            return Some(reason);
-        }
-        if self.observe(moment)
-            && let Err(behind) = self.rebound()
-        {
-            let mut reason = Reason::new(Cause::GuaranteeLost)
-                .about("even if nothing deviates any more, too little time is left");
-            reason.behind = behind;
-            return Some(Box::new(reason.since(moment.now.clone())));
+        let trouble = self.dispatch.take(moment);
+        let moves_times = self.observe(moment);
+        if let Some(reason) = trouble {
+            if !promise::is_about_time(&reason) {
+                return Some(reason);
+            }
+            if let Err(reason) = self.weaken(moment.now, *reason) {
+                return Some(reason);
+            }
+        } else if moves_times {
+            let about = "even if nothing deviates any more, too little time is left";
+            let reason = Reason::new(Cause::GuaranteeLost).about(about);
+            if let Err(reason) = self.weaken(moment.now, reason.since(moment.now.clone())) {
+                return Some(reason);
+            }
         }
         // Only ends and amounts can move the rest out of its envelope.
         let step = moment.news.iter().find_map(may_matter);
@@ -182,16 +196,6 @@ impl Rest {
         );
         let reason = Reason::new(Cause::Likelier).about(about);
         Some(reason.since(moment.now.clone()))
-    }
-
-    /// Goes by the present values: what runs may take as long as it likes, what is to come takes
-    /// as long as planned.
-    fn rebound(&mut self) -> Result<(), Vec<String>> {
-        let running = self.dispatch.running().clone();
-        let runs = |instance: InstanceId| running.contains(&instance);
-        let (plan, values) = (&self.mission.plan, &self.values);
-        let bounds = |constraint: &Constraint| bounds(plan, constraint, values, &runs);
-        self.dispatch.rebound(&bounds)
     }
 
     /// Puts observed values in place of planned ones. Whether other times follow from them than
@@ -267,27 +271,6 @@ impl Rest {
 fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
     let range = &plan.parameter(parameter).range;
     (range.lower.value().cloned(), range.upper.value().cloned())
-}
-
-/// What runs may take as long as it likes, and every other parameter has its value.
-fn bounds(
-    plan: &ParametrizedPlan,
-    constraint: &Constraint,
-    values: &[Rational],
-    runs: &dyn Fn(InstanceId) -> bool,
-) -> Bounds {
-    if let Bound::Parameter(parameter) = &constraint.lower
-        && let ParameterKind::Duration(instance) = plan.parameter(*parameter).kind
-        && runs(instance)
-    {
-        return range(plan, *parameter);
-    }
-    let value = |bound: &Bound| match bound {
-        Bound::Infinite => None,
-        Bound::Finite(value) => Some(value.clone()),
-        Bound::Parameter(id) => Some(values[id.index()].clone()),
-    };
-    (value(&constraint.lower), value(&constraint.upper))
 }
 
 /// The step whose news can move the rest of a plan out of its envelope.

@@ -1,7 +1,10 @@
 //! `stn`: dispatch within the windows of the plan's network.
 
+use elbowroom_plan::uncertain::Reading;
+use elbowroom_plan::{Constraint, NodeId};
+
 use super::Registered;
-use crate::dispatch::{Dispatch, Sight, given, replan};
+use crate::dispatch::{Dispatch, duration_of, given, replan};
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::quantities::amounts;
@@ -11,8 +14,8 @@ pub(super) const REGISTERED: Registered = Registered {
     name: "stn",
     argument: None,
     is_optional: false,
-    summary: "Dispatches within the windows that follow from the whole network, with the \
-              durations that the domain allows, and replans when one is missed.",
+    summary: "Dispatches on the whole network, with the durations that the domain allows, and \
+              replans when something happens outside its window.",
     paper: "Dechter, Meiri & Pearl (1991); Muscettola, Morris & Tsamardinos (1998)",
     need: Need::Network,
     make: |_, _| Box::new(Stn { state: None }),
@@ -26,8 +29,17 @@ struct Stn {
 
 impl Executor for Stn {
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
-        let dispatch = Dispatch::new(mission, Sight::Whole, &given)?;
-        self.state = Some((dispatch, mission.clone()));
+        // Where the domain leaves a duration open the world may have its way, if the plan bears
+        // that; if not, the executor goes by the durations that are planned, or by what it can
+        // choose.
+        let attempt = |open: Open| {
+            let reading = |constraint: &Constraint| reading(mission, constraint, open);
+            Dispatch::controlled(mission, &reading)
+        };
+        let dispatch = attempt(Open::World)
+            .or_else(|_| attempt(Open::Planned))
+            .or_else(|_| attempt(Open::Executor));
+        self.state = Some((dispatch?, mission.clone()));
         Ok(())
     }
 
@@ -48,5 +60,40 @@ impl Executor for Stn {
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         self.state.as_ref()?.0.planned(step, is_end)
+    }
+}
+
+/// Who decides how long an action takes to which the domain leaves that open.
+#[derive(Clone, Copy, Debug)]
+enum Open {
+    /// The world, as long as the domain allows.
+    World,
+    /// The executor, who tells the action at its start to take as long as planned.
+    Planned,
+    /// The executor.
+    Executor,
+}
+
+fn reading(mission: &Mission, constraint: &Constraint, open: Open) -> Reading {
+    let plan = &mission.plan.plan;
+    let (lower, upper) = given(constraint);
+    let is_open = lower != upper || lower.is_none();
+    let is_duration = duration_of(plan, constraint).is_some();
+    match (open, &lower) {
+        (Open::World, Some(least)) if is_duration && is_open && !least.is_negative() => {
+            Reading::Contingent {
+                lower: least.clone(),
+                upper,
+            }
+        }
+        (Open::Planned, _) if is_duration && is_open => {
+            let time = |node: NodeId| &mission.nominal[node.index()];
+            let planned = time(constraint.to) - time(constraint.from);
+            Reading::Requirement {
+                lower: Some(planned.clone()),
+                upper: Some(planned),
+            }
+        }
+        _ => Reading::Requirement { lower, upper },
     }
 }

@@ -1,6 +1,6 @@
-//! Effects: what a happening changes, and which guards that ends.
+//! Effects: what a happening changes.
 
-use elbowroom_model::ground::{Change, Condition, Effect, FluentId, SnapAction};
+use elbowroom_model::ground::{Change, Effect, FluentId, SnapAction};
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
@@ -8,7 +8,7 @@ use super::{Progression, Unreadable, reading};
 use crate::event::Measured;
 
 impl Progression {
-    /// The effects of a happening: all read the state on arrival, deletions come first.
+    /// The effects of a happening: all read the state on arrival, deletions come before additions.
     pub(super) fn happen(
         &mut self,
         snap: &SnapAction,
@@ -19,7 +19,7 @@ impl Progression {
         let mut outcome = Ok(());
         let takes_place = |(index, effect): &(usize, &Effect)| {
             guards.is_none_or(|guards| guards[*index])
-                && self.holds(&effect.guard.now, duration) == Ok(true)
+                && self.held_on_arrival(&effect.guard.now, duration) == Ok(true)
         };
         let effects = snap.effects.iter().enumerate();
         let due = effects
@@ -30,11 +30,10 @@ impl Progression {
         for (change, amount) in due {
             outcome = outcome.and(amount.and_then(|amount| self.apply(change, &amount)));
         }
-        self.check_guards();
         outcome
     }
 
-    /// A change with its amount, read now; 0 for facts.
+    /// A change with its amount, read on arrival; 0 for facts.
     pub(super) fn amount<'c>(
         &self,
         change: &'c Change,
@@ -46,7 +45,9 @@ impl Progression {
             Change::Update { fluent, value, .. } => {
                 match measured.iter().find(|measured| measured.fluent == *fluent) {
                     Some(measured) => Ok(measured.amount.clone()),
-                    None => reading::evaluate(value, duration, &self.values),
+                    None => {
+                        reading::evaluate(value, duration, &|fluent| self.value_on_arrival(fluent))
+                    }
                 }
             }
         };
@@ -69,36 +70,6 @@ impl Progression {
             }
         }
         Ok(())
-    }
-
-    /// Guards over the whole of an action must hold at every moment: each change can end them.
-    pub(super) fn check_guards(&mut self) {
-        let mut lost = Vec::new();
-        for (ticket, underway) in &self.running {
-            let Some(body) = underway.action.durative() else {
-                continue;
-            };
-            let fails = |condition: &Condition| {
-                !condition.is_trivial()
-                    && self.holds(condition, Some(&underway.planned)) != Ok(true)
-            };
-            let ends = body.end.effects.iter().enumerate();
-            let ends = ends.filter(|(_, effect)| fails(&effect.guard.over_all));
-            lost.extend(ends.map(|(index, _)| (*ticket, index, true)));
-            let rates = body.continuous.iter().enumerate();
-            let rates = rates.filter(|(_, effect)| fails(&effect.guard.over_all));
-            lost.extend(rates.map(|(index, _)| (*ticket, index, false)));
-        }
-        for (ticket, index, is_end) in lost {
-            if let Some(underway) = self.running.get_mut(&ticket) {
-                let guards = if is_end {
-                    &mut underway.end_guards
-                } else {
-                    &mut underway.continuous
-                };
-                guards[index] = false;
-            }
-        }
     }
 }
 

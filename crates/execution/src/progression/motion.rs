@@ -6,10 +6,7 @@ use elbowroom_model::ground::{Expression, FluentId};
 use elbowroom_num::Rational;
 
 use super::Unreadable;
-
-/// A polynomial in the time since the last happening; coefficients by power.
-#[derive(Clone, Debug, PartialEq)]
-struct Polynomial(Vec<Rational>);
+use super::polynomial::Polynomial;
 
 /// A continuous effect at work.
 pub(super) struct Rate<'a> {
@@ -18,123 +15,152 @@ pub(super) struct Rate<'a> {
     pub(super) duration: Option<&'a Rational>,
 }
 
-/// The values that moving fluents have after `elapsed`.
-///
-/// A rate may read fluents that move themselves, as long as none depends on itself in the end.
-pub(super) fn moved(
-    rates: &[Rate<'_>],
-    elapsed: &Rational,
-    now: &dyn Fn(FluentId) -> Result<Rational, Unreadable>,
-) -> Result<Vec<(FluentId, Rational)>, Unreadable> {
-    let mut waiting: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
-    for rate in rates {
-        waiting.entry(rate.fluent).or_default().push(rate);
-    }
-    let mut motion: BTreeMap<FluentId, Polynomial> = BTreeMap::new();
-    while let Some(&first) = waiting.keys().next() {
-        let is_ready = |rate: &&Rate<'_>| {
-            let mut is_ready = true;
-            rate.per_time
-                .visit_fluents(&mut |fluent| is_ready &= !waiting.contains_key(&fluent));
-            is_ready
-        };
-        let ready = waiting
-            .iter()
-            .find(|(_, rates)| rates.iter().all(is_ready))
-            .map(|(&fluent, _)| fluent)
-            .ok_or(Unreadable::Circular(first))?;
-        let mut speed = Polynomial(Vec::new());
-        for rate in waiting.remove(&ready).into_iter().flatten() {
-            let term = Polynomial::of(rate.per_time, rate.duration, &|fluent| match motion
-                .get(&fluent)
-            {
-                Some(polynomial) => Ok(polynomial.clone()),
-                None => Ok(Polynomial(vec![now(fluent)?])),
-            })?;
-            speed = speed.plus(&term);
+/// The values that move, as functions of the time that passes from now on.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Motion(BTreeMap<FluentId, Polynomial>);
+
+impl Motion {
+    /// What these rates bring about.
+    ///
+    /// A rate may read fluents that move themselves, as long as none depends on itself in the end.
+    pub(super) fn of(
+        rates: &[Rate<'_>],
+        now: &dyn Fn(FluentId) -> Result<Rational, Unreadable>,
+    ) -> Result<Self, Unreadable> {
+        let mut waiting: BTreeMap<FluentId, Vec<&Rate<'_>>> = BTreeMap::new();
+        for rate in rates {
+            waiting.entry(rate.fluent).or_default().push(rate);
         }
-        motion.insert(ready, speed.integral(now(ready)?));
+        let mut motion = Self::default();
+        while let Some(&first) = waiting.keys().next() {
+            let is_ready = |rate: &&Rate<'_>| {
+                let mut is_ready = true;
+                rate.per_time
+                    .visit_fluents(&mut |fluent| is_ready &= !waiting.contains_key(&fluent));
+                is_ready
+            };
+            let ready = waiting
+                .iter()
+                .find(|(_, rates)| rates.iter().all(is_ready))
+                .map(|(&fluent, _)| fluent)
+                .ok_or(Unreadable::Circular(first))?;
+            let mut speed = Polynomial::constant(Rational::ZERO);
+            for rate in waiting.remove(&ready).into_iter().flatten() {
+                let term = Fraction::of(rate.per_time, rate.duration, &|fluent| {
+                    motion.value(fluent, now)
+                })?;
+                speed = speed.plus(&term.as_polynomial()?);
+            }
+            motion.0.insert(ready, speed.integral(now(ready)?));
+        }
+        Ok(motion)
     }
-    Ok(motion
-        .into_iter()
-        .map(|(fluent, polynomial)| (fluent, polynomial.at(elapsed)))
-        .collect())
+
+    /// Whether nothing moves.
+    pub(super) fn is_still(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// A fluent's value as a function of time; `now` is what it is where it does not move.
+    pub(super) fn value(
+        &self,
+        fluent: FluentId,
+        now: &dyn Fn(FluentId) -> Result<Rational, Unreadable>,
+    ) -> Result<Polynomial, Unreadable> {
+        match self.0.get(&fluent) {
+            Some(polynomial) => Ok(polynomial.clone()),
+            None => Ok(Polynomial::constant(now(fluent)?)),
+        }
+    }
+
+    /// The values after `elapsed`.
+    pub(super) fn after(&self, elapsed: &Rational) -> Vec<(FluentId, Rational)> {
+        let moved = self.0.iter();
+        moved
+            .map(|(fluent, polynomial)| (*fluent, polynomial.at(elapsed)))
+            .collect()
+    }
 }
 
-impl Polynomial {
-    fn of(
+/// An expression as a function of time: one polynomial divided by another.
+pub(super) struct Fraction {
+    pub(super) numerator: Polynomial,
+    pub(super) denominator: Polynomial,
+}
+
+impl Fraction {
+    pub(super) fn of(
         expression: &Expression,
         duration: Option<&Rational>,
-        read: &dyn Fn(FluentId) -> Result<Self, Unreadable>,
+        read: &dyn Fn(FluentId) -> Result<Polynomial, Unreadable>,
     ) -> Result<Self, Unreadable> {
         let of = |part: &Expression| Self::of(part, duration, read);
         Ok(match expression {
-            Expression::Constant(value) => Self(vec![value.clone()]),
-            Expression::Fluent(fluent) => read(*fluent)?,
-            Expression::Duration => Self(vec![duration.ok_or(Unreadable::Open)?.clone()]),
+            Expression::Constant(value) => Polynomial::constant(value.clone()).into(),
+            Expression::Fluent(fluent) => read(*fluent)?.into(),
+            Expression::Duration => {
+                Polynomial::constant(duration.ok_or(Unreadable::Open)?.clone()).into()
+            }
             Expression::TotalTime | Expression::Unknown(_) => return Err(Unreadable::Open),
             Expression::Add(parts) => {
-                let mut sum = Self(Vec::new());
+                let mut sum = Self::from(Polynomial::constant(Rational::ZERO));
                 for part in parts {
                     sum = sum.plus(&of(part)?);
                 }
                 sum
             }
             Expression::Multiply(parts) => {
-                let mut product = Self(vec![Rational::ONE]);
+                let mut product = Self::from(Polynomial::constant(Rational::ONE));
                 for part in parts {
-                    product = product.times(&of(part)?);
+                    let factor = of(part)?;
+                    product.numerator = product.numerator.times(&factor.numerator);
+                    product.denominator = product.denominator.times(&factor.denominator);
                 }
                 product
             }
-            Expression::Subtract(left, right) => {
-                of(left)?.plus(&of(right)?.scaled(&-Rational::ONE))
+            Expression::Subtract(left, right) => of(left)?.minus(of(right)?),
+            Expression::Negate(part) => {
+                let mut part = of(part)?;
+                part.numerator = part.numerator.scaled(&-Rational::ONE);
+                part
             }
-            Expression::Negate(part) => of(part)?.scaled(&-Rational::ONE),
             Expression::Divide(left, right) => {
-                let divisor = of(right)?;
-                let [divisor] = divisor.0.as_slice() else {
-                    return Err(Unreadable::Quotient);
-                };
-                of(left)?.scaled(&divisor.reciprocal().ok_or(Unreadable::DivisionByZero)?)
+                let (left, right) = (of(left)?, of(right)?);
+                Self {
+                    numerator: left.numerator.times(&right.denominator),
+                    denominator: left.denominator.times(&right.numerator),
+                }
             }
         })
     }
 
     fn plus(&self, other: &Self) -> Self {
-        let count = self.0.len().max(other.0.len());
-        let at = |p: &Self, i: usize| p.0.get(i).cloned().unwrap_or_default();
-        Self((0..count).map(|i| at(self, i) + at(other, i)).collect())
-    }
-
-    fn times(&self, other: &Self) -> Self {
-        let count = (self.0.len() + other.0.len()).saturating_sub(1);
-        let mut product = vec![Rational::ZERO; count];
-        for (i, a) in self.0.iter().enumerate() {
-            for (j, b) in other.0.iter().enumerate() {
-                product[i + j] += a * b;
-            }
+        let left = self.numerator.times(&other.denominator);
+        let right = other.numerator.times(&self.denominator);
+        Self {
+            numerator: left.plus(&right),
+            denominator: self.denominator.times(&other.denominator),
         }
-        Self(product)
     }
 
-    fn scaled(&self, factor: &Rational) -> Self {
-        Self(self.0.iter().map(|c| c * factor).collect())
+    pub(super) fn minus(&self, mut other: Self) -> Self {
+        other.numerator = other.numerator.scaled(&-Rational::ONE);
+        self.plus(&other)
     }
 
-    fn integral(&self, initial: Rational) -> Self {
-        let mut power = Rational::ZERO;
-        let raised = self.0.iter().map(|c| {
-            power += &Rational::ONE;
-            c / &power
-        });
-        let mut coefficients = vec![initial];
-        coefficients.extend(raised);
-        Self(coefficients)
+    /// The same, if nothing that moves divides it.
+    fn as_polynomial(&self) -> Result<Polynomial, Unreadable> {
+        let divisor = self.denominator.as_constant().ok_or(Unreadable::Quotient)?;
+        let factor = divisor.reciprocal().ok_or(Unreadable::DivisionByZero)?;
+        Ok(self.numerator.scaled(&factor))
     }
+}
 
-    fn at(&self, time: &Rational) -> Rational {
-        let horner = |value: Rational, c: &Rational| value * time + c;
-        self.0.iter().rev().fold(Rational::ZERO, horner)
+impl From<Polynomial> for Fraction {
+    fn from(numerator: Polynomial) -> Self {
+        Self {
+            numerator,
+            denominator: Polynomial::constant(Rational::ONE),
+        }
     }
 }

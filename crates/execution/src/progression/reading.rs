@@ -30,14 +30,15 @@ pub enum Unreadable {
 struct Reading<'a> {
     state: &'a Progression,
     duration: Option<&'a Rational>,
+    /// Whether the state on arrival is meant, before anything of the present group.
+    is_on_arrival: bool,
 }
 
 impl Moment<Unreadable> for Reading<'_> {
     fn fact(&self, fact: FactId) -> Result<bool, Unreadable> {
-        if self.state.doubtful_facts.contains(&fact) {
-            return Err(Unreadable::DoubtfulFact(fact));
-        }
-        Ok(self.state.fact(fact))
+        let truth = self.state.fact_in_doubt(fact)?;
+        let before = self.state.facts_on_arrival.get(&fact);
+        Ok(*before.filter(|_| self.is_on_arrival).unwrap_or(&truth))
     }
 
     fn compare(
@@ -50,7 +51,13 @@ impl Moment<Unreadable> for Reading<'_> {
             if let Some(fluent) = self.state.doubtful_fluent(expression) {
                 return Err(Unreadable::DoubtfulValue(fluent));
             }
-            evaluate(expression, self.duration, &self.state.values)
+            evaluate(expression, self.duration, &|fluent| {
+                if self.is_on_arrival {
+                    self.state.value_on_arrival(fluent)
+                } else {
+                    self.state.value(fluent)
+                }
+            })
         };
         Ok(comparison.holds(&value(left)?, &value(right)?))
     }
@@ -66,9 +73,32 @@ impl Progression {
         condition: &Condition,
         duration: Option<&Rational>,
     ) -> Result<bool, Unreadable> {
+        self.read(condition, duration, false)
+    }
+
+    /// Whether a condition held on arrival at the present moment, before anything happened at it:
+    /// what counts for all that happens now.
+    ///
+    /// # Errors
+    /// When that cannot be said.
+    pub fn held_on_arrival(
+        &self,
+        condition: &Condition,
+        duration: Option<&Rational>,
+    ) -> Result<bool, Unreadable> {
+        self.read(condition, duration, true)
+    }
+
+    fn read(
+        &self,
+        condition: &Condition,
+        duration: Option<&Rational>,
+        is_on_arrival: bool,
+    ) -> Result<bool, Unreadable> {
         let basic = Reading {
             state: self,
             duration,
+            is_on_arrival,
         };
         match self.task.derivation() {
             Some(derivation) if derivation.is_read_by(condition) => {
@@ -98,7 +128,26 @@ impl Progression {
         parts
     }
 
-    fn doubtful_fluent(&self, expression: &Expression) -> Option<FluentId> {
+    /// The parts of a condition that did not hold on arrival, or say nothing.
+    pub fn unmet_on_arrival<'c>(
+        &self,
+        condition: &'c Condition,
+        duration: Option<&Rational>,
+    ) -> Vec<&'c Condition> {
+        let mut parts = condition.conjuncts();
+        parts.retain(|part| self.held_on_arrival(part, duration) != Ok(true));
+        parts
+    }
+
+    /// Whether a basic fact is true, if reports do not contradict each other about it.
+    pub(super) fn fact_in_doubt(&self, fact: FactId) -> Result<bool, Unreadable> {
+        if self.doubtful_facts.contains(&fact) {
+            return Err(Unreadable::DoubtfulFact(fact));
+        }
+        Ok(self.fact(fact))
+    }
+
+    pub(super) fn doubtful_fluent(&self, expression: &Expression) -> Option<FluentId> {
         let mut found = None;
         if !self.doubtful_values.is_empty() {
             expression.visit_fluents(&mut |fluent| {
@@ -112,15 +161,15 @@ impl Progression {
 }
 
 /// The value of an expression.
-pub(super) fn evaluate(
+pub(super) fn evaluate<'v>(
     expression: &Expression,
     duration: Option<&Rational>,
-    values: &[Option<Rational>],
+    values: &dyn Fn(FluentId) -> Option<&'v Rational>,
 ) -> Result<Rational, Unreadable> {
     let mut fault = None;
     let value = expression.evaluate(&mut |leaf| match leaf {
         Expression::Fluent(fluent) => {
-            let value = values.get(fluent.index()).cloned().flatten();
+            let value = values(*fluent).cloned();
             if value.is_none() {
                 fault = Some(Unreadable::Undefined(*fluent));
             }

@@ -72,9 +72,10 @@ impl Run<'_> {
         remark.or(is_early.then_some("its time is in the future; taken as now"))
     }
 
-    /// The belief is never taken back in time, so a late report changes the present state.
+    /// The belief is never taken back in time, so a late report changes the present state. What is
+    /// reported of one time is one group.
     fn believe_until(&mut self, time: &Rational) {
-        let _ = self.belief.advance(&time.max(self.belief.time()).clone());
+        let _ = self.belief.arrive(time);
     }
 
     fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
@@ -194,7 +195,7 @@ impl Run<'_> {
             if let Some(expression) = quantities::expression(action, is_end, measured.fluent) {
                 expression.visit_leaves(&mut |leaf| {
                     if let Expression::Fluent(fluent) = leaf {
-                        let value = self.belief.value(*fluent);
+                        let value = self.belief.value_on_arrival(*fluent);
                         values.extend(value.map(|value| (*fluent, value.clone())));
                     }
                 });

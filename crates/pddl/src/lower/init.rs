@@ -114,7 +114,9 @@ impl Reader {
     /// cannot become both true and false, nor one fluent get two values.
     fn refuse_contradiction(&mut self, time: &Rational, change: &TimedChange, content: &Node) {
         let contradicts = |other: &TimedInitial| {
-            other.time == *time && other.change != *change && subject(&other.change) == subject(change)
+            other.time == *time
+                && other.change != *change
+                && subject(&other.change) == subject(change)
         };
         if !self.problem.timed.iter().any(contradicts) {
             return;

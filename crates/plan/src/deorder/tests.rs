@@ -1,5 +1,3 @@
-mod random;
-
 use elbowroom_model::Step;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;

@@ -12,8 +12,7 @@ use crate::draw::{Purpose, keyed};
 
 impl World for SimWorld<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        self.now = now.clone().max(self.now.clone());
-        let _ = self.truth.advance(&self.now.clone());
+        self.proceed(now, false);
         match command {
             Command::Start {
                 ticket,
@@ -37,7 +36,7 @@ impl World for SimWorld<'_> {
                 if delay.is_positive() {
                     self.put(&self.now + delay, Coming::Start(*ticket));
                 } else {
-                    self.happen(self.now.clone(), Some(&Coming::Start(*ticket)));
+                    self.start(*ticket);
                 }
             }
             Command::Cancel { ticket } => {
@@ -55,26 +54,7 @@ impl World for SimWorld<'_> {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        while self.untold.is_empty() {
-            let first = self.agenda.keys().next().map(|(time, _)| time.clone());
-            // Timed initials can break what is under way.
-            let timed = self.truth.next_timed().cloned();
-            let is_timed = timed
-                .as_ref()
-                .is_some_and(|timed| first.as_ref().is_none_or(|first| timed < first));
-            let next = if is_timed { timed } else { first };
-            let Some(time) = next.filter(|time| time <= until) else {
-                let _ = self.truth.advance(until);
-                self.now = until.clone().max(self.now.clone());
-                break;
-            };
-            let coming = if is_timed {
-                None
-            } else {
-                self.agenda.pop_first().map(|(_, coming)| coming)
-            };
-            self.happen(time.max(self.now.clone()), coming.as_ref());
-        }
+        self.proceed(until, true);
         Ok(Passage {
             now: self.now.clone(),
             observations: std::mem::take(&mut self.untold),

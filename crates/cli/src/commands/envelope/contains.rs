@@ -15,7 +15,7 @@ use crate::look::{BAD, GOOD, Look, STRONG, styled};
 use crate::{number, output};
 
 /// Answers yes, or no with a counterexample.
-pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, text: &str) -> Answer {
+pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle, text: &str) -> Answer {
     let envelope = parse_box(text, subject.plan)
         .map_err(|error| Failure::new(format!("--contains: {error}"), ""))?;
     let objection = oracle.objection(&envelope).map_err(|r| refused(&r))?;

@@ -2,8 +2,7 @@
 
 use elbowroom::model::Task;
 use elbowroom::model::validate::Violation;
-use elbowroom::plan::reduction::Side;
-use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind};
+use elbowroom::plan::{DecoupledEnvelope, Node, ParameterId, ParameterKind, Side};
 use elbowroom::{Explanation, Shortfall};
 use serde_json::{Map, Value, json};
 
@@ -104,7 +103,7 @@ fn header(arguments: &EnvelopeArgs, task: &Task, answer: &str) -> Value {
         "plan": arguments.plan.display().to_string(),
         "settings": {
             "method": "irr",
-            "guarantee": "weak",
+            "guarantee": elbowroom::envelope::Guarantee::from(arguments.guarantee).name(),
             "growth": match arguments.growth {
                 Growth::Doubling => "doubling",
                 Growth::Constant => "constant",

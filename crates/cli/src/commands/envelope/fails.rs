@@ -50,11 +50,7 @@ pub(super) fn without_schedule(subject: &Subject<'_>) -> Answer {
 }
 
 /// Some schedule breaks the plan, although everything is as planned.
-pub(super) fn at_nominal(
-    subject: &Subject<'_>,
-    oracle: &Oracle<'_>,
-    objection: &Objection,
-) -> Answer {
+pub(super) fn at_nominal(subject: &Subject<'_>, oracle: &Oracle, objection: &Objection) -> Answer {
     let point = DecoupledEnvelope::point(&subject.plan.nominal());
     print(
         subject,

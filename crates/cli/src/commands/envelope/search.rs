@@ -4,8 +4,7 @@ use elbowroom::envelope::{
     Growth, Limit, Oracle, Settings, StopReason, Widening, irr, limits, sharpen,
 };
 use elbowroom::num::Rational;
-use elbowroom::plan::reduction::{BoxEnd, Side};
-use elbowroom::plan::{DecoupledEnvelope, ParameterId};
+use elbowroom::plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 
 use super::watch::{Stop, Watch};
 use super::{Subject, document, fails, refused, text};
@@ -42,7 +41,7 @@ pub(super) struct Step {
 }
 
 /// Searches, and prints what was found.
-pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) -> Answer {
+pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle, watch: &Watch) -> Answer {
     if watch.flow().is_break() {
         return nothing_yet(subject, watch.stop());
     }
@@ -75,14 +74,15 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
         StopReason::Converged => Stop::Converged,
         StopReason::CheckLimit => Stop::CheckLimit,
         StopReason::Cancelled => watch.stop(),
+        StopReason::Undecided => Stop::Undecided,
     };
     let mut envelope = match search.envelope {
         Ok(envelope) => envelope,
         Err(objection) => return fails::at_nominal(subject, &oracle, &objection),
     };
     if subject.arguments.sharpen && stop == Stop::Converged {
-        envelope =
-            sharpen(&mut oracle, &envelope, &mut || watch.flow()).map_err(|r| refused(&r))?;
+        let sharp = sharpen(&mut oracle, &envelope, &mut || watch.flow());
+        envelope = sharp.map_err(|r| refused(&r))?.unwrap_or(envelope);
         if watch.flow().is_break() {
             stop = watch.stop();
         }
@@ -91,7 +91,7 @@ pub(super) fn run(subject: &Subject<'_>, mut oracle: Oracle<'_>, watch: &Watch) 
     let checks = oracle.checks();
     drop(progress);
     let outcome = Outcome {
-        limits: what_limits(subject, &mut oracle, &envelope, watch)?,
+        limits: what_limits(subject, &mut oracle, &envelope, watch),
         envelope,
         widenings,
         checks,
@@ -120,12 +120,12 @@ fn nothing_yet(subject: &Subject<'_>, stop: Stop) -> Answer {
 /// is no time left to ask.
 fn what_limits(
     subject: &Subject<'_>,
-    oracle: &mut Oracle<'_>,
+    oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     watch: &Watch,
-) -> Result<Vec<[Option<String>; 2]>, Failure> {
+) -> Vec<[Option<String>; 2]> {
     if watch.flow().is_break() {
-        return Ok(vec![[None, None]; subject.plan.parameters.len()]);
+        return vec![[None, None]; subject.plan.parameters.len()];
     }
     let precision = &subject.arguments.precision;
     // A sharpened end has no room at all, so the smallest step tells what it touches.
@@ -134,20 +134,14 @@ fn what_limits(
     } else {
         precision.clone()
     };
-    let mut words = in_words(
-        subject,
-        &limits(oracle, envelope, &distance).map_err(|r| refused(&r))?,
-    );
+    let mut words = in_words(subject, &limits(oracle, envelope, &distance));
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
         if watch.flow().is_break() || words.iter().flatten().all(Option::is_some) {
             break;
         }
         distance = &distance + &distance;
-        let farther = in_words(
-            subject,
-            &limits(oracle, envelope, &distance).map_err(|r| refused(&r))?,
-        );
+        let farther = in_words(subject, &limits(oracle, envelope, &distance));
         for (known, found) in words
             .iter_mut()
             .flatten()
@@ -158,7 +152,7 @@ fn what_limits(
             }
         }
     }
-    Ok(words)
+    words
 }
 
 fn in_words(subject: &Subject<'_>, limits: &[[Option<Limit>; 2]]) -> Vec<[Option<String>; 2]> {
@@ -179,8 +173,5 @@ fn in_words(subject: &Subject<'_>, limits: &[[Option<Limit>; 2]]) -> Vec<[Option
 
 fn value_of(envelope: &DecoupledEnvelope, end: BoxEnd) -> Option<Rational> {
     let interval = envelope.interval(end.parameter);
-    match end.side {
-        Side::Lower => interval.lower.value().cloned(),
-        Side::Upper => interval.upper.value().cloned(),
-    }
+    end.side.of(interval).value().cloned()
 }

@@ -131,6 +131,10 @@ fn course(subject: &Subject<'_>, outcome: &Outcome) -> String {
             "The time limit came before the search was done; the intervals could be wider"
                 .to_owned()
         }
+        Stop::Undecided => {
+            "Some wider boxes have too many cases to tell apart; the intervals could be wider"
+                .to_owned()
+        }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
         }

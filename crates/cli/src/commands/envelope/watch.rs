@@ -15,6 +15,7 @@ pub(super) enum Stop {
     CheckLimit,
     TimeLimit,
     Cancelled,
+    Undecided,
 }
 
 impl Stop {
@@ -24,6 +25,7 @@ impl Stop {
             Self::CheckLimit => "check limit",
             Self::TimeLimit => "time limit",
             Self::Cancelled => "cancelled",
+            Self::Undecided => "too many cases",
         }
     }
 }

@@ -1,0 +1,100 @@
+//! Why no executor can keep to a box although there is a schedule for all values in it.
+
+use elbowroom_envelope::{ControlConflict, ControlGround};
+use elbowroom_plan::{DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, Reason};
+
+use super::Explainer;
+
+impl Explainer<'_> {
+    /// What an executor would have to know in advance, and what stands between that and a schedule.
+    pub(super) fn uncontrollable(&self, conflict: &ControlConflict) -> String {
+        let mut unknown: Vec<ParameterId> = Vec::new();
+        let mut between: Vec<String> = Vec::new();
+        for ground in &conflict.grounds {
+            match *ground {
+                ControlGround::Early(id) | ControlGround::Late(id) => {
+                    if !unknown.contains(&id) {
+                        unknown.push(id);
+                    }
+                }
+                ControlGround::Constraint(index) => {
+                    let words = self.constraint(index);
+                    if !between.contains(&words) {
+                        between.push(words);
+                    }
+                }
+            }
+        }
+        unknown.sort_unstable();
+        let unknown: Vec<String> = unknown.into_iter().map(|id| self.lasting(id)).collect();
+        let mut reason = match unknown.as_slice() {
+            [] => "no executor can see to this beforehand".to_owned(),
+            _ => format!("one would have to know in advance {}", listed(&unknown)),
+        };
+        if !between.is_empty() {
+            reason.push_str(": ");
+            reason.push_str(&between.join(", "));
+        }
+        reason
+    }
+
+    /// The same with the values that the parameters may take.
+    pub(super) fn uncontrollable_in(
+        &self,
+        conflict: &ControlConflict,
+        refused: &DecoupledEnvelope,
+    ) -> String {
+        let mut ids: Vec<ParameterId> = conflict.ends().iter().map(|end| end.parameter).collect();
+        ids.dedup();
+        let range = |id: ParameterId| {
+            let interval = refused.interval(id);
+            format!("{} in {interval}", self.plan.parameter(id).name)
+        };
+        let ranges: Vec<String> = ids.into_iter().map(range).collect();
+        let reason = self.uncontrollable(conflict);
+        match ranges.as_slice() {
+            [] => reason,
+            _ => format!("{reason} ({})", ranges.join(", ")),
+        }
+    }
+
+    fn lasting(&self, id: ParameterId) -> String {
+        match self.plan.parameter(id).kind {
+            ParameterKind::Duration(instance) => {
+                format!("how long {} takes", self.action_name(instance))
+            }
+            _ => self.quantity(id),
+        }
+    }
+
+    fn constraint(&self, index: usize) -> String {
+        let plan = &self.plan.plan;
+        let constraint = &plan.constraints[index];
+        let node = |id: NodeId| plan.node_words(self.task, id);
+        if let Reason::Timed(timed) = constraint.reason {
+            return format!(
+                "{}{}",
+                self.timed_change(constraint.from, timed),
+                self.at_time(timed)
+            );
+        }
+        let own = |id: NodeId| match plan.nodes[id.index()] {
+            Node::Start(instance) | Node::End(instance) => Some(instance),
+            _ => None,
+        };
+        match (own(constraint.from), own(constraint.to)) {
+            (Some(start), Some(end)) if start == end => {
+                format!("the duration of {}", self.action_name(start))
+            }
+            _ => format!("{} before {}", node(constraint.from), node(constraint.to)),
+        }
+    }
+}
+
+fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

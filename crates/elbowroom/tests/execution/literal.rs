@@ -1,0 +1,152 @@
+//! A plan executed to the letter: each action at its planned time, whatever comes of it.
+
+use std::sync::{Arc, Mutex};
+
+use elbowroom::execution::run::{self, Ports, Report};
+use elbowroom::execution::{
+    Cause, Decided, Decision, Ending, Executor, Mission, Moment, Need, News, NoPlanner, NoRecord,
+    Order, Planned, Prepared, Preparer, Reason, StepId,
+};
+use elbowroom::model::{State, Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::plan::{ParametrizedPlan, StnPlan};
+use elbowroom::sim::{SimWorld, WorldModel};
+
+use crate::scene::Scene;
+
+/// What came of it.
+pub(crate) struct Outcome {
+    pub(crate) report: Report,
+    /// What is true in the end.
+    pub(crate) truth: State,
+    /// Whether the goal is.
+    pub(crate) is_goal: bool,
+    /// What is believed when the last action has ended; `None` if something failed before.
+    pub(crate) belief: Option<State>,
+}
+
+/// Executes the plan of a scene to the letter, in the world where everything goes as planned.
+pub(crate) fn execute(scene: &Scene) -> Outcome {
+    let model = WorldModel::as_planned();
+    let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
+    let belief = Arc::new(Mutex::new(None));
+    let mut executor = Literal {
+        steps: Vec::new(),
+        left: 0,
+        belief: Arc::clone(&belief),
+    };
+    let report = run::run(
+        Arc::clone(&scene.task),
+        Some(&scene.plan),
+        &scene.settings,
+        Ports {
+            world: &mut world,
+            planner: &mut NoPlanner,
+            preparer: &mut AsItIs,
+            executor: &mut executor,
+            need: Need::Orderings,
+            recorder: &mut NoRecord,
+        },
+    );
+    let belief = belief.lock().expect("nobody panics").take();
+    Outcome {
+        report,
+        truth: world.truth().state(),
+        is_goal: world.truth().is_goal() == Ok(true),
+        belief,
+    }
+}
+
+/// Looks at nothing in the plan.
+struct AsItIs;
+
+impl Preparer for AsItIs {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        _plan: &TimeTriggeredPlan,
+        _need: Need,
+    ) -> Result<Prepared, String> {
+        let plan = StnPlan::unconstrained(task, Vec::new());
+        Ok(Prepared {
+            nominal: vec![Rational::ZERO; plan.nodes.len()],
+            plan: ParametrizedPlan {
+                plan,
+                parameters: Vec::new(),
+                initial: std::collections::BTreeMap::default(),
+                goal: task.goal().clone(),
+            },
+            envelope: None,
+        })
+    }
+}
+
+struct Literal {
+    /// What has not been started, the first one last.
+    steps: Vec<(StepId, elbowroom::model::Step)>,
+    left: usize,
+    belief: Arc<Mutex<Option<State>>>,
+}
+
+fn decided(decision: Decision, cause: Cause) -> Decided {
+    Decided {
+        decision,
+        reason: Reason::new(cause),
+    }
+}
+
+impl Executor for Literal {
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let steps = mission.time_triggered.steps.iter().cloned();
+        self.steps = (0..).map(StepId).zip(steps).collect();
+        self.steps.sort_by(|(_, a), (_, b)| b.start.cmp(&a.start));
+        self.left = self.steps.len();
+        Ok(())
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        for news in moment.news {
+            match news {
+                News::Ended {
+                    ending: Ending::Succeeded,
+                    ..
+                } => self.left -= 1,
+                News::Ended { .. } => return decided(Decision::Replan, Cause::Failed),
+                News::Started { step, .. } => {
+                    let _ = step;
+                }
+                other => panic!("{other:?} in a world where everything goes as planned"),
+            }
+        }
+        if moment.belief.broken().is_some() {
+            return decided(Decision::Replan, Cause::Condition);
+        }
+        let due = |(_, step): &(StepId, elbowroom::model::Step)| step.start <= *moment.now;
+        let mut orders = Vec::new();
+        while self.steps.last().is_some_and(due) {
+            let Some((id, step)) = self.steps.pop() else {
+                break;
+            };
+            orders.push(Order {
+                step: id,
+                action: Arc::new(step.action),
+                duration: step.duration,
+                planned: Planned::default(),
+            });
+        }
+        if !orders.is_empty() {
+            return decided(Decision::Start(orders), Cause::Due);
+        }
+        if self.left == 0 {
+            let belief = moment.belief;
+            *self.belief.lock().expect("nobody panics") = Some(belief.state());
+            return if belief.is_goal() == Ok(true) {
+                decided(Decision::GoalReached, Cause::GoalReached)
+            } else {
+                decided(Decision::Replan, Cause::PlanDone)
+            };
+        }
+        let until = self.steps.last().map(|(_, step)| step.start.clone());
+        decided(Decision::Wait { until }, Cause::NothingDue)
+    }
+}

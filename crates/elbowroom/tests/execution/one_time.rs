@@ -1,0 +1,296 @@
+//! What happens at one time is one group, in the simulated world, in what is believed of it, and
+//! for the judge.
+
+use std::fmt::Write as _;
+
+use elbowroom::execution::run::Verdict;
+use elbowroom::model::validate::{self, Mistake, validate};
+use elbowroom::num::Rational;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use crate::literal::execute;
+use crate::scene::{Scene, runs};
+
+fn domain(rest: &str) -> String {
+    format!(
+        "(define (domain d) (:requirements :durative-actions :fluents :negative-preconditions
+            :timed-initial-literals :continuous-effects :conditional-effects
+            :duration-inequalities)
+         (:predicates (p0) (p1) (p2) (p3)) (:functions (x) (y)) {rest})"
+    )
+}
+
+fn scene(actions: &str, init: &str, goal: &str, plan: &str) -> Scene {
+    let problem =
+        format!("(define (problem p) (:domain d) (:init (= (x) 0) {init}) (:goal {goal}))");
+    Scene::new(&domain(actions), &problem, Some(plan))
+}
+
+fn reaches_the_goal(scene: &Scene) {
+    let outcome = execute(scene);
+    assert_eq!(
+        outcome.report.verdict,
+        Verdict::GoalReached,
+        "{:#?}",
+        outcome.report.executed
+    );
+    assert!(outcome.is_goal);
+    let verdict = scene.judged(&outcome.report);
+    assert!(verdict.is_valid(), "{verdict:?}");
+}
+
+const MATCH: &str = "
+    (:durative-action light :parameters () :duration (= ?duration 8) :condition (at start (p3))
+      :effect (and (at start (p0)) (at end (not (p0)))))
+    (:durative-action mend :parameters () :duration (= ?duration 5)
+      :condition (over all (p0)) :effect (at end (p1)))";
+
+#[test]
+fn a_match_that_burns_out_just_as_the_mending_ends_is_enough() {
+    let plan = "0: (light) [8]\n3: (mend) [5]";
+    reaches_the_goal(&scene(MATCH, "(p3)", "(p1)", plan));
+    // In whichever order they were started.
+    let short = MATCH.replace("?duration 8", "?duration 2");
+    let plan = "0: (light) [2]\n0.5: (mend) [1.5]";
+    let short = short.replace("?duration 5", "?duration 1.5");
+    reaches_the_goal(&scene(&short, "(p3)", "(p1)", plan));
+}
+
+#[test]
+fn a_match_that_burns_out_before_the_mending_ends_is_not() {
+    let outcome = execute(&scene(
+        MATCH,
+        "(p3)",
+        "(p1)",
+        "0: (light) [8]\n3.001: (mend) [5]",
+    ));
+    assert_ne!(outcome.report.verdict, Verdict::GoalReached);
+    // It is known when the light goes out.
+    assert_eq!(outcome.report.time, Rational::from(8));
+}
+
+#[test]
+fn a_strict_comparison_may_become_an_equality_at_the_end() {
+    let drain = "(:durative-action drain :parameters () :duration (>= ?duration 0)
+        :condition (over all (> (x) 0))
+        :effect (and (decrease (x) (* #t 2)) (at end (p0))))";
+    reaches_the_goal(&scene(
+        &drain.replace("(> (x) 0)", "(> (+ (x) 10) 0)"),
+        "",
+        "(p0)",
+        "0: (drain) [5]",
+    ));
+    // One tick more, and it has failed.
+    let late = scene(
+        &drain.replace("(> (x) 0)", "(> (+ (x) 10) 0)"),
+        "",
+        "(p0)",
+        "0: (drain) [5.001]",
+    );
+    assert_ne!(execute(&late).report.verdict, Verdict::GoalReached);
+}
+
+/// What fails while numbers move is noticed at the next multiple of the resolution, not when the
+/// executor looks.
+#[test]
+fn a_number_that_leaves_its_bounds_and_comes_back_has_left_them() {
+    let actions = "
+        (:durative-action dive :parameters () :duration (= ?duration 10)
+          :condition (over all (>= (x) -3)) :effect (and (decrease (x) (* #t 1)) (at end (p0))))
+        (:durative-action rise :parameters () :duration (= ?duration 10)
+          :condition () :effect (increase (x) (* #t (y))))
+        (:durative-action push :parameters () :duration (= ?duration 10)
+          :condition () :effect (increase (y) (* #t 1)))";
+    // With a = 1 - y: x = -a until 1, and -a - a s + s²/2 at 1 + s; least at s = a.
+    let plan = "0: (dive) [10]\n0: (rise) [10]\n1: (push) [8]";
+    reaches_the_goal(&scene(actions, "(= (y) -0.6)", "(p0)", plan));
+    let deep = execute(&scene(actions, "(= (y) -1)", "(p0)", plan));
+    assert_ne!(deep.report.verdict, Verdict::GoalReached);
+    // -3 is reached at s = 2 - √2.
+    assert_eq!(deep.report.time, Rational::new(1586, 1000));
+}
+
+#[test]
+fn an_action_of_duration_0_takes_no_time() {
+    let blink = "(:durative-action blink :parameters () :duration (= ?duration 0)
+        :condition (at start (p3)) :effect (and (at start (p0)) (at end (p1))))";
+    let scene = scene(blink, "(p3)", "(and (p0) (p1))", "2: (blink) [0]");
+    reaches_the_goal(&scene);
+    let executed = execute(&scene).report.executed;
+    assert_eq!(executed[0].step.duration, Some(Rational::ZERO));
+    assert_eq!(executed[0].step.start, Rational::from(2));
+}
+
+/// One end gives what the other takes; neither reads it.
+#[test]
+fn two_ends_and_a_start_at_one_time_count_together() {
+    let actions = "
+        (:durative-action give :parameters () :duration (= ?duration 2)
+          :condition () :effect (at end (increase (x) 1)))
+        (:durative-action take :parameters () :duration (= ?duration 2)
+          :condition () :effect (at end (decrease (x) 1)))
+        (:durative-action lend :parameters () :duration (= ?duration 1)
+          :condition () :effect (and (at start (decrease (x) 1)) (at end (increase (x) 1))))
+        (:durative-action watch :parameters () :duration (= ?duration 5)
+          :condition (over all (>= (x) 0)) :effect (at end (p0)))";
+    for plan in [
+        "0: (watch) [5]\n1: (take) [2]\n1: (give) [2]",
+        "0: (watch) [5]\n1: (give) [2]\n1: (take) [2]",
+        // The start at 3 takes what the end at 3 gives.
+        "0: (watch) [5]\n1: (give) [2]\n3: (lend) [1]",
+    ] {
+        reaches_the_goal(&scene(actions, "", "(p0)", plan));
+    }
+    let outcome = execute(&scene(
+        actions,
+        "",
+        "(p0)",
+        "0: (watch) [5]\n1: (take) [2]\n2: (give) [2]",
+    ));
+    assert_ne!(outcome.report.verdict, Verdict::GoalReached);
+    assert_eq!(outcome.report.time, Rational::from(3));
+}
+
+/// Timed initials belong to the group of their time.
+#[test]
+fn a_timed_initial_may_end_what_just_ends_and_open_what_just_starts() {
+    let actions = "
+        (:durative-action pass :parameters () :duration (= ?duration 2)
+          :condition (over all (p0)) :effect (at end (p1)))
+        (:durative-action follow :parameters () :duration (= ?duration 2)
+          :condition (over all (not (p0))) :effect (at end (p2)))";
+    let plan = "1: (pass) [2]\n3: (follow) [2]";
+    let init = "(at 1 (p0)) (at 3 (not (p0)))";
+    reaches_the_goal(&scene(actions, init, "(and (p1) (p2))", plan));
+    let early = "0.999: (pass) [2]\n3: (follow) [2]";
+    let outcome = execute(&scene(actions, init, "(and (p1) (p2))", early));
+    assert_ne!(outcome.report.verdict, Verdict::GoalReached);
+}
+
+/// Random conditions, effects and plans, on a grid so coarse that most things coincide.
+#[test]
+fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
+    let (mut valid, mut invalid) = (0, 0);
+    for seed in 0..runs("ELBOWROOM_ONE_TIME_PLANS", 4000) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (domain, problem, plan) = random_problem(&mut rng);
+        let scene = Scene::new(&domain, &problem, Some(&plan));
+        let verdict = validate(&scene.task, &scene.plan, &validate::Settings::default());
+        let about = || format!("{seed}\n{domain}\n{problem}\n{plan}\n{verdict:?}");
+        match &verdict {
+            validate::Verdict::Valid(judged) => {
+                valid += 1;
+                let outcome = execute(&scene);
+                let report = &outcome.report;
+                assert_eq!(report.verdict, Verdict::GoalReached, "{}", about());
+                assert_eq!(outcome.truth, judged.state, "{}", about());
+                assert_eq!(outcome.belief.as_ref(), Some(&judged.state), "{}", about());
+                assert_eq!(report.time, judged.makespan, "{}", about());
+                let again = scene.judged(report);
+                assert!(again.is_valid(), "{}\n{again:?}", about());
+            }
+            validate::Verdict::Invalid(violation) => {
+                // Worlds do not ask how far apart things are.
+                if matches!(violation.mistake, Mistake::Condition { .. }) {
+                    invalid += 1;
+                    let outcome = execute(&scene);
+                    // The goal may hold all the same.
+                    let is_done = outcome.belief.is_some();
+                    let is_reached = outcome.report.verdict == Verdict::GoalReached;
+                    assert!(!(is_done && is_reached), "{}", about());
+                }
+            }
+            validate::Verdict::Undecided(_) => {}
+        }
+    }
+    assert!(valid > 300 && invalid > 300, "{valid}, {invalid}");
+}
+
+fn pick<'a>(rng: &mut ChaCha8Rng, among: &[&'a str]) -> &'a str {
+    among[rng.random_range(0..among.len())]
+}
+
+fn condition(rng: &mut ChaCha8Rng) -> String {
+    let fact = pick(rng, &["(p0)", "(p1)", "(p2)", "(p3)"]);
+    let number = rng.random_range(-2..4);
+    match rng.random_range(0..10) {
+        0..4 => fact.to_owned(),
+        4..6 => format!("(not {fact})"),
+        6 => format!("(or {fact} (> (x) {number}))"),
+        7 => format!("(> (x) {number})"),
+        8 => format!("(<= (x) {number})"),
+        _ => format!("(>= (+ (x) (y)) {number})"),
+    }
+}
+
+fn change(rng: &mut ChaCha8Rng) -> String {
+    let fact = pick(rng, &["(p0)", "(p1)", "(p2)", "(p3)"]);
+    match rng.random_range(0..9) {
+        0..3 => fact.to_owned(),
+        3..5 => format!("(not {fact})"),
+        5 => "(increase (x) 1)".to_owned(),
+        6 => "(decrease (x) ?duration)".to_owned(),
+        7 => "(increase (x) (y))".to_owned(),
+        _ => "(assign (y) 2)".to_owned(),
+    }
+}
+
+fn random_problem(rng: &mut ChaCha8Rng) -> (String, String, String) {
+    let mut actions = String::new();
+    for index in 0..4 {
+        let mut conditions = String::new();
+        for when in ["at start", "over all", "at end"] {
+            if rng.random_range(0..3) == 0 {
+                let _ = write!(conditions, " ({when} {})", condition(rng));
+            }
+        }
+        let mut effects = String::new();
+        for when in ["at start", "at end"] {
+            if rng.random_range(0..3) > 0 {
+                let _ = write!(effects, " ({when} {})", change(rng));
+            }
+        }
+        if rng.random_range(0..5) == 0 {
+            let when = pick(rng, &["at start", "over all", "at end"]);
+            let (needed, change) = (condition(rng), change(rng));
+            let _ = write!(effects, " (when ({when} {needed}) (at end {change}))");
+        }
+        match rng.random_range(0..6) {
+            0 => effects.push_str(" (increase (x) (* #t 1))"),
+            1 => effects.push_str(" (decrease (x) (* #t (y)))"),
+            2 => effects.push_str(" (increase (y) (* #t 1))"),
+            _ => {}
+        }
+        let _ = write!(
+            actions,
+            "(:durative-action a{index} :parameters () :duration (>= ?duration 0)
+               :condition (and{conditions}) :effect (and{effects}))"
+        );
+    }
+    let mut init = String::from("(= (x) 1) (= (y) 1)");
+    for fact in ["(p0)", "(p1)", "(p2)", "(p3)"] {
+        if rng.random_bool(0.5) {
+            init.push_str(fact);
+        }
+        if rng.random_bool(0.2) {
+            let literal = if rng.random_bool(0.5) {
+                fact.to_owned()
+            } else {
+                format!("(not {fact})")
+            };
+            let _ = write!(init, "(at {} {literal})", rng.random_range(1..6));
+        }
+    }
+    let goal = condition(rng);
+    let problem = format!("(define (problem p) (:domain d) (:init {init}) (:goal (and {goal})))");
+    let mut plan = String::new();
+    for _ in 0..rng.random_range(1..5) {
+        let half = |n: i64| f64::from(i32::try_from(n).expect("small")) / 2.0;
+        let start = half(rng.random_range(0..8));
+        let duration = half(rng.random_range(0..7));
+        let _ = writeln!(plan, "{start}: (a{}) [{duration}]", rng.random_range(0..4));
+    }
+    (domain(&actions), problem, plan)
+}

@@ -1,0 +1,150 @@
+//! What is guaranteed inside a box, and the half of the box check that depends on it.
+
+use std::fmt;
+use std::sync::Arc;
+
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
+
+use crate::branching::{MOST_BRANCHES, TooManyBranches};
+use crate::control::{ControlConflict, dynamic_conflict, strong_conflict};
+use crate::feasibility::{Feasibility, Infeasible};
+use crate::obligations::Refusal;
+use crate::oracle::Objection;
+use crate::reduction::Reduction;
+
+/// What is guaranteed inside an envelope.
+///
+/// Whichever it is, every schedule that the plan's network allows is valid. They differ in what
+/// whoever executes the plan has to know to have such a schedule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Guarantee {
+    /// For all values there is a schedule, for an executor that knows them in advance (weak
+    /// controllability). What the papers compute.
+    Weak,
+    /// The plan can be executed by one who learns each value only as it comes about (dynamic
+    /// controllability).
+    #[default]
+    Dynamic,
+    /// One schedule does for all values (strong controllability).
+    Strong,
+}
+
+impl Guarantee {
+    /// Its name in documents and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Weak => "weak",
+            Self::Dynamic => "dynamic",
+            Self::Strong => "strong",
+        }
+    }
+}
+
+impl fmt::Display for Guarantee {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Decides whether a plan can be scheduled for the values in a box, as a guarantee demands.
+///
+/// One variant for each guarantee that there is an answer for. All of them remember what they
+/// found for the last box accepted, so that moving one end of it costs little; which box that is,
+/// and that nothing else has moved, is the [`Oracle`](crate::Oracle)'s business.
+#[derive(Clone, Debug)]
+pub(crate) enum Controllability {
+    Weak(Feasibility),
+    Dynamic(Control),
+    Strong(Control),
+}
+
+/// What both of the guarantees that are more than weak go by.
+#[derive(Clone, Debug)]
+pub(crate) struct Control {
+    plan: Arc<ParametrizedPlan>,
+    /// That there is no schedule at all is the better reason, where it is one.
+    feasibility: Feasibility,
+}
+
+/// Why a plan cannot be scheduled as demanded; [`Controllability::objection`] works out the values.
+#[derive(Clone, Debug)]
+pub(crate) enum Uncontrollable {
+    Weak(Infeasible),
+    Conflict(ControlConflict),
+}
+
+impl Controllability {
+    /// For this plan.
+    pub(crate) fn new(
+        guarantee: Guarantee,
+        plan: &Arc<ParametrizedPlan>,
+        reduction: &Reduction,
+    ) -> Self {
+        let feasibility = Feasibility::new(plan, reduction);
+        let control = |feasibility| Control {
+            plan: Arc::clone(plan),
+            feasibility,
+        };
+        match guarantee {
+            Guarantee::Weak => Self::Weak(feasibility),
+            Guarantee::Dynamic => Self::Dynamic(control(feasibility)),
+            Guarantee::Strong => Self::Strong(control(feasibility)),
+        }
+    }
+
+    /// Why the box is refused, if it is.
+    ///
+    /// `moved` says that the box differs only in that end, further out, from the last one that was
+    /// accepted.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub(crate) fn refuses(
+        &mut self,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+    ) -> Result<Option<Uncontrollable>, Refusal> {
+        match self {
+            Self::Weak(feasibility) => {
+                let found = feasibility.infeasible(envelope, moved);
+                let found = found.map_err(|TooManyBranches| Refusal::TooManyCases {
+                    place: "parameters on constraints in both directions".to_owned(),
+                    limit: MOST_BRANCHES,
+                })?;
+                Ok(found.map(Uncontrollable::Weak))
+            }
+            Self::Dynamic(control) => {
+                let conflict = dynamic_conflict(&control.plan, envelope);
+                Ok(conflict.map(Uncontrollable::Conflict))
+            }
+            Self::Strong(control) => {
+                let conflict = strong_conflict(&control.plan, envelope);
+                Ok(conflict.map(Uncontrollable::Conflict))
+            }
+        }
+    }
+
+    /// The objection, with values that show it.
+    pub(crate) fn objection(
+        &self,
+        envelope: &DecoupledEnvelope,
+        found: Uncontrollable,
+    ) -> Objection {
+        let (Self::Weak(feasibility)
+        | Self::Dynamic(Control { feasibility, .. })
+        | Self::Strong(Control { feasibility, .. })) = self;
+        match found {
+            Uncontrollable::Weak(found) => {
+                Objection::NoSchedule(feasibility.values(envelope, found))
+            }
+            Uncontrollable::Conflict(conflict) => {
+                let infeasible = feasibility.clone().infeasible(envelope, None);
+                match infeasible {
+                    Ok(Some(found)) => Objection::NoSchedule(feasibility.values(envelope, found)),
+                    _ => Objection::Uncontrollable(conflict),
+                }
+            }
+        }
+    }
+}

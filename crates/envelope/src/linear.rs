@@ -1,0 +1,287 @@
+//! Linear expressions over time points and parameters.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+
+use elbowroom_plan::{NodeId, ParameterId, Valuation};
+
+/// A factor by which a parameter can be multiplied in a [`Linear`] expression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Factor {
+    /// The time of a node.
+    Time(NodeId),
+    /// The value of a parameter.
+    Parameter(ParameterId),
+}
+
+/// `constant + Σ c·t_i + Σ d·γ_j + Σ e·γ_j·x`, where `x` is a time or another parameter.
+///
+/// Linear in the times for fixed parameters and in each parameter for fixed times; the products
+/// come from parametrized rates. [`NodeId::ZERO`] is at time 0 and never occurs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Linear {
+    /// The constant part.
+    pub constant: Rational,
+    /// Coefficients of times, none zero.
+    pub times: BTreeMap<NodeId, Rational>,
+    /// Coefficients of parameters, none zero.
+    pub parameters: BTreeMap<ParameterId, Rational>,
+    /// Coefficients of products, none zero. In a product of two parameters the first is the
+    /// smaller id.
+    pub products: BTreeMap<(ParameterId, Factor), Rational>,
+}
+
+impl Linear {
+    /// A number.
+    pub fn constant(constant: Rational) -> Self {
+        Self {
+            constant,
+            ..Self::default()
+        }
+    }
+
+    /// A parameter.
+    pub fn parameter(id: ParameterId) -> Self {
+        Self {
+            parameters: BTreeMap::from([(id, Rational::ONE)]),
+            ..Self::default()
+        }
+    }
+
+    /// The time of `to` minus the time of `from`.
+    pub fn difference(from: NodeId, to: NodeId) -> Self {
+        let mut difference = Self::default();
+        difference.add_time(to, &Rational::ONE);
+        difference.add_time(from, &Rational::from(-1));
+        difference
+    }
+
+    /// The number, if nothing else is in it.
+    pub fn as_constant(&self) -> Option<&Rational> {
+        let is_constant =
+            self.times.is_empty() && self.parameters.is_empty() && self.products.is_empty();
+        is_constant.then_some(&self.constant)
+    }
+
+    /// Adds `coefficient` times the time of `node`.
+    pub fn add_time(&mut self, node: NodeId, coefficient: &Rational) {
+        if node != NodeId::ZERO {
+            add_term(&mut self.times, node, coefficient);
+        }
+    }
+
+    /// Adds `factor` times `other`.
+    pub fn add_scaled(&mut self, other: &Self, factor: &Rational) {
+        self.constant += &other.constant * factor;
+        for (&node, coefficient) in &other.times {
+            add_term(&mut self.times, node, &(coefficient * factor));
+        }
+        for (&id, coefficient) in &other.parameters {
+            add_term(&mut self.parameters, id, &(coefficient * factor));
+        }
+        for (&product, coefficient) in &other.products {
+            add_term(&mut self.products, product, &(coefficient * factor));
+        }
+    }
+
+    /// `self + other`.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        let mut sum = self.clone();
+        sum.add_scaled(other, &Rational::ONE);
+        sum
+    }
+
+    /// `self - other`.
+    #[must_use]
+    pub fn minus(&self, other: &Self) -> Self {
+        let mut difference = self.clone();
+        difference.add_scaled(other, &Rational::from(-1));
+        difference
+    }
+
+    /// `factor * self`.
+    #[must_use]
+    pub fn scaled(&self, factor: &Rational) -> Self {
+        let mut scaled = Self::default();
+        scaled.add_scaled(self, factor);
+        scaled
+    }
+
+    /// The product, or `None` if it would be of a kind not representable here: two times, or
+    /// three factors.
+    pub fn times(&self, other: &Self) -> Option<Self> {
+        if let Some(factor) = other.as_constant() {
+            return Some(self.scaled(factor));
+        }
+        if let Some(factor) = self.as_constant() {
+            return Some(other.scaled(factor));
+        }
+        // One side may hold times; the other only parameters; neither holds products.
+        let (parametric, other) = if self.times.is_empty() {
+            (self, other)
+        } else {
+            (other, self)
+        };
+        if !parametric.times.is_empty()
+            || !parametric.products.is_empty()
+            || !other.products.is_empty()
+        {
+            return None;
+        }
+        let mut product = other.scaled(&parametric.constant);
+        for (&id, coefficient) in &parametric.parameters {
+            if !other.constant.is_zero() {
+                add_term(
+                    &mut product.parameters,
+                    id,
+                    &(coefficient * &other.constant),
+                );
+            }
+            for (&node, time) in &other.times {
+                add_term(
+                    &mut product.products,
+                    (id, Factor::Time(node)),
+                    &(coefficient * time),
+                );
+            }
+            for (&second, factor) in &other.parameters {
+                let key = (id.min(second), Factor::Parameter(id.max(second)));
+                add_term(&mut product.products, key, &(coefficient * factor));
+            }
+        }
+        Some(product)
+    }
+
+    /// The same with a parameter replaced by the difference of two times, where it occurs outside
+    /// products.
+    #[must_use]
+    pub fn with_difference(&self, id: ParameterId, from: NodeId, to: NodeId) -> Self {
+        let mut replaced = self.clone();
+        if let Some(coefficient) = replaced.parameters.remove(&id) {
+            replaced.add_scaled(&Self::difference(from, to), &coefficient);
+        }
+        replaced
+    }
+
+    /// The same with some parameters replaced by numbers.
+    #[must_use]
+    pub fn with_values(&self, values: &BTreeMap<ParameterId, Rational>) -> Self {
+        let mut fixed = Self {
+            constant: self.constant.clone(),
+            times: self.times.clone(),
+            ..Self::default()
+        };
+        for (&id, coefficient) in &self.parameters {
+            match values.get(&id) {
+                Some(value) => fixed.constant += coefficient * value,
+                None => add_term(&mut fixed.parameters, id, coefficient),
+            }
+        }
+        for (&(id, factor), coefficient) in &self.products {
+            let first = values.get(&id);
+            match (first, factor) {
+                (Some(value), Factor::Time(node)) => fixed.add_time(node, &(coefficient * value)),
+                (first, Factor::Parameter(second)) => match (first, values.get(&second)) {
+                    (Some(a), Some(b)) => fixed.constant += &(coefficient * a) * b,
+                    (Some(a), None) => {
+                        add_term(&mut fixed.parameters, second, &(coefficient * a));
+                    }
+                    (None, Some(b)) => add_term(&mut fixed.parameters, id, &(coefficient * b)),
+                    (None, None) => add_term(&mut fixed.products, (id, factor), coefficient),
+                },
+                (None, Factor::Time(_)) => {
+                    add_term(&mut fixed.products, (id, factor), coefficient);
+                }
+            }
+        }
+        fixed
+    }
+
+    /// The value for these times (by node) and parameters.
+    pub fn value(&self, times: &[Rational], parameters: &Valuation) -> Rational {
+        let mut value = self.constant.clone();
+        for (node, coefficient) in &self.times {
+            value += coefficient * &times[node.index()];
+        }
+        for (id, coefficient) in &self.parameters {
+            value += coefficient * &parameters[id.index()];
+        }
+        for ((id, factor), coefficient) in &self.products {
+            let factor = match factor {
+                Factor::Time(node) => &times[node.index()],
+                Factor::Parameter(second) => &parameters[second.index()],
+            };
+            value += &(coefficient * &parameters[id.index()]) * factor;
+        }
+        value
+    }
+
+    /// A parameter whose square has a positive coefficient.
+    pub fn squared_parameter(&self) -> Option<ParameterId> {
+        let square = self.products.iter().find(|&(&(first, factor), amount)| {
+            factor == Factor::Parameter(first) && amount.is_positive()
+        });
+        square.map(|(&(id, _), _)| id)
+    }
+
+    /// The parameters that stand in products.
+    pub fn multiplied_parameters(&self) -> impl Iterator<Item = ParameterId> + '_ {
+        self.products.keys().flat_map(|&(first, factor)| {
+            let second = match factor {
+                Factor::Parameter(second) => Some(second),
+                Factor::Time(_) => None,
+            };
+            std::iter::once(first).chain(second)
+        })
+    }
+}
+
+/// Adds to a coefficient, dropping it when it becomes zero.
+fn add_term<K: Ord>(terms: &mut BTreeMap<K, Rational>, key: K, coefficient: &Rational) {
+    if coefficient.is_zero() {
+        return;
+    }
+    match terms.entry(key) {
+        std::collections::btree_map::Entry::Vacant(entry) => {
+            entry.insert(coefficient.clone());
+        }
+        std::collections::btree_map::Entry::Occupied(mut entry) => {
+            *entry.get_mut() += coefficient;
+            if entry.get().is_zero() {
+                entry.remove();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Linear, NodeId, ParameterId, Rational};
+
+    #[test]
+    fn a_rate_times_a_duration_is_bilinear_and_a_duration_squared_is_refused() {
+        let rate = Linear::parameter(ParameterId(0)).plus(&Linear::constant(Rational::from(2)));
+        let duration = Linear::difference(NodeId(1), NodeId(2));
+        let product = rate.times(&duration).expect("bilinear");
+        // (3 + 2) * (10 - 4)
+        let times = [0, 4, 10].map(Rational::from);
+        assert_eq!(
+            product.value(&times, &vec![Rational::from(3)]),
+            Rational::from(30)
+        );
+        assert!(duration.times(&duration).is_none());
+        assert!(product.times(&duration).is_none());
+    }
+
+    #[test]
+    fn what_cancels_disappears() {
+        let difference = Linear::difference(NodeId(1), NodeId(2));
+        assert_eq!(difference.minus(&difference), Linear::default());
+        assert_eq!(
+            Linear::difference(NodeId::ZERO, NodeId::ZERO),
+            Linear::default()
+        );
+    }
+}

@@ -1,0 +1,27 @@
+//! How an envelope is searched for.
+
+use std::fmt;
+
+/// How an envelope is searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Method {
+    /// One end of the box at a time is moved out: [`irr`](crate::irr()).
+    #[default]
+    Irr,
+}
+
+impl Method {
+    /// Its name in documents and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Irr => "irr",
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}

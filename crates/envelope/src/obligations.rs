@@ -1,0 +1,275 @@
+//! What every schedule of a plan must satisfy, as linear inequalities.
+//!
+//! `Obligations::compile` runs the plan symbolically, once, in the order of a nominal
+//! schedule. That order is enough: the schedules of a network with boxed parameters form a convex
+//! set, so if two interfering happenings are at least ε apart in all of them, one always comes
+//! first. The separation itself is an obligation; where it holds, every value that a happening
+//! reads is one fixed expression in times and parameters (paper 1's `enc_eff` without its
+//! disjunctions). What remains undecided is only which commuting happenings come before a moment
+//! *inside* an action, where its over-all condition is read ([`OverAll`]).
+//!
+//! An obligation is violated in exactly the schedules of its [`BadCase`]s.
+
+mod compile;
+mod dnf;
+mod goal;
+mod over_all;
+mod separation;
+mod timeline;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Condition, FluentId};
+use elbowroom_num::Rational;
+
+use crate::linear::Linear;
+use elbowroom_plan::{InstanceId, NodeId, ParameterId, StnPlan, Valuation};
+
+pub use over_all::OverAll;
+
+/// `to - from <= bound`, or `<` when strict.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The time point subtracted.
+    pub from: NodeId,
+    /// The time point it is subtracted from.
+    pub to: NodeId,
+    /// Greatest difference.
+    pub bound: Rational,
+    /// Whether the bound itself is excluded.
+    pub is_strict: bool,
+}
+
+impl Difference {
+    /// `earlier < later`.
+    pub fn before(earlier: NodeId, later: NodeId) -> Self {
+        Self {
+            from: later,
+            to: earlier,
+            bound: Rational::ZERO,
+            is_strict: true,
+        }
+    }
+
+    /// `earlier <= later`.
+    pub fn not_after(earlier: NodeId, later: NodeId) -> Self {
+        Self {
+            from: later,
+            to: earlier,
+            bound: Rational::ZERO,
+            is_strict: false,
+        }
+    }
+}
+
+/// `expression <= 0`, or `< 0` when strict.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Inequality {
+    /// The left-hand side.
+    pub expression: Linear,
+    /// Whether zero itself is excluded.
+    pub is_strict: bool,
+}
+
+impl Inequality {
+    /// Whether it holds for these times (by node) and parameters.
+    pub fn holds(&self, times: &[Rational], parameters: &Valuation) -> bool {
+        let value = self.expression.value(times, parameters);
+        value.is_negative() || (value.is_zero() && !self.is_strict)
+    }
+}
+
+/// One way in which an obligation can be violated: all of these at once.
+///
+/// Nodes are those of the plan and, in over-all conditions, [`StnPlan::nodes`]`.len()` for the
+/// moment at which the condition is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct BadCase {
+    /// Constraints on differences of times.
+    pub differences: Vec<Difference>,
+    /// Other linear constraints.
+    pub inequalities: Vec<Inequality>,
+}
+
+/// What is required.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Requirement {
+    /// Two interfering happenings are at least ε apart; `first` comes first.
+    Separation {
+        /// The earlier happening.
+        first: NodeId,
+        /// The later happening.
+        second: NodeId,
+    },
+    /// A condition holds on arrival at a happening.
+    Condition {
+        /// The happening.
+        node: NodeId,
+        /// The condition, one conjunct.
+        condition: Condition,
+    },
+    /// A condition holds at every moment inside an action.
+    OverAll {
+        /// The action.
+        instance: InstanceId,
+        /// The condition, one conjunct.
+        condition: Condition,
+    },
+    /// The action's duration obeys its domain.
+    Duration {
+        /// The action.
+        instance: InstanceId,
+        /// Which of its duration constraints; `None` for `>= 0`.
+        constraint: Option<usize>,
+    },
+    /// A number that an effect needs is defined.
+    Defined {
+        /// Where it is needed.
+        node: NodeId,
+    },
+    /// A happening changes a fluent in one way only, unless all it does is to increase and
+    /// decrease it.
+    OneUpdate {
+        /// The happening.
+        node: NodeId,
+        /// The fluent.
+        fluent: FluentId,
+    },
+    /// The goal holds at the end.
+    Goal {
+        /// The condition, one conjunct.
+        condition: Condition,
+    },
+}
+
+/// A requirement with all the ways in which it can be violated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Obligation {
+    /// What is required.
+    pub requirement: Requirement,
+    /// Violated exactly when one of these is the case.
+    pub bad_cases: Vec<BadCase>,
+}
+
+/// Everything that must hold in every schedule of a plan.
+#[derive(Clone, Debug, Default)]
+pub struct Obligations {
+    /// Obligations whose bad cases are known.
+    pub direct: Vec<Obligation>,
+    /// Numeric and compound over-all conditions; their cases unfold on demand.
+    pub over_all: Vec<OverAll>,
+}
+
+/// The exact method does not cover something in the plan or its problem.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// A product or quotient is neither linear nor bilinear.
+    #[error(
+        "{place}: the value of {expression} is not linear in times and parameters; fix one of its factors"
+    )]
+    NotLinear {
+        /// Where it stands.
+        place: String,
+        /// The expression.
+        expression: String,
+    },
+    /// A rate changes while it acts.
+    #[error("{place}: the rate of change of {fluent} depends on something that changes later on")]
+    ChangingRate {
+        /// Where it stands.
+        place: String,
+        /// The fluent it changes.
+        fluent: String,
+    },
+    /// A conditional effect hangs on what holds throughout its action.
+    #[error("{place}: a conditional effect with an over-all condition cannot be analysed")]
+    GuardOverAll {
+        /// Where it stands.
+        place: String,
+    },
+    /// Too many combinations of conditional effects or alternatives.
+    #[error("{place}: more than {limit} combinations of cases")]
+    TooManyCases {
+        /// Where they arise.
+        place: String,
+        /// How many are considered.
+        limit: usize,
+    },
+    /// A derived fact depends on its own negation.
+    #[error("{place}: a derived fact depends on its own negation; rewrite the rules without that")]
+    Unstratified {
+        /// Where it is read.
+        place: String,
+    },
+    /// A number is left open that is not among the plan's parameters.
+    #[error("{place}: a number is left open that is no parameter; vary it or give it a value")]
+    OpenNumber {
+        /// Where it stands.
+        place: String,
+    },
+    /// The ends of a parameter's interval do not decide what happens between them.
+    #[error(
+        "parameter {name} is multiplied by itself, or by a time that it also bounds, or with several numbers of one condition; give it a value, or vary one of these only"
+    )]
+    Coupled {
+        /// The parameter.
+        name: String,
+    },
+    /// The plan's network has no schedule at the nominal values.
+    #[error("the plan has no schedule at its nominal values")]
+    NoNominalSchedule,
+}
+
+impl Requirement {
+    /// The requirement in words.
+    pub fn describe(&self, task: &Task, plan: &StnPlan) -> String {
+        match self {
+            Self::Separation { first, second } => format!(
+                "{} must come before {}, by at least ε",
+                plan.node_words(task, *first),
+                plan.node_words(task, *second)
+            ),
+            Self::Condition { node, condition } => format!(
+                "{} needs {}",
+                plan.node_words(task, *node),
+                task.describe_condition(condition)
+            ),
+            Self::OverAll {
+                instance,
+                condition,
+            } => format!(
+                "{} needs {} throughout",
+                plan.instance(*instance).action.name,
+                task.describe_condition(condition)
+            ),
+            Self::Duration { instance, .. } => {
+                format!(
+                    "{} must obey its domain's duration",
+                    plan.instance(*instance).action.name
+                )
+            }
+            Self::Defined { node } => {
+                format!(
+                    "{} needs a number that has no value",
+                    plan.node_words(task, *node)
+                )
+            }
+            Self::OneUpdate { node, fluent } => {
+                format!(
+                    "{} must not change {} in several ways at once",
+                    plan.node_words(task, *node),
+                    task.fluent_name(*fluent)
+                )
+            }
+            Self::Goal { condition } => {
+                format!(
+                    "the goal {} must hold at the end",
+                    task.describe_condition(condition)
+                )
+            }
+        }
+    }
+}
+
+/// Parameters that are differences of times: `t_second - t_first`.
+pub type Substitution = std::collections::BTreeMap<ParameterId, (NodeId, NodeId)>;

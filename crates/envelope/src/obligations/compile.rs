@@ -1,0 +1,355 @@
+//! The symbolic run.
+
+mod changes;
+mod guards;
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
+use elbowroom_num::Rational;
+
+use changes::record;
+use guards::{GuardId, GuardPart, effects};
+
+use super::dnf::{Alternatives, Wanted, compared};
+use super::goal::goal_cases;
+use super::over_all::literal_cases;
+use super::separation::separations;
+use super::timeline::{FluentChange, Reading, Timeline};
+use super::{
+    BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
+};
+use crate::linear::Linear;
+use elbowroom_plan::{InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan};
+
+/// How many combinations of outcomes of conditional effects are followed.
+const MOST_RUNS: usize = 256;
+
+impl Obligations {
+    /// All obligations of a plan.
+    ///
+    /// `nominal` gives each node its time in some schedule at the nominal parameter values;
+    /// `substitution` the parameters that are differences of times.
+    ///
+    /// # Errors
+    /// When something in the plan is beyond exact linear reasoning; the message names it.
+    pub(crate) fn compile(
+        task: &Task,
+        plan: &ParametrizedPlan,
+        epsilon: &Rational,
+        nominal: &[Rational],
+        substitution: &Substitution,
+    ) -> Result<Self, Refusal> {
+        let mut order: Vec<NodeId> = plan.plan.nodes().map(|(id, _)| id).collect();
+        order.sort_by(|a, b| nominal[a.index()].cmp(&nominal[b.index()]).then(a.cmp(b)));
+        let mut obligations = Self {
+            direct: separations(task, &plan.plan, &order, epsilon),
+            over_all: Vec::new(),
+        };
+        let substitution = Arc::new(substitution.clone());
+        let compiler = Compiler {
+            task,
+            plan,
+            order,
+            substitution,
+        };
+        let mut runs = vec![Run {
+            position: 0,
+            timeline: Timeline::initial(task, plan, &compiler.substitution),
+            outcomes: BTreeMap::new(),
+        }];
+        let mut finished = 0;
+        while let Some(run) = runs.pop() {
+            match compiler.follow(run, &mut obligations)? {
+                Progress::Finished => finished += 1,
+                Progress::Split(more) => runs.extend(more),
+            }
+            if finished + runs.len() > MOST_RUNS {
+                return Err(Refusal::TooManyCases {
+                    place: "conditional effects".to_owned(),
+                    limit: MOST_RUNS,
+                });
+            }
+        }
+        Ok(obligations)
+    }
+}
+
+/// One combination of outcomes of conditional effects, followed up to a position.
+#[derive(Clone)]
+struct Run {
+    position: usize,
+    timeline: Timeline,
+    outcomes: BTreeMap<GuardId, bool>,
+}
+
+enum Progress {
+    Finished,
+    /// An outcome depends on times or parameters: one run for each alternative.
+    Split(Vec<Run>),
+}
+
+struct Compiler<'a> {
+    task: &'a Task,
+    plan: &'a ParametrizedPlan,
+    /// All nodes in nominal order.
+    order: Vec<NodeId>,
+    substitution: Arc<Substitution>,
+}
+
+impl Compiler<'_> {
+    fn follow(&self, mut run: Run, obligations: &mut Obligations) -> Result<Progress, Refusal> {
+        while let Some(&node) = self.order.get(run.position) {
+            if let Some(split) = self.decide_guards(&mut run, node, obligations)? {
+                return Ok(Progress::Split(split));
+            }
+            self.happen(&mut run, node, obligations)?;
+            run.position += 1;
+        }
+        self.finish(run, obligations)?;
+        Ok(Progress::Finished)
+    }
+
+    /// What the happening at a node requires and changes.
+    fn happen(
+        &self,
+        run: &mut Run,
+        node: NodeId,
+        obligations: &mut Obligations,
+    ) -> Result<(), Refusal> {
+        match self.plan.plan.nodes[node.index()] {
+            Node::Zero => Ok(()),
+            Node::Timed(index) => {
+                let effects = self.task.timed()[index]
+                    .changes
+                    .iter()
+                    .map(|change| (change, true));
+                self.apply(run, node, effects, obligations)
+            }
+            Node::Instant(id) | Node::Start(id) => {
+                let action = &self.plan.plan.instance(id).action;
+                let snap = match &action.body {
+                    Body::Instantaneous(snap) => snap,
+                    Body::Durative(body) => {
+                        self.require_duration(run, node, id, false, obligations)?;
+                        &body.start
+                    }
+                };
+                self.require(run, node, snap, obligations)?;
+                let effects = effects(run, id, 0, &snap.effects);
+                let drifts = self.drifts(run, node, id)?;
+                self.apply(run, node, effects.into_iter(), obligations)?;
+                for (fluent, rate) in drifts {
+                    let value = self
+                        .reading(&run.timeline, node)
+                        .linear(&Expression::Fluent(fluent))?;
+                    if value.is_none() || rate.is_none() {
+                        self.never_takes_time(run, node, id, obligations);
+                    }
+                    let rate = rate.unwrap_or_default();
+                    run.timeline.change(node, fluent, FluentChange::Drift(rate));
+                }
+                Ok(())
+            }
+            Node::End(id) => {
+                let Body::Durative(body) = &self.plan.plan.instance(id).action.body else {
+                    return Ok(());
+                };
+                self.require_duration(run, node, id, true, obligations)?;
+                self.require(run, node, &body.end, obligations)?;
+                let effects = effects(run, id, body.start.effects.len(), &body.end.effects);
+                let since = self.plan.plan.start(id);
+                let first = body.start.effects.len() + body.end.effects.len();
+                // Values on arrival include the drift up to now, so it ends after the effects are
+                // read; increases commute with it, assignments begin from zero drift either way.
+                let read = self.read_changes(run, node, effects.into_iter(), obligations)?;
+                for (index, effect) in body.continuous.iter().enumerate() {
+                    if run.outcomes.get(&(id, first + index, GuardPart::AtStart)) != Some(&false) {
+                        run.timeline
+                            .change(node, effect.fluent, FluentChange::DriftEnd(since));
+                    }
+                }
+                record(run, node, read);
+                Ok(())
+            }
+        }
+    }
+
+    /// The conditions of a happening.
+    fn require(
+        &self,
+        run: &Run,
+        node: NodeId,
+        snap: &SnapAction,
+        obligations: &mut Obligations,
+    ) -> Result<(), Refusal> {
+        for condition in snap.condition.conjuncts() {
+            let broken = self
+                .reading(&run.timeline, node)
+                .alternatives(condition, Wanted::NotTrue)?;
+            let requirement = Requirement::Condition {
+                node,
+                condition: condition.clone(),
+            };
+            oblige(obligations, requirement, &run.timeline, broken);
+        }
+        Ok(())
+    }
+
+    /// The duration constraints read at the start or at the end.
+    fn require_duration(
+        &self,
+        run: &Run,
+        node: NodeId,
+        instance: InstanceId,
+        at_end: bool,
+        obligations: &mut Obligations,
+    ) -> Result<(), Refusal> {
+        let Some(body) = self.plan.plan.instance(instance).action.durative() else {
+            return Ok(());
+        };
+        let (start, end) = (self.plan.plan.start(instance), self.plan.plan.end(instance));
+        let duration = Linear::difference(start, end);
+        if !at_end {
+            obligations.direct.push(Obligation {
+                requirement: Requirement::Duration {
+                    instance,
+                    constraint: None,
+                },
+                bad_cases: vec![BadCase {
+                    differences: vec![Difference::before(end, start)],
+                    inequalities: run.timeline.assumptions.clone(),
+                }],
+            });
+        }
+        let is_open = self
+            .plan
+            .parameters
+            .iter()
+            .any(|parameter| parameter.kind == ParameterKind::Duration(instance));
+        if is_open {
+            return Ok(());
+        }
+        for (index, constraint) in body.duration.iter().enumerate() {
+            if constraint.at_end != at_end {
+                continue;
+            }
+            let bound = self
+                .reading(&run.timeline, node)
+                .linear(&constraint.bound)?;
+            let broken = match bound {
+                Some(bound) => compared(constraint.comparison, &duration, &bound, false),
+                None => vec![Vec::new()],
+            };
+            let requirement = Requirement::Duration {
+                instance,
+                constraint: Some(index),
+            };
+            oblige(obligations, requirement, &run.timeline, broken);
+        }
+        Ok(())
+    }
+
+    /// What can be said only when the whole timeline is known: over-all conditions and goal.
+    fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
+        let timeline = Arc::new(run.timeline);
+        let plan = &self.plan.plan;
+        for (index, instance) in plan.instances.iter().enumerate() {
+            let id = InstanceId::from(index);
+            let Some(body) = instance.action.durative() else {
+                continue;
+            };
+            for condition in body.over_all.conjuncts() {
+                let (start, end) = (plan.start(id), plan.end(id));
+                let literal = match condition {
+                    Condition::Fact(fact) => Some((*fact, true)),
+                    Condition::Not(part) => match &**part {
+                        Condition::Fact(fact) => Some((*fact, false)),
+                        _ => None,
+                    },
+                    _ => None,
+                };
+                match literal {
+                    Some((fact, wanted)) if !self.task.is_derived(fact) => {
+                        obligations.direct.push(Obligation {
+                            requirement: Requirement::OverAll {
+                                instance: id,
+                                condition: condition.clone(),
+                            },
+                            bad_cases: literal_cases(&timeline, fact, wanted, start, end),
+                        });
+                    }
+                    _ => obligations.over_all.push(OverAll::new(
+                        self.task,
+                        plan,
+                        id,
+                        condition,
+                        &self.order,
+                        &timeline,
+                        &self.substitution,
+                    )),
+                }
+            }
+        }
+        for condition in self.plan.goal.conjuncts() {
+            let bad_cases = goal_cases(self.task, plan, &timeline, &self.substitution, condition)?;
+            let requirement = Requirement::Goal {
+                condition: condition.clone(),
+            };
+            obligations.direct.push(Obligation {
+                requirement,
+                bad_cases,
+            });
+        }
+        Ok(())
+    }
+
+    /// Reading everything recorded so far, at a node.
+    fn reading<'r>(&'r self, timeline: &'r Timeline, node: NodeId) -> Reading<'r> {
+        let plan = &self.plan.plan;
+        let (action, place) = match plan.nodes[node.index()] {
+            Node::Start(id) | Node::End(id) => (
+                Some((plan.start(id), plan.end(id))),
+                plan.instance(id).action.name.as_str(),
+            ),
+            Node::Instant(id) => (None, plan.instance(id).action.name.as_str()),
+            Node::Zero | Node::Timed(_) => (None, "timed initials"),
+        };
+        Reading {
+            task: self.task,
+            timeline,
+            cut: &|_| true,
+            moment: node,
+            action,
+            substitution: &self.substitution,
+            place,
+            derived: OnceCell::new(),
+        }
+    }
+}
+
+/// Adds an obligation unless it cannot be violated.
+fn oblige(
+    obligations: &mut Obligations,
+    requirement: Requirement,
+    timeline: &Timeline,
+    broken: Alternatives,
+) {
+    if broken.is_empty() {
+        return;
+    }
+    let bad_cases = broken
+        .into_iter()
+        .map(|inequalities| BadCase {
+            differences: Vec::new(),
+            inequalities: [&timeline.assumptions[..], &inequalities].concat(),
+        })
+        .collect();
+    obligations.direct.push(Obligation {
+        requirement,
+        bad_cases,
+    });
+}

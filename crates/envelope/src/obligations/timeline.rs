@@ -1,0 +1,304 @@
+//! What happens to each fact and fluent, in the order of a nominal schedule.
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::derivation::{Derived, Moment};
+use elbowroom_model::ground::{Expression, FactId, FluentId};
+use elbowroom_model::problem::{Comparison, Unknown};
+use elbowroom_num::Rational;
+
+use super::{Inequality, Refusal, Substitution};
+use crate::linear::Linear;
+use elbowroom_plan::{NodeId, ParameterId, ParametrizedPlan};
+
+/// The events of every fact and fluent so far, in nominal order.
+///
+/// A *cut* is a set of nodes taken to have happened; reading at a cut gives what the plan's state
+/// is after exactly these. During the symbolic run the cut is everything recorded so far.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Timeline {
+    facts: BTreeMap<FactId, FactHistory>,
+    fluents: BTreeMap<FluentId, FluentHistory>,
+    /// Under which conditional effects' outcomes this timeline is the right one.
+    pub(crate) assumptions: Vec<Inequality>,
+}
+
+/// How a fact changes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FactHistory {
+    pub(crate) initially: bool,
+    /// The node, and what the fact becomes there.
+    pub(crate) events: Vec<(NodeId, bool)>,
+}
+
+/// How a fluent changes.
+#[derive(Clone, Debug, Default)]
+struct FluentHistory {
+    initially: Option<Linear>,
+    events: Vec<(NodeId, FluentChange)>,
+}
+
+/// One change of a fluent.
+#[derive(Clone, Debug)]
+pub(crate) enum FluentChange {
+    /// It gets a value, or loses it (an effect whose right-hand side is undefined).
+    Assign(Option<Linear>),
+    /// It moves by an amount.
+    Shift(Linear),
+    /// A continuous change with this rate begins; no times occur in the rate.
+    Drift(Linear),
+    /// A continuous change that began at that node stops.
+    DriftEnd(NodeId),
+}
+
+/// Which nodes have happened.
+pub(crate) type Cut<'a> = &'a dyn Fn(NodeId) -> bool;
+
+/// What an expression is read in: a cut, the moment of reading, and the action it belongs to.
+pub(crate) struct Reading<'a> {
+    pub(crate) task: &'a Task,
+    pub(crate) timeline: &'a Timeline,
+    pub(crate) cut: Cut<'a>,
+    /// The time at which values are read.
+    pub(crate) moment: NodeId,
+    /// Start and end of the action whose `?duration` may be meant.
+    pub(crate) action: Option<(NodeId, NodeId)>,
+    /// Parameters that are differences of times.
+    pub(crate) substitution: &'a Substitution,
+    /// For messages.
+    pub(crate) place: &'a str,
+    /// The derived facts at the cut, once something has asked for one.
+    pub(crate) derived: OnceCell<Derived<Refusal>>,
+}
+
+impl Timeline {
+    /// Nothing has happened yet.
+    pub(crate) fn initial(
+        task: &Task,
+        plan: &ParametrizedPlan,
+        substitution: &Substitution,
+    ) -> Self {
+        let mut timeline = Self::default();
+        for &fact in &task.initial().facts {
+            timeline.facts.entry(fact).or_default().initially = true;
+        }
+        for (&fluent, value) in &task.initial().values {
+            timeline.fluents.entry(fluent).or_default().initially =
+                Some(Linear::constant(value.clone()));
+        }
+        for (&fluent, &parameter) in &plan.initial {
+            timeline.fluents.entry(fluent).or_default().initially =
+                Some(parameter_value(parameter, substitution));
+        }
+        timeline
+    }
+
+    /// Records that the fact becomes true or false at the node.
+    pub(crate) fn set(&mut self, node: NodeId, fact: FactId, becomes: bool) {
+        self.facts
+            .entry(fact)
+            .or_default()
+            .events
+            .push((node, becomes));
+    }
+
+    /// Records a change of the fluent at the node.
+    pub(crate) fn change(&mut self, node: NodeId, fluent: FluentId, change: FluentChange) {
+        self.fluents
+            .entry(fluent)
+            .or_default()
+            .events
+            .push((node, change));
+    }
+
+    /// What happens to a fact.
+    pub(crate) fn fact_history(&self, fact: FactId) -> FactHistory {
+        self.facts.get(&fact).cloned().unwrap_or_default()
+    }
+
+    /// The nodes at which the fact may change.
+    pub(crate) fn fact_nodes(&self, fact: FactId) -> impl Iterator<Item = NodeId> + '_ {
+        self.facts
+            .get(&fact)
+            .into_iter()
+            .flat_map(|h| h.events.iter().map(|&(node, _)| node))
+    }
+
+    /// The nodes at which the fluent's value or rate may change.
+    pub(crate) fn fluent_nodes(&self, fluent: FluentId) -> impl Iterator<Item = NodeId> + '_ {
+        self.fluents
+            .get(&fluent)
+            .into_iter()
+            .flat_map(|h| h.events.iter().map(|(node, _)| *node))
+    }
+
+    fn is_true(&self, fact: FactId, cut: Cut<'_>) -> bool {
+        let Some(history) = self.facts.get(&fact) else {
+            return false;
+        };
+        history
+            .events
+            .iter()
+            .rev()
+            .find(|&&(node, _)| cut(node))
+            .map_or(history.initially, |&(_, becomes)| becomes)
+    }
+
+    fn value(&self, fluent: FluentId, cut: Cut<'_>, moment: NodeId) -> Option<Linear> {
+        let history = self.fluents.get(&fluent)?;
+        let mut base = history.initially.clone();
+        // Continuous changes under way: when each began, and since when it has been counted.
+        let mut drifts: Vec<(NodeId, NodeId, &Linear)> = Vec::new();
+        for (node, change) in history.events.iter().filter(|(node, _)| cut(*node)) {
+            match change {
+                FluentChange::Assign(value) => {
+                    base.clone_from(value);
+                    for drift in &mut drifts {
+                        drift.1 = *node;
+                    }
+                }
+                FluentChange::Shift(amount) => base = base.map(|base| base.plus(amount)),
+                FluentChange::Drift(rate) => drifts.push((*node, *node, rate)),
+                FluentChange::DriftEnd(since) => {
+                    if let Some(index) = drifts.iter().position(|&(began, _, _)| began == *since) {
+                        let (_, counted, rate) = drifts.remove(index);
+                        base = base.and_then(|base| add_drift(&base, rate, counted, *node));
+                    }
+                }
+            }
+        }
+        for (_, counted, rate) in drifts {
+            base = base.and_then(|base| add_drift(&base, rate, counted, moment));
+        }
+        base
+    }
+}
+
+/// `base + rate * (until - since)`; rates hold no times, so the product is always representable.
+fn add_drift(base: &Linear, rate: &Linear, since: NodeId, until: NodeId) -> Option<Linear> {
+    Some(base.plus(&rate.times(&Linear::difference(since, until))?))
+}
+
+/// The parameter, or the difference of times that it is.
+pub(crate) fn parameter_value(id: ParameterId, substitution: &Substitution) -> Linear {
+    match substitution.get(&id) {
+        Some(&(from, to)) => Linear::difference(from, to),
+        None => Linear::parameter(id),
+    }
+}
+
+impl Reading<'_> {
+    /// Whether the fact is true at the cut.
+    pub(crate) fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
+        if !self.task.is_derived(fact) {
+            return Ok(self.timeline.is_true(fact, self.cut));
+        }
+        let derivation = self
+            .task
+            .derivation()
+            .ok_or_else(|| Refusal::Unstratified {
+                place: self.place.to_owned(),
+            })?;
+        let basic = Basic(self);
+        let derived = self.derived.get_or_init(|| derivation.derive(&basic));
+        derivation.on_top_of(&basic, derived).fact(fact)
+    }
+
+    /// The expression's value at the cut and moment; `None` where it is undefined.
+    pub(crate) fn linear(&self, expression: &Expression) -> Result<Option<Linear>, Refusal> {
+        Ok(match expression {
+            Expression::Constant(value) => Some(Linear::constant(value.clone())),
+            Expression::Fluent(fluent) => self.timeline.value(*fluent, self.cut, self.moment),
+            Expression::Duration => self
+                .action
+                .map(|(start, end)| Linear::difference(start, end)),
+            Expression::TotalTime => return Err(self.not_linear(expression)),
+            Expression::Unknown(Unknown::Parameter(id)) => {
+                Some(parameter_value(ParameterId(*id), self.substitution))
+            }
+            Expression::Unknown(_) => {
+                return Err(Refusal::OpenNumber {
+                    place: self.place.to_owned(),
+                });
+            }
+            Expression::Add(parts) => {
+                let mut sum = Some(Linear::default());
+                for part in parts {
+                    let part = self.linear(part)?;
+                    sum = sum.zip(part).map(|(sum, part)| sum.plus(&part));
+                }
+                sum
+            }
+            Expression::Subtract(left, right) => self
+                .linear(left)?
+                .zip(self.linear(right)?)
+                .map(|(l, r)| l.minus(&r)),
+            Expression::Negate(part) => self
+                .linear(part)?
+                .map(|part| part.scaled(&Rational::from(-1))),
+            Expression::Multiply(parts) => {
+                let mut product = Some(Linear::constant(Rational::ONE));
+                for part in parts {
+                    let Some((so_far, part)) = product.zip(self.linear(part)?) else {
+                        return Ok(None);
+                    };
+                    product = Some(
+                        so_far
+                            .times(&part)
+                            .ok_or_else(|| self.not_linear(expression))?,
+                    );
+                }
+                product
+            }
+            Expression::Divide(left, right) => {
+                let Some((left, right)) = self.linear(left)?.zip(self.linear(right)?) else {
+                    return Ok(None);
+                };
+                let divisor = right
+                    .as_constant()
+                    .ok_or_else(|| self.not_linear(expression))?;
+                divisor.reciprocal().map(|factor| left.scaled(&factor))
+            }
+        })
+    }
+
+    fn not_linear(&self, expression: &Expression) -> Refusal {
+        Refusal::NotLinear {
+            place: self.place.to_owned(),
+            expression: self.task.describe_expression(expression),
+        }
+    }
+}
+
+/// What rules read: basic facts, and comparisons of constants.
+struct Basic<'a>(&'a Reading<'a>);
+
+impl Moment<Refusal> for Basic<'_> {
+    fn fact(&self, fact: FactId) -> Result<bool, Refusal> {
+        Ok(self.0.timeline.is_true(fact, self.0.cut))
+    }
+
+    /// A comparison with an undefined number is false.
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, Refusal> {
+        let (Some(left), Some(right)) = (self.0.linear(left)?, self.0.linear(right)?) else {
+            return Ok(false);
+        };
+        let (Some(left), Some(right)) = (left.as_constant(), right.as_constant()) else {
+            return Err(Refusal::NotLinear {
+                place: self.0.place.to_owned(),
+                expression: "a derived predicate over numbers that vary".to_owned(),
+            });
+        };
+        Ok(comparison.holds(left, right))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,382 @@
+//! The plan's network with rigidly connected nodes taken together, and weights that depend on a
+//! box.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::{Delta, Rational};
+use elbowroom_stn::{
+    ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Weight,
+};
+
+use crate::obligations::{BadCase, Substitution};
+use elbowroom_plan::{
+    Bound, BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side,
+};
+
+/// `t_to - t_from <= constant + reach(end)`, over classes.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// The class subtracted.
+    pub from: ClassId,
+    /// The class it is subtracted from.
+    pub to: ClassId,
+    /// The part of the bound that does not depend on the box.
+    pub constant: Rational,
+    /// The end whose reach is added.
+    pub end: Option<BoxEnd>,
+}
+
+/// The plan's network over classes of rigidly connected nodes.
+///
+/// Two nodes are in one class if constraints without parameters fix their difference. Plans are
+/// full of such pairs (fixed durations, timed initials); what is left is often tiny.
+#[derive(Clone, Debug)]
+pub struct Reduction {
+    /// For each node its class, and by how much it comes after the class's own time.
+    places: Vec<(ClassId, Rational)>,
+    class_count: usize,
+    edges: Vec<Edge>,
+    /// Parameters that are differences of times, by the constraint `[p, p]` that says so.
+    pub substitution: Substitution,
+    /// Parameters that bound more than the one difference they are.
+    pub coupled: Vec<ParameterId>,
+}
+
+/// The network of a box, and which edge each of its constraints comes from.
+pub struct BoxNetwork {
+    /// Over classes.
+    pub network: Network<Delta>,
+    /// For each constraint of the network, a position in [`Reduction::edges`].
+    pub edges: Vec<usize>,
+}
+
+impl Reduction {
+    /// The reduced network of a plan.
+    pub fn new(plan: &ParametrizedPlan) -> Self {
+        let places = classes(plan);
+        let class_count = 1 + places
+            .iter()
+            .map(|(class, _)| class.index())
+            .max()
+            .unwrap_or(0);
+        let mut reduction = Self {
+            places,
+            class_count,
+            edges: Vec::new(),
+            substitution: Substitution::new(),
+            coupled: Vec::new(),
+        };
+        for (node, _) in plan.plan.nodes().skip(1) {
+            reduction.add_edge(node, NodeId::ZERO, Rational::ZERO, None);
+        }
+        for constraint in &plan.plan.constraints {
+            let (from, to) = (constraint.from, constraint.to);
+            reduction.note_parameters(plan, from, to, &constraint.lower, &constraint.upper);
+            match &constraint.upper {
+                Bound::Infinite => {}
+                Bound::Finite(upper) => reduction.add_edge(from, to, upper.clone(), None),
+                Bound::Parameter(parameter) => {
+                    let end = BoxEnd {
+                        parameter: *parameter,
+                        side: Side::Upper,
+                    };
+                    reduction.add_edge(from, to, Rational::ZERO, Some(end));
+                }
+            }
+            match &constraint.lower {
+                Bound::Infinite => {}
+                Bound::Finite(lower) => reduction.add_edge(to, from, -lower, None),
+                Bound::Parameter(parameter) => {
+                    let end = BoxEnd {
+                        parameter: *parameter,
+                        side: Side::Lower,
+                    };
+                    reduction.add_edge(to, from, Rational::ZERO, Some(end));
+                }
+            }
+        }
+        reduction.keep_tightest();
+        reduction.drop_implied(plan);
+        reduction
+    }
+
+    /// Drops constraints that the others imply whatever values the parameters take in their
+    /// ranges.
+    ///
+    /// Besides being less work, this shows what parameters really bear on: a constraint "the end
+    /// comes after time 0" would put the duration before it on a cycle of constraints.
+    fn drop_implied(&mut self, plan: &ParametrizedPlan) {
+        let ranges = DecoupledEnvelope {
+            intervals: plan
+                .parameters
+                .iter()
+                .map(|parameter| parameter.range.clone())
+                .collect(),
+        };
+        let BoxNetwork { network, edges } = self.network(&ranges);
+        let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
+        // Whole numbers are several times faster; sums of paths must stay far from overflow.
+        let implied = match scaled(&network) {
+            Some(network) => implied(network, has_parameter),
+            None => implied(network, has_parameter),
+        };
+        let implied: Vec<usize> = implied.into_iter().map(|id| edges[id.index()]).collect();
+        let mut index = 0;
+        self.edges.retain(|_| {
+            index += 1;
+            implied.binary_search(&(index - 1)).is_err()
+        });
+    }
+
+    /// Learns what a constraint says about the parameters in it.
+    fn note_parameters(
+        &mut self,
+        plan: &ParametrizedPlan,
+        from: NodeId,
+        to: NodeId,
+        lower: &Bound,
+        upper: &Bound,
+    ) {
+        let mut parameters = Vec::new();
+        parameters.extend(parameter_of(lower));
+        parameters.extend(parameter_of(upper));
+        let equal = lower == upper && parameters.len() == 2;
+        parameters.dedup();
+        for parameter in parameters {
+            debug_assert!(parameter.index() < plan.parameters.len());
+            if self.is_mentioned(parameter) {
+                self.coupled.push(parameter);
+            } else if equal {
+                self.substitution.insert(parameter, (from, to));
+            }
+        }
+        self.coupled.sort_unstable();
+        self.coupled.dedup();
+    }
+
+    /// Whether an earlier constraint mentions the parameter.
+    fn is_mentioned(&self, parameter: ParameterId) -> bool {
+        self.edges
+            .iter()
+            .any(|edge| edge.end.is_some_and(|end| end.parameter == parameter))
+    }
+
+    /// Whether the parameter bounds a difference of times.
+    pub fn is_in_network(&self, parameter: ParameterId) -> bool {
+        self.substitution.contains_key(&parameter) || self.is_mentioned(parameter)
+    }
+
+    /// A parameter in a product that the corners of a box say nothing about.
+    ///
+    /// Products are exact only one inequality at a time, only if the multiplied parameter does not
+    /// also move the times, and only if it does not multiply itself: a square is least between the
+    /// ends of an interval, unless its coefficient is negative.
+    pub(crate) fn undecided_at_corners(&self, case: &BadCase) -> Option<ParameterId> {
+        let is_joint = case.inequalities.len() > 1;
+        let expressions = case.inequalities.iter().map(|i| &i.expression);
+        expressions
+            .flat_map(|expression| {
+                let squared = expression.squared_parameter();
+                let multiplied = expression
+                    .multiplied_parameters()
+                    .filter(|&id| is_joint || self.is_in_network(id));
+                squared.into_iter().chain(multiplied)
+            })
+            .next()
+    }
+
+    /// Adds `to - from <= constant + reach(end)`.
+    fn add_edge(&mut self, from: NodeId, to: NodeId, constant: Rational, end: Option<BoxEnd>) {
+        let (from_class, from_offset) = &self.places[from.index()];
+        let (to_class, to_offset) = &self.places[to.index()];
+        let constant = constant + from_offset - to_offset;
+        let is_idle = from_class == to_class && end.is_none() && !constant.is_negative();
+        if !is_idle {
+            self.edges.push(Edge {
+                from: *from_class,
+                to: *to_class,
+                constant,
+                end,
+            });
+        }
+    }
+
+    /// Of parallel edges that depend on the same end only the tightest says anything.
+    fn keep_tightest(&mut self) {
+        self.edges.sort_by(|a, b| {
+            let place = |edge: &Edge| (edge.from, edge.to, edge.end);
+            place(a)
+                .cmp(&place(b))
+                .then_with(|| a.constant.cmp(&b.constant))
+        });
+        self.edges
+            .dedup_by(|b, a| (a.from, a.to, a.end) == (b.from, b.to, b.end));
+    }
+
+    /// The node's class, and by how much the node comes after it. One node more than the plan has
+    /// is the moment of an over-all condition; it has a class of its own, the last.
+    pub fn place(&self, node: NodeId) -> (ClassId, Rational) {
+        match self.places.get(node.index()) {
+            Some((class, offset)) => (*class, offset.clone()),
+            None => (self.moment(), Rational::ZERO),
+        }
+    }
+
+    /// By how much nodes come after their classes.
+    pub(crate) fn offsets(&self) -> impl Iterator<Item = &Rational> {
+        self.places.iter().map(|(_, offset)| offset)
+    }
+
+    /// The class of the moment at which an over-all condition is read.
+    pub fn moment(&self) -> ClassId {
+        ClassId(u32::try_from(self.class_count).expect("fewer classes than nodes"))
+    }
+
+    /// The constraints.
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+
+    /// How many classes there are.
+    pub fn class_count(&self) -> usize {
+        self.class_count
+    }
+
+    /// How many nodes the plan has.
+    pub fn node_count(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The network in which every parameter ranges over its interval, separately for each edge.
+    pub fn network(&self, envelope: &DecoupledEnvelope) -> BoxNetwork {
+        let mut network = Network::with_nodes(self.class_count);
+        let mut edges = Vec::with_capacity(self.edges.len());
+        for (index, edge) in self.edges.iter().enumerate() {
+            let Some(bound) = edge.bound(envelope) else {
+                continue;
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound: Delta::from(bound),
+            });
+            edges.push(index);
+        }
+        BoxNetwork { network, edges }
+    }
+
+    /// The times of all nodes, from those of the classes; class 0 holds time zero.
+    pub fn times(&self, class_times: &[Rational]) -> Vec<Rational> {
+        self.places
+            .iter()
+            .map(|(class, offset)| &class_times[class.index()] - &class_times[0] + offset)
+            .collect()
+    }
+}
+
+impl Edge {
+    /// The bound in a box; `None` if there is none.
+    pub fn bound(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
+        match self.end {
+            None => Some(self.constant.clone()),
+            Some(end) => end.reach(envelope).map(|reach| &self.constant + reach),
+        }
+    }
+}
+
+/// The constraints that others imply; none if the network is inconsistent (then there is nothing
+/// to gain, and the check of the nominal values will say so).
+fn implied<W: Weight>(
+    network: Network<W>,
+    keep: impl Fn(ConstraintId) -> bool,
+) -> Vec<ConstraintId> {
+    ConsistentNetwork::try_from(network)
+        .map(|network| network.implied(keep))
+        .unwrap_or_default()
+}
+
+/// The network with all bounds multiplied by their common denominator, if that gives numbers so
+/// small that no sum of them overflows.
+fn scaled(network: &Network<Delta>) -> Option<Network<i128>> {
+    const LARGEST: i128 = 1 << 80;
+    let mut denominator: i128 = 1;
+    for constraint in network.constraints() {
+        let own = i128::from(constraint.bound.real.denominator()?);
+        denominator = denominator.checked_mul(own / gcd(denominator, own))?;
+        if denominator > LARGEST {
+            return None;
+        }
+    }
+    let mut whole = Network::with_nodes(network.node_count());
+    for constraint in network.constraints() {
+        let (numerator, own) = constraint.bound.real.as_small()?;
+        let bound = i128::from(numerator).checked_mul(denominator / i128::from(own))?;
+        if bound.abs() > LARGEST {
+            return None;
+        }
+        whole.add(Constraint {
+            from: constraint.from,
+            to: constraint.to,
+            bound,
+        });
+    }
+    Some(whole)
+}
+
+fn gcd(a: i128, b: i128) -> i128 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+fn parameter_of(bound: &Bound) -> Option<ParameterId> {
+    match bound {
+        Bound::Parameter(id) => Some(*id),
+        Bound::Infinite | Bound::Finite(_) => None,
+    }
+}
+
+/// Each node's class and offset: a union-find over constraints of the form `[c, c]`.
+fn classes(plan: &ParametrizedPlan) -> Vec<(ClassId, Rational)> {
+    // `parent[n]` and by how much `n` comes after its parent.
+    let mut parents: Vec<(usize, Rational)> = (0..plan.plan.nodes.len())
+        .map(|node| (node, Rational::ZERO))
+        .collect();
+    for constraint in &plan.plan.constraints {
+        let (Bound::Finite(lower), Bound::Finite(upper)) = (&constraint.lower, &constraint.upper)
+        else {
+            continue;
+        };
+        if lower != upper {
+            continue;
+        }
+        let (from_root, from_offset) = root(&parents, constraint.from.index());
+        let (to_root, to_offset) = root(&parents, constraint.to.index());
+        // The smaller index stays the root, so that zero is the root of its class.
+        if from_root < to_root {
+            parents[to_root] = (from_root, from_offset + lower - to_offset);
+        } else if to_root < from_root {
+            parents[from_root] = (to_root, to_offset - lower - from_offset);
+        }
+    }
+    let mut numbers = BTreeMap::new();
+    (0..parents.len())
+        .map(|node| {
+            let (root, offset) = root(&parents, node);
+            let next = numbers.len();
+            let class = *numbers.entry(root).or_insert(next);
+            (
+                ClassId(u32::try_from(class).expect("fewer classes than nodes")),
+                offset,
+            )
+        })
+        .collect()
+}
+
+/// The node's root, and by how much the node comes after it.
+fn root(parents: &[(usize, Rational)], node: usize) -> (usize, Rational) {
+    let (mut at, mut offset) = (node, Rational::ZERO);
+    while parents[at].0 != at {
+        offset += &parents[at].1;
+        at = parents[at].0;
+    }
+    (at, offset)
+}

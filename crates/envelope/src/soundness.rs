@@ -1,0 +1,362 @@
+//! Whether every schedule of a plan is valid, for every value in a box.
+//!
+//! The second half of paper 1's CHECKINENVELOPE, `enc_tn ∧ enc_eff ∧ enc_R → enc_proofs`, without
+//! an SMT solver. Each way of breaking an obligation is a system of linear inequalities over the
+//! schedules of the box ([`BadCase`]); that it has no solution is shown by a path or a flow in the
+//! plan's network, or, where parameters are coupled, by a linear program. Such proofs are sums of
+//! constraints, so they are kept, and when a box is widened only those that use the moved end
+//! and no longer add up are looked for again.
+
+mod bad_case;
+mod certificate;
+mod corner;
+mod flow;
+mod lazy;
+mod linear_program;
+mod proof;
+mod scale;
+mod sound_box;
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_stn::ConsistentNetwork;
+
+use crate::linear::Linear;
+use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Requirement};
+use crate::reduction::Reduction;
+use bad_case::Outcome;
+use certificate::Certificate;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Valuation};
+use lazy::{Lazy, numbers};
+use proof::Proof;
+use scale::Numbers;
+
+pub use sound_box::SoundBox;
+
+/// Decides, box by box, whether every schedule of a plan is valid.
+///
+/// It does not hold the task and the plan, only what it has made of them: both are handed to it
+/// with each question, and must be those that it was made for.
+#[derive(Clone, Debug)]
+pub(crate) struct Soundness {
+    reduction: Reduction,
+    obligations: Obligations,
+    direct: Vec<DirectCase>,
+    over_all: Vec<Option<Proof>>,
+    /// The numbers in all bounds but the ends of boxes; `None` if they are large.
+    numbers: Option<Numbers>,
+    /// The case that broke last: the likeliest to break next.
+    suspect: usize,
+    /// How many bad cases have been refuted from scratch.
+    refutations: usize,
+}
+
+/// A bad case of a direct obligation with the proofs that it is impossible.
+#[derive(Clone, Debug)]
+struct DirectCase {
+    obligation: usize,
+    case: usize,
+    proofs: Option<Vec<Certificate>>,
+}
+
+/// An obligation that some schedule of a box breaks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Broken {
+    /// What is required.
+    pub requirement: Requirement,
+    /// How it is broken.
+    pub case: BadCase,
+}
+
+/// Values of the parameters and a schedule that break an obligation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Counterexample {
+    /// The parameters' values.
+    pub valuation: Valuation,
+    /// A time for each node.
+    pub schedule: Vec<Rational>,
+    /// For an over-all condition, the moment at which it is false.
+    pub moment: Option<Rational>,
+}
+
+/// The first obligation that some schedule for some value in the box (not empty) breaks; `None` if
+/// every schedule is valid.
+///
+/// That there is a schedule for every value is not asked: see [`Oracle`](crate::Oracle) for the
+/// whole check.
+///
+/// # Errors
+/// When the plan has no schedule at the values in the box nearest to its nominal ones, or holds
+/// something beyond exact linear reasoning.
+pub fn broken_in(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    epsilon: &Rational,
+    envelope: &DecoupledEnvelope,
+) -> Result<Option<Broken>, Refusal> {
+    let nearest = envelope.nearest(&plan.nominal());
+    let mut soundness = Soundness::around(task, plan, epsilon, &nearest)?;
+    soundness.broken(task, plan, envelope, None)
+}
+
+impl Soundness {
+    /// Compiles a plan's obligations for boxes that hold these values.
+    ///
+    /// Happenings are required to keep the order that they have there. That is no restriction in a
+    /// box with these values in it; in others, a different order may work as well.
+    ///
+    /// # Errors
+    /// When the plan has no schedule at these values ([`Refusal::NoNominalSchedule`]), or holds
+    /// something beyond exact linear reasoning.
+    pub(crate) fn around(
+        task: &Task,
+        plan: &ParametrizedPlan,
+        epsilon: &Rational,
+        valuation: &[Rational],
+    ) -> Result<Self, Refusal> {
+        let reduction = Reduction::new(plan);
+        let schedule =
+            earliest_schedule(&reduction, valuation).ok_or(Refusal::NoNominalSchedule)?;
+        let obligations =
+            Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
+        let mut direct = Vec::new();
+        for (index, obligation) in obligations.direct.iter().enumerate() {
+            for (case, bad) in obligation.bad_cases.iter().enumerate() {
+                check_products(plan, &reduction, bad)?;
+                direct.push(DirectCase {
+                    obligation: index,
+                    case,
+                    proofs: None,
+                });
+            }
+        }
+        for over_all in &obligations.over_all {
+            check_over_all(task, plan, &reduction, over_all, &schedule)?;
+        }
+        let over_all = vec![None; obligations.over_all.len()];
+        let numbers = numbers(&reduction, &obligations);
+        Ok(Self {
+            reduction,
+            obligations,
+            direct,
+            over_all,
+            numbers,
+            suspect: 0,
+            refutations: 0,
+        })
+    }
+
+    /// The plan's network with rigidly connected nodes taken together.
+    pub(crate) fn reduction(&self) -> &Reduction {
+        &self.reduction
+    }
+
+    /// How many bad cases have been refuted from scratch so far: a measure of work.
+    pub(crate) fn refutations(&self) -> usize {
+        self.refutations
+    }
+
+    /// The first obligation that some schedule for some value in the box breaks. The box contains
+    /// the values that this was made [around](Self::around).
+    ///
+    /// Remembers the proofs it finds. `moved` is a hint, for speed: the box differs only in that
+    /// end, further out than before, from the last one for which the answer was `None`, and all
+    /// boxes asked about since have been that one with an end moved out.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub(crate) fn broken(
+        &mut self,
+        task: &Task,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+        moved: Option<BoxEnd>,
+    ) -> Result<Option<Broken>, Refusal> {
+        let Self {
+            reduction,
+            obligations,
+            direct,
+            over_all,
+            numbers,
+            suspect,
+            refutations,
+        } = self;
+        let mut schedules = Lazy::Unmade(reduction, envelope, numbers.as_ref());
+        let first = (*suspect).min(direct.len());
+        let mut found = None;
+        for index in (first..direct.len()).chain(0..first) {
+            let direct = &mut direct[index];
+            let obligation = &obligations.direct[direct.obligation];
+            let is_separation = matches!(obligation.requirement, Requirement::Separation { .. });
+            // What happenings read is known only where those that interfere keep their order, so
+            // that they do not is the better reason, and the only one with a counterexample.
+            if found.is_some() && !is_separation || direct.stands(envelope, moved) {
+                continue;
+            }
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
+            *refutations += 1;
+            match schedules.possible(&obligation.bad_cases[direct.case]) {
+                Outcome::Impossible(proofs) => direct.proofs = Some(proofs),
+                Outcome::Possible => {
+                    *suspect = index;
+                    found = Some(Broken {
+                        requirement: obligation.requirement.clone(),
+                        case: obligation.bad_cases[direct.case].clone(),
+                    });
+                    if is_separation {
+                        return Ok(found);
+                    }
+                }
+                Outcome::Unknown(parameter) => {
+                    return Err(Refusal::Coupled {
+                        name: plan.parameter(parameter).name.clone(),
+                    });
+                }
+            }
+        }
+        if found.is_some() {
+            return Ok(found);
+        }
+        for (over_all, proof) in obligations.over_all.iter().zip(over_all) {
+            if proof
+                .as_ref()
+                .is_some_and(|proof| proof.holds_in(envelope, moved))
+            {
+                continue;
+            }
+            let Some(schedules) = schedules.get() else {
+                return Ok(None);
+            };
+            *refutations += 1;
+            match schedules.prove(task, plan, over_all, proof.as_ref(), moved)? {
+                Ok(found) => *proof = Some(found),
+                Err(case) => {
+                    return Ok(Some(Broken {
+                        requirement: Requirement::OverAll {
+                            instance: over_all.instance,
+                            condition: over_all.condition.clone(),
+                        },
+                        case,
+                    }));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Values and a schedule in the box that break the obligation as said.
+    pub(crate) fn counterexample(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        if let Requirement::Separation { first, second } = broken.requirement
+            && broken.case.differences.len() == 1
+        {
+            // The wrong way round may do no harm, if they are far apart or one is a timed initial
+            // after the end of the plan. But schedules are convex: between such a one and the one
+            // that the order was taken from lies one with the happenings in order, and too near.
+            let mut near = broken.case.clone();
+            near.differences.push(Difference::not_after(first, second));
+            let witness = bad_case::witness(&self.reduction, envelope, &near, None);
+            if witness.is_some() {
+                return witness;
+            }
+        }
+        bad_case::witness(&self.reduction, envelope, &broken.case, None)
+    }
+
+    /// Like [`counterexample`](Self::counterexample), but breaking the obligation by as much as
+    /// any does. Two happenings that should be apart may then be so far the wrong way round that
+    /// it does no harm.
+    pub(crate) fn worst_case(
+        &self,
+        envelope: &DecoupledEnvelope,
+        broken: &Broken,
+    ) -> Option<Counterexample> {
+        let gap = match broken.requirement {
+            Requirement::Separation { first, second } => Some(Linear::difference(first, second)),
+            _ => None,
+        };
+        bad_case::witness(&self.reduction, envelope, &broken.case, gap.as_ref())
+    }
+}
+
+impl DirectCase {
+    /// Whether the known proofs still stand.
+    fn stands(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+        let Some(proofs) = &self.proofs else {
+            return false;
+        };
+        proofs.iter().all(|proof| match moved {
+            Some(end) => !proof.depends_on(end) || proof.holds_in(envelope, moved),
+            None => proof.holds_in(envelope, None),
+        })
+    }
+}
+
+/// The earliest schedule at these values, by node.
+fn earliest_schedule(reduction: &Reduction, valuation: &[Rational]) -> Option<Vec<Rational>> {
+    let point = DecoupledEnvelope::point(valuation);
+    let network = reduction.network(&point).network;
+    let consistent = ConsistentNetwork::try_from(network).ok()?;
+    let earliest = consistent.earliest_schedule(elbowroom_stn::NodeId(0));
+    let times: Vec<Rational> = earliest
+        .times()
+        .iter()
+        .map(|time| time.real.clone())
+        .collect();
+    Some(reduction.times(&times))
+}
+
+/// Products are exact only one inequality at a time, and only if the multiplied parameter does not
+/// also move the times.
+fn check_products(
+    plan: &ParametrizedPlan,
+    reduction: &Reduction,
+    case: &BadCase,
+) -> Result<(), Refusal> {
+    match reduction.undecided_at_corners(case) {
+        Some(parameter) => Err(Refusal::Coupled {
+            name: plan.parameter(parameter).name.clone(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// The same for an over-all condition, read at any place of its moment among the events of the
+/// nominal schedule. Other places come to light with a box.
+fn check_over_all(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    reduction: &Reduction,
+    over_all: &OverAll,
+    nominal: &[Rational],
+) -> Result<(), Refusal> {
+    let (start, end) = (
+        &nominal[over_all.start.index()],
+        &nominal[over_all.end.index()],
+    );
+    let mut moments = vec![start];
+    moments.extend(
+        over_all
+            .events
+            .iter()
+            .map(|event| &nominal[event.index()])
+            .filter(|&time| time > start && time < end),
+    );
+    for moment in moments {
+        let cut = |node: NodeId| nominal[node.index()] <= *moment;
+        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+            inequalities.extend(over_all.assumptions.iter().cloned());
+            let case = BadCase {
+                differences: Vec::new(),
+                inequalities,
+            };
+            check_products(plan, reduction, &case)?;
+        }
+    }
+    Ok(())
+}

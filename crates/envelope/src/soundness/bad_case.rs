@@ -1,0 +1,393 @@
+//! Deciding whether a bad case is possible in a box.
+
+use elbowroom_num::{Delta, Rational};
+use elbowroom_stn::{
+    Checkpoint, ConsistentNetwork, Constraint, NegativeCycle, Network, NodeId as ClassId, Schedule,
+    Weight,
+};
+
+use super::Counterexample;
+use super::certificate::Certificate;
+use super::corner::corners;
+use super::flow;
+use super::linear_program;
+use super::scale::{Exactly, Scale};
+use crate::linear::Linear;
+use crate::obligations::{BadCase, Difference, Inequality};
+use crate::reduction::Reduction;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
+
+/// The schedules of a box: a network that can be tightened for a while.
+pub(crate) struct Schedules<'a, S: Scale> {
+    pub(crate) reduction: &'a Reduction,
+    pub(crate) envelope: &'a DecoupledEnvelope,
+    network: ConsistentNetwork<S::Weight>,
+    scale: S,
+    /// A schedule without assumptions.
+    base: Schedule<S::Weight>,
+    /// For the first constraints of the network, a position in [`Reduction::edges`].
+    edges: Vec<usize>,
+    /// The constraints after these: what is assumed.
+    assumed: Vec<Constraint<Delta>>,
+}
+
+/// A moment to come back to.
+pub(crate) struct Before<W> {
+    checkpoint: Checkpoint,
+    schedule: Schedule<W>,
+    assumed: usize,
+}
+
+/// Whether a bad case is possible.
+pub(crate) enum Outcome {
+    /// No; one proof for each combination of values of multiplied parameters.
+    Impossible(Vec<Certificate>),
+    /// Yes.
+    Possible,
+    /// Nobody knows: a parameter multiplies something in several inequalities, or moves the times
+    /// as well, so the corners of the box do not decide.
+    Unknown(ParameterId),
+}
+
+impl<'a, S: Scale> Schedules<'a, S> {
+    /// All schedules for values in the box, or `None` if there are none at all.
+    pub(crate) fn new(
+        reduction: &'a Reduction,
+        envelope: &'a DecoupledEnvelope,
+        scale: S,
+    ) -> Option<Self> {
+        let parameters = (0..envelope.intervals.len()).map(ParameterId::from);
+        let reaches: Vec<[Option<S::Weight>; 2]> = parameters
+            .map(|parameter| {
+                Side::BOTH.map(|side| {
+                    let reach = BoxEnd { parameter, side }.reach(envelope)?;
+                    Some(scale.weight(&Delta::from(reach)))
+                })
+            })
+            .collect();
+        let mut network = Network::with_nodes(reduction.class_count());
+        let mut edges = Vec::with_capacity(reduction.edges().len());
+        for (index, edge) in reduction.edges().iter().enumerate() {
+            let constant = scale.weight(&Delta::from(edge.constant.clone()));
+            let bound = match edge.end {
+                None => constant,
+                Some(end) => match &reaches[end.parameter.index()][end.side.index()] {
+                    Some(reach) => constant.plus(reach),
+                    None => continue,
+                },
+            };
+            network.add(Constraint {
+                from: edge.from,
+                to: edge.to,
+                bound,
+            });
+            edges.push(index);
+        }
+        let network = ConsistentNetwork::try_from(network).ok()?;
+        let base = network.schedule().clone();
+        Some(Self {
+            reduction,
+            envelope,
+            network,
+            scale,
+            base,
+            edges,
+            assumed: Vec::new(),
+        })
+    }
+
+    /// Tightens by a difference.
+    ///
+    /// # Errors
+    /// The proof that this leaves no schedule; the network is as before.
+    pub(crate) fn assume(&mut self, difference: &Difference) -> Result<(), Certificate> {
+        let constraint = constraint(self.reduction, difference);
+        let weighted = Constraint {
+            from: constraint.from,
+            to: constraint.to,
+            bound: self.scale.weight(&constraint.bound),
+        };
+        match self.network.add(weighted) {
+            Ok(_) => {
+                self.assumed.push(constraint);
+                Ok(())
+            }
+            Err(cycle) => Err(self.certificate(&cycle, &constraint.bound)),
+        }
+    }
+
+    /// The present moment, to come back to.
+    pub(crate) fn before(&self) -> Before<S::Weight> {
+        Before {
+            checkpoint: self.network.checkpoint(),
+            schedule: self.network.schedule().clone(),
+            assumed: self.assumed.len(),
+        }
+    }
+
+    /// Forgets what has been assumed since.
+    pub(crate) fn undo_to(&mut self, before: &Before<S::Weight>) {
+        self.network.undo_with(before.checkpoint, &before.schedule);
+        self.assumed.truncate(before.assumed);
+    }
+
+    /// Adds a time point: the moment of an over-all condition.
+    pub(crate) fn add_moment(&mut self) {
+        self.network.add_node();
+    }
+
+    /// The proof a negative cycle is; its first constraint, with bound `added`, was refused.
+    fn certificate(&self, cycle: &NegativeCycle<S::Weight>, added: &Delta) -> Certificate {
+        let mut certificate = Certificate::default();
+        for id in &cycle.constraints {
+            let assumed = id.index().checked_sub(self.edges.len());
+            match assumed.map(|index| self.assumed.get(index)) {
+                None => {
+                    let edge = self.edges[id.index()];
+                    certificate.add_edge(&self.reduction.edges()[edge], &Rational::ONE);
+                }
+                Some(Some(constraint)) => {
+                    certificate.add_constant(&constraint.bound, &Rational::ONE);
+                }
+                Some(None) => certificate.add_constant(added, &Rational::ONE),
+            }
+        }
+        certificate
+    }
+
+    /// Whether all of the case can be at once.
+    pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
+        let checkpoint = self.network.checkpoint();
+        let mut refuted = None;
+        for difference in &case.differences {
+            if let Err(certificate) = self.assume(difference) {
+                refuted = Some(Outcome::Impossible(vec![certificate]));
+                break;
+            }
+        }
+        let outcome = refuted.unwrap_or_else(|| self.inequalities_possible(case));
+        if !self.assumed.is_empty() {
+            self.network.undo_with(checkpoint, &self.base);
+            self.assumed.clear();
+        }
+        outcome
+    }
+
+    /// Whether the inequalities can hold in the network as it is now, differences included.
+    pub(crate) fn inequalities_possible(&mut self, case: &BadCase) -> Outcome {
+        if case.inequalities.is_empty() && self.reduction.coupled.is_empty() {
+            return Outcome::Possible;
+        }
+        let mut certificates = Vec::new();
+        let multiplied: Vec<ParameterId> = {
+            let mut ids: Vec<_> = case
+                .inequalities
+                .iter()
+                .flat_map(|inequality| inequality.expression.multiplied_parameters())
+                .collect();
+            ids.sort_unstable();
+            ids.dedup();
+            ids
+        };
+        let corners = corners(self.envelope, &multiplied);
+        if let (Some(parameter), true) =
+            (self.reduction.undecided_at_corners(case), corners.len() > 1)
+        {
+            return self.each_possible(case, parameter);
+        }
+        for corner in corners {
+            let fixed: Vec<Inequality> = case
+                .inequalities
+                .iter()
+                .map(|inequality| corner.apply(inequality))
+                .collect();
+            match self.linear_possible(&fixed) {
+                Some(mut certificate) => {
+                    certificate.fixed = multiplied
+                        .iter()
+                        .flat_map(|&parameter| Side::BOTH.map(|side| BoxEnd { parameter, side }))
+                        .collect();
+                    certificates.push(certificate);
+                }
+                None => return Outcome::Possible,
+            }
+        }
+        Outcome::Impossible(certificates)
+    }
+
+    /// Where corners do not decide several inequalities at once, one of them may be impossible by
+    /// itself.
+    fn each_possible(&mut self, case: &BadCase, parameter: ParameterId) -> Outcome {
+        if case.inequalities.len() > 1 {
+            for inequality in &case.inequalities {
+                let alone = BadCase {
+                    differences: Vec::new(),
+                    inequalities: vec![inequality.clone()],
+                };
+                let outcome = self.inequalities_possible(&alone);
+                if matches!(outcome, Outcome::Impossible(_)) {
+                    return outcome;
+                }
+            }
+        }
+        Outcome::Unknown(parameter)
+    }
+
+    /// A proof that the inequalities, free of products, cannot all hold; `None` if they can.
+    fn linear_possible(&mut self, inequalities: &[Inequality]) -> Option<Certificate> {
+        // Each inequality alone, without what couples parameters, is a problem of flows.
+        for inequality in inequalities {
+            if let Some(certificate) = self.flow_certificate(inequality) {
+                return Some(certificate);
+            }
+        }
+        // A parameter that is a difference of times has been replaced by it; one that only bounds a
+        // difference occurs twice.
+        let is_shared = inequalities
+            .iter()
+            .flat_map(|inequality| inequality.expression.parameters.keys())
+            .any(|&parameter| self.reduction.is_in_network(parameter));
+        if inequalities.len() <= 1 && self.reduction.coupled.is_empty() && !is_shared {
+            return None;
+        }
+        linear_program::refute(self.reduction, self.envelope, &self.assumed, inequalities)
+    }
+
+    /// The proof that `expression <= 0` fails in all schedules, if it does.
+    fn flow_certificate(&self, inequality: &Inequality) -> Option<Certificate> {
+        // It can hold exactly if the greatest value of `-expression` is at least zero.
+        let negated = inequality.expression.scaled(&Rational::from(-1));
+        let (constant, demand) = self.by_class(&negated);
+        let mut certificate = Certificate::default();
+        certificate.add_constant(&Delta::from(constant), &Rational::ONE);
+        if inequality.is_strict {
+            certificate.add_constant(&Delta::just_below(Rational::ZERO), &Rational::ONE);
+        }
+        for (&parameter, coefficient) in &negated.parameters {
+            let side = if coefficient.is_positive() {
+                Side::Upper
+            } else {
+                Side::Lower
+            };
+            certificate.add_end(BoxEnd { parameter, side }, &coefficient.abs());
+        }
+        let flow = flow::cheapest(&self.network, &demand)?;
+        for (index, amount) in flow
+            .iter()
+            .enumerate()
+            .filter(|(_, amount)| amount.is_positive())
+        {
+            if let Some(&edge) = self.edges.get(index) {
+                certificate.add_edge(&self.reduction.edges()[edge], amount);
+            } else {
+                let assumed = &self.assumed[index - self.edges.len()];
+                certificate.add_constant(&assumed.bound, amount);
+            }
+        }
+        certificate
+            .holds_in(self.envelope, None)
+            .then_some(certificate)
+    }
+
+    /// The expression's constant and its coefficient for each class; times count from class 0.
+    fn by_class(&self, expression: &Linear) -> (Rational, Vec<Rational>) {
+        let mut demand = vec![Rational::ZERO; self.network.network().node_count()];
+        let constant = spread(self.reduction, expression, |class: ClassId, coefficient| {
+            demand[class.index()] += coefficient;
+        });
+        demand[0] = Rational::ZERO;
+        demand[0] = -demand.iter().sum::<Rational>();
+        (constant, demand)
+    }
+}
+
+/// `to - from <= bound` over classes.
+fn constraint(reduction: &Reduction, difference: &Difference) -> Constraint<Delta> {
+    let (from, from_offset) = reduction.place(difference.from);
+    let (to, to_offset) = reduction.place(difference.to);
+    let bound = &difference.bound + &from_offset - &to_offset;
+    let bound = if difference.is_strict {
+        Delta::just_below(bound)
+    } else {
+        Delta::from(bound)
+    };
+    Constraint { from, to, bound }
+}
+
+/// Calls `add` with each class and its share of the expression's times, and returns the constant
+/// with the nodes' offsets in it.
+pub(crate) fn spread(
+    reduction: &Reduction,
+    expression: &Linear,
+    mut add: impl FnMut(ClassId, &Rational),
+) -> Rational {
+    let mut constant = expression.constant.clone();
+    for (&node, coefficient) in &expression.times {
+        let (class, offset) = reduction.place(node);
+        constant += coefficient * &offset;
+        add(class, coefficient);
+    }
+    constant
+}
+
+/// Values and a schedule in the box for which the case comes about. Among these, the ones that
+/// make `least` smallest, or, failing that, break the case's only inequality by most.
+pub(crate) fn witness(
+    reduction: &Reduction,
+    envelope: &DecoupledEnvelope,
+    case: &BadCase,
+    least: Option<&Linear>,
+) -> Option<Counterexample> {
+    // Without any schedule there is none to show.
+    Schedules::new(reduction, envelope, Exactly)?;
+    let assumed: Vec<_> = case
+        .differences
+        .iter()
+        .map(|d| constraint(reduction, d))
+        .collect();
+    let multiplied: Vec<ParameterId> = case
+        .inequalities
+        .iter()
+        .flat_map(|i| i.expression.multiplied_parameters())
+        .collect();
+    let least = |fixed: &'_ [Inequality]| match (least, fixed) {
+        (Some(least), _) => Some(least.clone()),
+        (None, [inequality]) => Some(inequality.expression.clone()),
+        (None, _) => None,
+    };
+    corners(envelope, &multiplied)
+        .into_iter()
+        .find_map(|corner| {
+            let fixed: Vec<Inequality> =
+                case.inequalities.iter().map(|i| corner.apply(i)).collect();
+            let (class_times, mut valuation) = linear_program::witness(
+                reduction,
+                envelope,
+                &assumed,
+                &fixed,
+                least(&fixed).as_ref(),
+            )?;
+            for (&parameter, value) in &corner.values {
+                valuation[parameter.index()] = value.clone();
+            }
+            let moment = &class_times[reduction.class_count()] - &class_times[0];
+            let mut times = reduction.times(&class_times);
+            times.push(moment.clone());
+            let comes_about = |valuation: &Valuation| {
+                envelope.contains(valuation)
+                    && case.inequalities.iter().all(|i| i.holds(&times, valuation))
+            };
+            let valuation = corner.far_out(valuation, &comes_about)?;
+            times.pop();
+            let reads_moment = case
+                .differences
+                .iter()
+                .flat_map(|difference| [difference.from, difference.to])
+                .any(|node| node.index() == reduction.node_count());
+            Some(Counterexample {
+                valuation,
+                schedule: times,
+                moment: reads_moment.then_some(moment),
+            })
+        })
+}

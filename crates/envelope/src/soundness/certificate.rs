@@ -1,0 +1,70 @@
+//! Proofs that a bad case cannot be, and how they depend on a box.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::{Delta, Rational};
+
+use crate::reduction::Edge;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
+
+/// A sum of constraints that comes out below zero on one side and at zero on the other.
+///
+/// By Farkas' lemma a system of linear inequalities is infeasible exactly if such a sum exists.
+/// Its value in a box is `base + Σ factor · reach(end)`; below zero, the bad case is impossible in
+/// that box. So after a box has been widened, one sum tells whether an old proof still stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Certificate {
+    base: Delta,
+    /// Positive factors.
+    ends: BTreeMap<BoxEnd, Rational>,
+    /// Ends on which the factors themselves depend: once one moves, the proof is void.
+    pub(crate) fixed: Vec<BoxEnd>,
+}
+
+impl Certificate {
+    /// Adds `factor` times a constant.
+    pub(crate) fn add_constant(&mut self, constant: &Delta, factor: &Rational) {
+        self.base = &self.base + &constant.scaled(factor);
+    }
+
+    /// Adds `factor` times an edge's bound.
+    pub(crate) fn add_edge(&mut self, edge: &Edge, factor: &Rational) {
+        self.base.real += &edge.constant * factor;
+        if let Some(end) = edge.end {
+            self.add_end(end, factor);
+        }
+    }
+
+    /// Adds `factor` times an end's reach.
+    pub(crate) fn add_end(&mut self, end: BoxEnd, factor: &Rational) {
+        *self.ends.entry(end).or_default() += factor;
+    }
+
+    /// Whether the proof uses the end.
+    pub(crate) fn depends_on(&self, end: BoxEnd) -> bool {
+        self.ends.contains_key(&end) || self.fixed.contains(&end)
+    }
+
+    /// The value in the box; `None` for infinity.
+    pub(crate) fn value(&self, envelope: &DecoupledEnvelope) -> Option<Delta> {
+        let mut value = self.base.clone();
+        for (end, factor) in &self.ends {
+            value.real += &end.reach(envelope)? * factor;
+        }
+        Some(value)
+    }
+
+    /// Whether the proof stands in the box, which differs from the one it was made for in `moved`;
+    /// `None`: nothing is known about how they differ.
+    pub(crate) fn holds_in(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+        let is_void = match moved {
+            Some(end) => self.fixed.contains(&end),
+            None => !self.fixed.is_empty(),
+        };
+        if is_void {
+            return false;
+        }
+        self.value(envelope)
+            .is_some_and(|value| value < Delta::ZERO)
+    }
+}

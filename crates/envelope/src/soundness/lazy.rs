@@ -1,0 +1,90 @@
+//! The network of a box, made only when something has to be proved anew.
+
+use elbowroom_model::Task;
+
+use super::bad_case::{Outcome, Schedules};
+use super::proof::{Attempt, Proof, Prover};
+use super::scale::{Exactly, Numbers, Whole};
+use crate::obligations::{BadCase, Obligations, OverAll, Refusal};
+use crate::reduction::Reduction;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
+
+/// The network of a box, made when first needed.
+pub(crate) enum Lazy<'a> {
+    Unmade(&'a Reduction, &'a DecoupledEnvelope, Option<&'a Numbers>),
+    Made(AnySchedules<'a>),
+    /// The box has no schedule at all: then none is bad.
+    Empty,
+}
+
+impl<'a> Lazy<'a> {
+    /// `None` if the box has no schedule at all.
+    pub(crate) fn get(&mut self) -> Option<&mut AnySchedules<'a>> {
+        if let Self::Unmade(reduction, envelope, numbers) = *self {
+            *self = AnySchedules::new(reduction, envelope, numbers).map_or(Self::Empty, Self::Made);
+        }
+        match self {
+            Self::Made(schedules) => Some(schedules),
+            Self::Unmade(..) | Self::Empty => None,
+        }
+    }
+}
+
+/// The network of a box, with whole numbers for weights if they fit.
+pub(crate) enum AnySchedules<'a> {
+    Whole(Schedules<'a, Whole>),
+    Exact(Schedules<'a, Exactly>),
+}
+
+impl<'a> AnySchedules<'a> {
+    /// `None` if the box has no schedule at all.
+    fn new(
+        reduction: &'a Reduction,
+        envelope: &'a DecoupledEnvelope,
+        numbers: Option<&Numbers>,
+    ) -> Option<Self> {
+        match numbers.and_then(|numbers| Whole::fitting(reduction, envelope, numbers)) {
+            Some(scale) => Schedules::new(reduction, envelope, scale).map(Self::Whole),
+            None => Schedules::new(reduction, envelope, Exactly).map(Self::Exact),
+        }
+    }
+
+    pub(crate) fn possible(&mut self, case: &BadCase) -> Outcome {
+        match self {
+            Self::Whole(schedules) => schedules.possible(case),
+            Self::Exact(schedules) => schedules.possible(case),
+        }
+    }
+
+    pub(crate) fn prove(
+        &mut self,
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        over_all: &'a OverAll,
+        old: Option<&Proof>,
+        moved: Option<BoxEnd>,
+    ) -> Result<Attempt, Refusal> {
+        match self {
+            Self::Whole(schedules) => {
+                Prover::new(task, plan, over_all, schedules).prove(old, moved)
+            }
+            Self::Exact(schedules) => {
+                Prover::new(task, plan, over_all, schedules).prove(old, moved)
+            }
+        }
+    }
+}
+
+/// The numbers that bounds are made of, but for the ends of boxes; `None` if they are large.
+pub(crate) fn numbers(reduction: &Reduction, obligations: &Obligations) -> Option<Numbers> {
+    let mut numbers = Numbers::default();
+    numbers.include_edges(reduction.edges())?;
+    reduction
+        .offsets()
+        .try_for_each(|offset| numbers.include(offset))?;
+    let cases = obligations.direct.iter().flat_map(|o| &o.bad_cases);
+    cases
+        .flat_map(|case| &case.differences)
+        .try_for_each(|difference| numbers.include(&difference.bound))?;
+    Some(numbers)
+}

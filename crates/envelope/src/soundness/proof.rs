@@ -1,0 +1,196 @@
+//! The proof that an over-all condition holds: a tree over the places of its moment.
+
+use elbowroom_model::Task;
+
+use super::bad_case::{Outcome, Schedules};
+use super::certificate::Certificate;
+use super::scale::Scale;
+use crate::obligations::{BadCase, Difference, OverAll, Refusal};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan};
+
+/// How many places of the moment are told apart in one over-all condition.
+const MOST_PLACES: usize = 100_000;
+
+/// Why there is no moment at which the condition is false.
+#[derive(Clone, Debug)]
+pub(crate) enum Proof {
+    /// There is no such moment, whatever the condition.
+    NoMoment(Certificate),
+    /// Which events come before the moment is settled, and the condition is true there: one proof
+    /// for each way in which it could be false.
+    True(Vec<Vec<Certificate>>),
+    /// The moment is at or after an event, or before it.
+    Either(Box<Proof>, Box<Proof>),
+}
+
+impl Proof {
+    /// Whether the proof stands in a box that differs from its own in `moved` only.
+    pub(crate) fn holds_in(&self, envelope: &DecoupledEnvelope, moved: Option<BoxEnd>) -> bool {
+        match self {
+            Self::NoMoment(certificate) => certificate.holds_in(envelope, moved),
+            Self::True(cases) => cases.iter().flatten().all(|c| c.holds_in(envelope, moved)),
+            Self::Either(after, before) => {
+                after.holds_in(envelope, moved) && before.holds_in(envelope, moved)
+            }
+        }
+    }
+}
+
+/// Looks for a moment at which an over-all condition is false.
+pub(crate) struct Prover<'a, 'b, S: Scale> {
+    pub(crate) task: &'a Task,
+    pub(crate) plan: &'a ParametrizedPlan,
+    pub(crate) over_all: &'a OverAll,
+    pub(crate) schedules: &'b mut Schedules<'a, S>,
+    /// The differences assumed so far, for the counterexample.
+    assumed: Vec<Difference>,
+    places: usize,
+}
+
+/// A proof, or how the condition can be false.
+pub(crate) type Attempt = Result<Proof, BadCase>;
+
+impl<'a, 'b, S: Scale> Prover<'a, 'b, S> {
+    pub(crate) fn new(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        over_all: &'a OverAll,
+        schedules: &'b mut Schedules<'a, S>,
+    ) -> Self {
+        Self {
+            task,
+            plan,
+            over_all,
+            schedules,
+            assumed: Vec::new(),
+            places: 0,
+        }
+    }
+
+    /// Proves the condition in the box, reusing what stands of an old proof.
+    pub(crate) fn prove(
+        &mut self,
+        old: Option<&Proof>,
+        moved: Option<BoxEnd>,
+    ) -> Result<Attempt, Refusal> {
+        let before = self.schedules.before();
+        self.schedules.add_moment();
+        let inside = [
+            Difference::before(self.over_all.start, self.over_all.moment),
+            Difference::before(self.over_all.moment, self.over_all.end),
+        ];
+        let mut attempt = None;
+        for difference in inside {
+            match self.schedules.assume(&difference) {
+                Ok(()) => self.assumed.push(difference),
+                Err(certificate) => {
+                    attempt = Some(Ok(Proof::NoMoment(certificate)));
+                    break;
+                }
+            }
+        }
+        let attempt = match attempt {
+            Some(attempt) => attempt,
+            None => self.place(0, &mut Vec::new(), old, moved)?,
+        };
+        self.schedules.undo_to(&before);
+        Ok(attempt)
+    }
+
+    /// Places the moment relative to the events from `index` on; `happened` come before it.
+    fn place(
+        &mut self,
+        index: usize,
+        happened: &mut Vec<NodeId>,
+        old: Option<&Proof>,
+        moved: Option<BoxEnd>,
+    ) -> Result<Attempt, Refusal> {
+        if let Some(old) = old
+            && old.holds_in(self.schedules.envelope, moved)
+        {
+            return Ok(Ok(old.clone()));
+        }
+        self.places += 1;
+        if self.places > MOST_PLACES {
+            return Err(Refusal::TooManyCases {
+                place: format!(
+                    "over-all condition of {}",
+                    self.plan.plan.instance(self.over_all.instance).action.name
+                ),
+                limit: MOST_PLACES,
+            });
+        }
+        let Some(&event) = self.over_all.events.get(index) else {
+            return self.settle(happened);
+        };
+        let (old_after, old_before) = match old {
+            Some(Proof::Either(after, before)) => (Some(&**after), Some(&**before)),
+            _ => (None, None),
+        };
+        let moment = self.over_all.moment;
+        happened.push(event);
+        let after = self.branch(
+            Difference::not_after(event, moment),
+            index,
+            happened,
+            old_after,
+            moved,
+        )?;
+        happened.pop();
+        let Ok(after) = after else { return Ok(after) };
+        let before = self.branch(
+            Difference::before(moment, event),
+            index,
+            happened,
+            old_before,
+            moved,
+        )?;
+        Ok(before.map(|before| Proof::Either(Box::new(after), Box::new(before))))
+    }
+
+    fn branch(
+        &mut self,
+        difference: Difference,
+        index: usize,
+        happened: &mut Vec<NodeId>,
+        old: Option<&Proof>,
+        moved: Option<BoxEnd>,
+    ) -> Result<Attempt, Refusal> {
+        let before = self.schedules.before();
+        if let Err(certificate) = self.schedules.assume(&difference) {
+            return Ok(Ok(Proof::NoMoment(certificate)));
+        }
+        self.assumed.push(difference);
+        let attempt = self.place(index + 1, happened, old, moved)?;
+        if attempt.is_ok() {
+            self.assumed.pop();
+        }
+        self.schedules.undo_to(&before);
+        Ok(attempt)
+    }
+
+    fn coupled(&self, parameter: ParameterId) -> Refusal {
+        Refusal::Coupled {
+            name: self.plan.parameter(parameter).name.clone(),
+        }
+    }
+
+    /// All events are placed: the condition's value is now an expression.
+    fn settle(&mut self, happened: &[NodeId]) -> Result<Attempt, Refusal> {
+        let cut = |node: NodeId| happened.contains(&node);
+        let mut proofs = Vec::new();
+        for mut inequalities in self.over_all.cases(self.task, &self.plan.plan, &cut)? {
+            inequalities.extend(self.over_all.assumptions.iter().cloned());
+            let case = BadCase {
+                differences: self.assumed.clone(),
+                inequalities,
+            };
+            match self.schedules.inequalities_possible(&case) {
+                Outcome::Impossible(certificates) => proofs.push(certificates),
+                Outcome::Possible => return Ok(Err(case)),
+                Outcome::Unknown(parameter) => return Err(self.coupled(parameter)),
+            }
+        }
+        Ok(Ok(Proof::True(proofs)))
+    }
+}

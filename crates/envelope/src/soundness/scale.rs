@@ -1,0 +1,197 @@
+//! Weights of the networks in which bad cases are looked for.
+//!
+//! Bounds are fractions, and strict ones an infinitesimal less. Nearly always they fit whole
+//! numbers, multiplied by their common denominator: that is several times faster, and as exact.
+
+use elbowroom_num::{Delta, Rational};
+use elbowroom_stn::Weight;
+
+use crate::reduction::{Edge, Reduction};
+use elbowroom_plan::DecoupledEnvelope;
+
+/// How bounds become weights. Sums and comparisons of weights are those of the bounds.
+pub(crate) trait Scale {
+    /// What a bound becomes.
+    type Weight: Weight;
+
+    /// The bound's weight.
+    fn weight(&self, bound: &Delta) -> Self::Weight;
+}
+
+/// Bounds are their own weights.
+#[derive(Clone, Debug)]
+pub(crate) struct Exactly;
+
+impl Scale for Exactly {
+    type Weight = Delta;
+
+    fn weight(&self, bound: &Delta) -> Delta {
+        bound.clone()
+    }
+}
+
+/// Whole numbers: multiples of `1 / denominator`, each [`UNIT`] δ.
+#[derive(Clone, Debug)]
+pub(crate) struct Whole {
+    denominator: i64,
+}
+
+/// How many δ make up the smallest difference of two bounds: more than anything adds up.
+const UNIT: i128 = 1 << 40;
+
+/// All weights on a path without repetition add up to less, δ apart.
+const LARGEST_PATH: i128 = 1 << 60;
+
+impl Scale for Whole {
+    type Weight = i128;
+
+    fn weight(&self, bound: &Delta) -> i128 {
+        let whole = |number: &Rational| {
+            let (numerator, own) = number.as_small().expect("looked at before");
+            i128::from(numerator) * i128::from(self.denominator / own)
+        };
+        let (infinitesimal, _) = bound.infinitesimal.as_small().expect("0 or -1");
+        if bound.real.is_zero() {
+            return i128::from(infinitesimal);
+        }
+        whole(&bound.real) * UNIT + i128::from(infinitesimal)
+    }
+}
+
+impl Whole {
+    /// The scale for the schedules of a box on which differences with the bounds in `numbers` are
+    /// imposed; `None` if it takes numbers so large that sums might not fit.
+    ///
+    /// A schedule's times lie between sums of paths, and those are at most [`LARGEST_PATH`]
+    /// units. What the searches add up on top of that is a few such sums for each constraint
+    /// imposed at a time; 127 bits leave room for millions.
+    pub(crate) fn fitting(
+        reduction: &Reduction,
+        envelope: &DecoupledEnvelope,
+        numbers: &Numbers,
+    ) -> Option<Self> {
+        let mut all = numbers.clone();
+        for interval in &envelope.intervals {
+            for end in [&interval.lower, &interval.upper] {
+                if let Some(value) = end.value() {
+                    all.include(value)?;
+                }
+            }
+        }
+        // A bound is a constant plus an end, or a difference plus two offsets.
+        let nodes = i128::try_from(reduction.class_count()).ok()? + 4;
+        let largest = all.largest.checked_mul(i128::from(all.denominator))?;
+        let path = largest.checked_mul(3)?.checked_mul(nodes)?;
+        (path < LARGEST_PATH).then_some(Self {
+            denominator: all.denominator,
+        })
+    }
+}
+
+/// The common denominator of some numbers, and a bound on their magnitude.
+#[derive(Clone, Debug)]
+pub(crate) struct Numbers {
+    denominator: i64,
+    largest: i128,
+}
+
+impl Default for Numbers {
+    fn default() -> Self {
+        Self {
+            denominator: 1,
+            largest: 1,
+        }
+    }
+}
+
+impl Numbers {
+    /// Includes a number; `None` if the numbers get too large.
+    pub(crate) fn include(&mut self, number: &Rational) -> Option<()> {
+        let (numerator, own) = number.as_small()?;
+        if self.denominator % own != 0 {
+            self.denominator = (self.denominator / gcd(self.denominator, own)).checked_mul(own)?;
+        }
+        let magnitude = i128::from(numerator / own).abs() + 1;
+        self.largest = self.largest.max(magnitude);
+        Some(())
+    }
+
+    /// Includes the constants of edges.
+    pub(crate) fn include_edges(&mut self, edges: &[Edge]) -> Option<()> {
+        edges
+            .iter()
+            .try_for_each(|edge| self.include(&edge.constant))
+    }
+}
+
+fn gcd(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Delta, Numbers, Rational, Scale, Whole};
+    use crate::reduction::Reduction;
+    use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, StnPlan};
+
+    /// The scale for these numbers in a plan without actions.
+    fn fitting(inside: &[Rational], ends: &[Rational]) -> Option<Whole> {
+        let task = elbowroom_model::Task::new(elbowroom_model::Problem::default());
+        let plan = StnPlan::unconstrained(&task, Vec::new());
+        let reduction = Reduction::new(&ParametrizedPlan::closed(&task, plan));
+        let mut numbers = Numbers::default();
+        inside
+            .iter()
+            .try_for_each(|number| numbers.include(number))?;
+        Whole::fitting(&reduction, &DecoupledEnvelope::point(ends), &numbers)
+    }
+
+    #[test]
+    fn weights_add_up_and_compare_like_their_bounds() {
+        let numbers = [(1, 1000), (-7, 3), (0, 1), (5, 1), (4999, 1000), (-1, 1000)]
+            .map(|(numerator, denominator)| Rational::new(numerator, denominator));
+        let scale = fitting(&numbers[..3], &numbers[3..]).unwrap();
+        let bounds: Vec<Delta> = numbers
+            .iter()
+            .flat_map(|number| {
+                [
+                    Delta::from(number.clone()),
+                    Delta::just_below(number.clone()),
+                ]
+            })
+            .collect();
+        for a in &bounds {
+            for b in &bounds {
+                assert_eq!(scale.weight(a).cmp(&scale.weight(b)), a.cmp(b));
+                let sum = a + b;
+                for c in &bounds {
+                    let weight = scale.weight(a) + scale.weight(b);
+                    assert_eq!(weight.cmp(&scale.weight(c)), sum.cmp(c), "{a} + {b}, {c}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_too_large_or_of_too_many_denominators_do_not_fit() {
+        let large = Rational::from(i64::MAX / 2);
+        assert!(fitting(std::slice::from_ref(&large), &[]).is_none());
+        assert!(fitting(&[], std::slice::from_ref(&large)).is_none());
+        assert!(fitting(&[&large * &large], &[]).is_none());
+        let prime = |p| Rational::new(1, p);
+        let primes = [
+            prime(1_000_003),
+            prime(1_000_033),
+            prime(1_000_037),
+            prime(1_000_039),
+        ];
+        assert!(fitting(&primes[..2], &primes[2..]).is_none());
+        assert!(
+            fitting(
+                &[Rational::from(1_000_000_000)],
+                &[Rational::new(1, 64_000)]
+            )
+            .is_some()
+        );
+    }
+}

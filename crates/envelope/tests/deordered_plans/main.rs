@@ -1,0 +1,142 @@
+//! Deordering against the judge, on problems made so that a random plan is valid.
+//!
+//! A random plan of random effects comes first. Then conditions are added one at a time, each of
+//! which the judge finds to hold in that plan; so they are many, and tight. Whatever schedule the
+//! deordered plan has, the judge must find them to hold in it as well.
+
+mod scenario;
+
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::soundness::{Broken, broken_in};
+use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
+use elbowroom_num::Rational;
+use elbowroom_plan::deorder::{Deordered, Settings, deorder, pin_until_sound, pinned_to};
+use elbowroom_plan::{
+    DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
+};
+use elbowroom_stn::{ConsistentNetwork, Constraint};
+use rand::SeedableRng;
+use rand::seq::{IndexedRandom, SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use scenario::{scenario, time};
+
+/// A schedule whose nodes, in random order, take an end or a random point of their windows.
+fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
+    let zero = network_node(NodeId::ZERO);
+    let mut network =
+        ConsistentNetwork::try_from(plan.network(&[])).expect("a plan with a schedule");
+    let mut nodes: Vec<_> = network.network().nodes().skip(1).collect();
+    nodes.shuffle(rng);
+    for node in nodes {
+        let windows = network.windows(zero);
+        let earliest = windows[node]
+            .earliest
+            .clone()
+            .expect("times are not negative");
+        let latest = windows[node].latest.clone();
+        let latest = latest.unwrap_or_else(|| &earliest + time(rng, 20));
+        let share = *[0, 0, 1, 2, 4, 4].choose(rng).expect("shares");
+        let at = &earliest + (latest - &earliest) * Rational::new(share, 4);
+        network
+            .add(Constraint::at_least(zero, node, at.clone()))
+            .expect("inside its window");
+        network
+            .add(Constraint::at_most(zero, node, at))
+            .expect("inside its window");
+    }
+    network.schedule().relative_to(zero).times().to_vec()
+}
+
+/// Steps with what they need and do, and what is left of their order.
+fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
+    let steps = fixed.steps.iter().map(|step| {
+        let duration = step.duration.clone().unwrap_or_default();
+        format!(
+            "{}: {} [{duration}] {:?}\n",
+            step.start, step.action.name, step.action.body
+        )
+    });
+    let order = plan.constraints.iter().map(|constraint| {
+        let (from, to) = (
+            plan.node_label(constraint.from),
+            plan.node_label(constraint.to),
+        );
+        let (lower, upper) = (&constraint.lower, &constraint.upper);
+        format!(
+            "{to} - {from} in [{lower:?}, {upper:?}]: {:?}\n",
+            constraint.reason
+        )
+    });
+    let timed = format!("{:?}\n", task.timed());
+    steps.chain(order).chain([timed]).collect()
+}
+
+/// What some schedule of the plan breaks.
+fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
+    let closed = ParametrizedPlan::closed(task, plan.clone());
+    let everything = DecoupledEnvelope::point(&[]);
+    broken_in(task, &closed, &Settings::default().epsilon, &everything)
+}
+
+fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
+    for _ in 0..12 {
+        let fixed = plan.scheduled(&draw(plan, rng));
+        let verdict = validate(
+            task,
+            &fixed,
+            &elbowroom_model::validate::Settings::default(),
+        );
+        if let Verdict::Invalid(violation) = verdict {
+            panic!("seed {seed}: {violation}\n{}", shown(task, plan, &fixed));
+        }
+    }
+}
+
+#[test]
+fn all_schedules_are_valid_where_no_value_depends_on_time() {
+    for seed in 0..400 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let scenario = scenario(&mut rng, true);
+        let mut task = scenario.task();
+        let plan = scenario.plan(&mut task);
+        let deordered = deorder(&task, &plan, &Settings::default());
+        let Deordered { plan, .. } = deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        assert_sound(seed, &task, &plan, &mut rng);
+    }
+}
+
+#[test]
+fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
+    let (mut pinned, mut untold) = (0, 0);
+    for seed in 0..250 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let scenario = scenario(&mut rng, false);
+        let mut task = scenario.task();
+        let plan = scenario.plan(&mut task);
+        let deordered = deorder(&task, &plan, &Settings::default());
+        let Deordered { plan, nominal } =
+            deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let mut is_told = true;
+        let sound = pin_until_sound(plan.clone(), &nominal, &mut |plan| {
+            let broken = broken(&task, plan);
+            is_told &= broken.is_ok();
+            let broken = broken.ok()??;
+            let differences = broken.case.differences.iter();
+            let nodes = differences.flat_map(|difference| [difference.from, difference.to]);
+            let inequalities = broken.case.inequalities.iter();
+            let others = inequalities.flat_map(|inequality| inequality.expression.times.keys());
+            let all = nodes.chain(others.copied());
+            Some(all.filter(|node| node.index() < plan.nodes.len()).collect())
+        });
+        untold += usize::from(!is_told);
+        let sound = match sound {
+            Some(sound) if is_told => sound,
+            _ => pinned_to(plan.clone(), &nominal),
+        };
+        pinned += usize::from(sound != plan);
+        assert_sound(seed, &task, &sound, &mut rng);
+    }
+    assert!(pinned > 0, "the scenarios are too easy");
+    println!("{pinned} of 250 plans needed pins; of {untold} nothing could be told");
+}

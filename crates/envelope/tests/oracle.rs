@@ -1,0 +1,113 @@
+//! The oracle and the box that it keeps.
+
+mod given;
+
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::{Guarantee, Objection, Oracle};
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, ParameterId, Side};
+
+use given::{Given, envelope, oracle};
+
+/// Two actions one after the other, done within 10 by a constraint, and by a deadline at 20.
+const RELAY: Given<'_> = Given {
+    domain: "(:durative-action run :parameters () :duration (>= ?duration 0)
+                :condition (at end (p)) :effect (and))",
+    init: "(p) (at 20 (not (p)))",
+    goal: "",
+    plan: "parameter a default 1; parameter b default 1;
+           durative-action instance first : (run); durative-action instance second : (run);
+           c: first.end - first.start in [a, a]; c: second.end - second.start in [b, b];
+           c: second.start - first.end in [0, 0]; c: second.end - .zero in [0, 10];",
+    vary: &[],
+};
+
+fn upper(parameter: usize) -> BoxEnd {
+    BoxEnd {
+        parameter: ParameterId::from(parameter),
+        side: Side::Upper,
+    }
+}
+
+fn number(number: i64) -> Rational {
+    Rational::from(number)
+}
+
+#[test]
+fn a_look_at_another_box_changes_nothing_about_how_the_accepted_one_can_be_widened() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    let accepted = envelope("[1, 1] [1, 8]");
+    assert_eq!(oracle.start(&accepted), Ok(None));
+    // This box is inside as well, but nothing found for it holds for the accepted one.
+    assert_eq!(oracle.objection(&envelope("[1, 8] [1, 1]")), Ok(None));
+    assert_eq!(oracle.accepted(), Some(&accepted));
+    let too_far = oracle.objection_to_reach(upper(0), Some(number(8)));
+    assert!(
+        matches!(too_far, Ok(Some(Objection::NoSchedule(_)))),
+        "{too_far:?}"
+    );
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
+    assert_eq!(oracle.accepted(), Some(&envelope("[1, 2] [1, 8]")));
+}
+
+#[test]
+fn looks_are_counted_but_what_it_takes_to_come_back_from_them_is_not() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    assert_eq!(oracle.start(&envelope("[1, 1] [1, 1]")), Ok(None));
+    assert_eq!(oracle.objection(&envelope("[1, 2] [1, 2]")), Ok(None));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
+    assert_eq!(oracle.checks(), 3);
+}
+
+#[test]
+fn an_end_that_reaches_so_far_already_stays_where_it_is() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    let accepted = envelope("[1, 4] [1, 4]");
+    assert_eq!(oracle.start(&accepted), Ok(None));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(2))), Ok(true));
+    assert_eq!(oracle.accepted(), Some(&accepted));
+    // Nothing has become tighter either.
+    assert_eq!(oracle.try_reach(upper(1), Some(number(6))), Ok(true));
+    assert_eq!(oracle.try_reach(upper(0), Some(number(5))), Ok(false));
+    assert_eq!(oracle.accepted(), Some(&envelope("[1, 4] [1, 6]")));
+}
+
+#[test]
+fn the_nominal_values_are_the_box_to_start_from_if_nobody_names_another() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    assert_eq!(oracle.accepted(), None);
+    assert_eq!(oracle.try_reach(upper(1), Some(number(9))), Ok(true));
+    assert_eq!(oracle.accepted(), Some(&envelope("[1, 1] [1, 9]")));
+}
+
+#[test]
+fn a_box_that_is_refused_is_not_started_from() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    let accepted = envelope("[1, 1] [1, 1]");
+    assert_eq!(oracle.start(&accepted), Ok(None));
+    assert_ne!(oracle.start(&envelope("[1, 6] [1, 6]")), Ok(None));
+    assert_eq!(oracle.accepted(), Some(&accepted));
+}
+
+#[test]
+fn an_oracle_can_be_made_in_one_thread_and_used_in_another() {
+    let (task, plan) = RELAY.task_and_plan();
+    let mut oracle = oracle(&task, &plan).unwrap();
+    drop((task, plan));
+    let asked = std::thread::spawn(move || oracle.try_reach(upper(0), Some(number(9))));
+    assert_eq!(asked.join().unwrap(), Ok(true));
+}
+
+#[test]
+fn a_guarantee_without_a_check_is_refused_by_name() {
+    let (task, plan) = RELAY.task_and_plan();
+    for guarantee in [Guarantee::Dynamic, Guarantee::Strong] {
+        let refusal = Oracle::new(&task, &plan, &Rational::ONE, guarantee);
+        assert_eq!(refusal.unwrap_err(), Refusal::Guarantee { guarantee });
+    }
+}

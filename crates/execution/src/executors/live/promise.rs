@@ -1,0 +1,230 @@
+//! What can be promised of the rest of a plan: the most that still holds.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::uncertain::Reading;
+use elbowroom_plan::{Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
+
+use super::Rest;
+use crate::dispatch::Dispatch;
+use crate::executor::{Mission, StepId};
+use crate::reason::{Cause, Promise, Reason};
+
+/// How much of the room around what is planned is tried, in halves of the share before.
+const HALVINGS: u32 = 4;
+
+/// How long actions that have used up their room may still take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Overrun {
+    /// However long.
+    ForEver,
+    /// Another quarter of what was planned.
+    Quarter,
+    /// They are taken to end when it suits.
+    Suitable,
+}
+
+/// Takes up a plan with the most that can be promised of it.
+///
+/// # Errors
+/// When no times satisfy the plan's constraints.
+pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason>> {
+    let values = mission.plan.nominal();
+    let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
+    let mut attempt = |share: &Rational, overrun: Overrun| {
+        let reading = |constraint: &Constraint| {
+            let room = Room {
+                mission,
+                values: &values,
+                share,
+                overrun,
+                elapsed: &|instance| runs(instance).then_some(Rational::ZERO),
+            };
+            room.reading(constraint)
+        };
+        Dispatch::controlled(mission, &reading)
+    };
+    // Without an envelope nothing is known of numbers but what the plan says.
+    let reads_numbers = mission.plan.reads_numbers(&mission.task);
+    let knows_room = mission.envelope.is_some() || !reads_numbers;
+    most(reads_numbers, knows_room, &mut attempt)
+}
+
+/// Whether a reason says that something happened at another time than the plan allows.
+pub(super) fn is_about_time(reason: &Reason) -> bool {
+    matches!(
+        reason.cause,
+        Cause::OutsideInterval | Cause::Outlived | Cause::Unreachable
+    )
+}
+
+impl Rest {
+    /// Something was not as promised: makes the most of what is left.
+    ///
+    /// # Errors
+    /// When the rest does not work even if nothing deviates any more.
+    pub(super) fn weaken(&mut self, now: &Rational, reason: Reason) -> Result<(), Box<Reason>> {
+        let local = self.dispatch.local(now);
+        let Self {
+            dispatch,
+            mission,
+            values,
+            ..
+        } = self;
+        let mut behind = Vec::new();
+        let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
+            .map(|index| {
+                let [start, end] = dispatch.nodes_of(InstanceId::from(index));
+                let begun = dispatch.happened(start)?;
+                dispatch.happened(end).is_none().then(|| &local - begun)
+            })
+            .collect();
+        let mut attempt = |share: &Rational, overrun: Overrun| {
+            let reading = |constraint: &Constraint| {
+                let room = Room {
+                    mission,
+                    values,
+                    share,
+                    overrun,
+                    elapsed: &|instance| elapsed[instance.index()].clone(),
+                };
+                room.reading(constraint)
+            };
+            dispatch
+                .rebound(&local, &reading)
+                .map_err(|words| behind = words)
+        };
+        if let Ok(((), promise)) = most(self.reads_numbers, !self.reads_numbers, &mut attempt) {
+            self.promise = promise.max(self.promise);
+            return Ok(());
+        }
+        let mut lost = Reason {
+            cause: Cause::GuaranteeLost,
+            ..reason
+        };
+        let about = "even if nothing deviates any more, too little time is left";
+        lost.about = Some(about.to_owned());
+        lost.behind = behind;
+        Err(Box::new(lost.since(now.clone())))
+    }
+}
+
+/// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
+/// envelope, or, once something has left it (`knows_room` does not hold), of what is planned.
+fn most<T, E>(
+    reads_numbers: bool,
+    knows_room: bool,
+    attempt: &mut dyn FnMut(&Rational, Overrun) -> Result<T, E>,
+) -> Result<(T, Promise), E> {
+    let mut share = Rational::ONE;
+    for halving in 0..=HALVINGS {
+        for overrun in [Overrun::ForEver, Overrun::Quarter] {
+            let promise = match halving {
+                _ if !knows_room => Promise::Planned,
+                0 => Promise::Envelope,
+                _ => Promise::PartOfEnvelope,
+            };
+            if let Ok(done) = attempt(&share, overrun) {
+                return Ok((done, promise));
+            }
+        }
+        if reads_numbers {
+            break;
+        }
+        share = share / Rational::from(2);
+    }
+    for overrun in [Overrun::ForEver, Overrun::Quarter] {
+        if let Ok(done) = attempt(&Rational::ZERO, overrun) {
+            return Ok((done, Promise::Planned));
+        }
+    }
+    attempt(&Rational::ZERO, Overrun::Suitable).map(|done| (done, Promise::Luck))
+}
+
+/// The room that the rest of a plan is tried with.
+struct Room<'a> {
+    mission: &'a Mission,
+    /// What was observed, and for the rest what is planned.
+    values: &'a [Rational],
+    /// How much of the room around what is planned; 1 is all of it.
+    share: &'a Rational,
+    overrun: Overrun,
+    /// For how long an instance has been under way.
+    elapsed: &'a dyn Fn(InstanceId) -> Option<Rational>,
+}
+
+impl Room<'_> {
+    fn reading(&self, constraint: &Constraint) -> Reading {
+        let plan = &self.mission.plan;
+        let Some(parameter) = duration(plan, constraint) else {
+            let value = |bound: &Bound| match bound {
+                Bound::Infinite => None,
+                Bound::Finite(value) => Some(value.clone()),
+                Bound::Parameter(id) => Some(self.values[id.index()].clone()),
+            };
+            return Reading::Requirement {
+                lower: value(&constraint.lower),
+                upper: value(&constraint.upper),
+            };
+        };
+        let (lower, upper) = self.interval(parameter);
+        let ParameterKind::Duration(instance) = plan.parameter(parameter).kind else {
+            return Reading::Contingent { lower, upper };
+        };
+        let Some(elapsed) = (self.elapsed)(instance) else {
+            return Reading::Contingent { lower, upper };
+        };
+        let has_room = upper.as_ref().is_none_or(|upper| *upper > elapsed);
+        let lower = lower.max(elapsed.clone());
+        match self.overrun {
+            _ if has_room => Reading::Contingent { lower, upper },
+            Overrun::ForEver => Reading::Contingent { lower, upper: None },
+            Overrun::Quarter => {
+                let planned = &plan.parameter(parameter).nominal;
+                let quarter = (planned / Rational::from(4)).max(self.mission.epsilon.clone());
+                Reading::Contingent {
+                    lower,
+                    upper: Some(elapsed + quarter),
+                }
+            }
+            Overrun::Suitable => Reading::Requirement {
+                lower: Some(lower),
+                upper: None,
+            },
+        }
+    }
+
+    /// The share of the envelope around what is planned.
+    fn interval(&self, id: ParameterId) -> (Rational, Option<Rational>) {
+        let planned = &self.values[id.index()];
+        if self.share.is_zero() {
+            return (planned.clone(), Some(planned.clone()));
+        }
+        let Some(envelope) = &self.mission.envelope else {
+            // Without an envelope as much again as is planned is taken for all the room.
+            let room = planned * self.share;
+            return (planned - &room, Some(planned + room));
+        };
+        let interval = envelope.interval(id);
+        let within = |end: &Rational| planned + (end - planned) * self.share;
+        let lower = interval.lower.value().map_or(Rational::ZERO, within);
+        let upper = match interval.upper.value() {
+            Some(upper) => Some(within(upper)),
+            // A share of infinitely much room is in proportion to what is planned.
+            None if *self.share == Rational::ONE => None,
+            None => Some(planned + planned * self.share * Rational::from(16)),
+        };
+        (lower.max(Rational::ZERO), upper)
+    }
+}
+
+/// The parameter that a constraint says is a duration or the time of a timed initial.
+fn duration(plan: &ParametrizedPlan, constraint: &Constraint) -> Option<ParameterId> {
+    match (&constraint.lower, &constraint.upper) {
+        (Bound::Parameter(lower), Bound::Parameter(upper))
+            if lower == upper && plan.plan.is_up_to_the_world(constraint) =>
+        {
+            Some(*lower)
+        }
+        _ => None,
+    }
+}

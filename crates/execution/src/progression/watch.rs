@@ -1,0 +1,245 @@
+//! Over-all conditions: at every moment strictly between start and end.
+//!
+//! From one happening group to the next, facts stay and fluents move as polynomials in time. Where
+//! the sides of a comparison cross is found exactly, so that a strict comparison that becomes an
+//! equality just at the end holds, and one that fails for a while between two groups does not.
+
+use elbowroom_model::derivation::{Moment, holds};
+use elbowroom_model::ground::{Condition, Expression, FactId};
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
+
+use super::motion::{Fraction, Motion};
+use super::polynomial::{Cell, cells};
+use super::{Progression, Underway, Unreadable};
+use crate::event::Ticket;
+
+/// Which moments after the present group are meant.
+#[derive(Clone, Copy)]
+enum Span<'a> {
+    /// All that come soon enough.
+    Soon,
+    /// All until so much later, which itself is left out.
+    Until(&'a Rational),
+}
+
+/// What does not hold in a span.
+#[derive(Default)]
+struct Lost {
+    /// Parts of over-all conditions.
+    conditions: Vec<(Ticket, Vec<usize>)>,
+    /// Guards: of which action, which effect, and whether it is one of its end.
+    guards: Vec<(Ticket, usize, bool)>,
+}
+
+impl Progression {
+    /// The running actions whose over-all condition fails from now on if nothing else happens at
+    /// this moment (now, for those that did not start now, and soon after), with what of it fails.
+    pub fn breaking(&self) -> Vec<(Ticket, Vec<&Condition>)> {
+        let motion = self.motion().unwrap_or_default();
+        let lost = self.lost(&motion, Span::Soon).conditions.into_iter();
+        let breaking = lost.filter_map(|(ticket, parts)| {
+            let body = self.running.get(&ticket)?.action.durative()?;
+            let conjuncts = body.over_all.conjuncts();
+            let parts = parts.into_iter().map(|index| conjuncts[index]);
+            Some((ticket, parts.collect()))
+        });
+        breaking.collect()
+    }
+
+    /// When an over-all condition that holds now has failed, if nothing happens until then, and if
+    /// that is before `until`: the first multiple of `grid` after that moment.
+    pub fn next_break(&self, until: &Rational, grid: &Rational) -> Option<Rational> {
+        let motion = self.motion().ok().filter(|motion| !motion.is_still())?;
+        let length = Some(until - &self.time).filter(Rational::is_positive)?;
+        let running = self.running.values();
+        let first = running.filter_map(|underway| {
+            let over_all = &underway.action.durative()?.over_all;
+            let mut view = View {
+                state: self,
+                motion: &motion,
+                duration: &underway.planned,
+                cell: Cell::Soon,
+            };
+            let mut moment = Rational::ZERO;
+            for cell in cells(&view.boundaries(over_all), &length, Some(grid)) {
+                if let Cell::Zero(_, latest) = &cell {
+                    moment.clone_from(latest);
+                }
+                view.cell = cell;
+                if view.holds(over_all) != Ok(true) {
+                    return Some(moment);
+                }
+            }
+            None
+        });
+        let moment = &self.time + first.min()?;
+        Some(((moment / grid).floor() + Rational::ONE) * grid)
+    }
+
+    /// Notes what will not have held when so much time has passed.
+    pub(super) fn watch(&mut self, motion: &Motion, elapsed: &Rational) {
+        let lost = self.lost(motion, Span::Until(elapsed));
+        for (ticket, parts) in lost.conditions {
+            if let Some(underway) = self.running.get_mut(&ticket) {
+                underway.broken.extend(parts);
+            }
+        }
+        for (ticket, index, is_end) in lost.guards {
+            if let Some(underway) = self.running.get_mut(&ticket) {
+                let guards = if is_end {
+                    &mut underway.end_guards
+                } else {
+                    &mut underway.continuous
+                };
+                guards[index] = false;
+            }
+        }
+    }
+
+    fn lost(&self, motion: &Motion, span: Span<'_>) -> Lost {
+        let mut lost = Lost::default();
+        for (&ticket, underway) in &self.running {
+            let Some(body) = underway.action.durative() else {
+                continue;
+            };
+            let fails = |condition: &Condition| {
+                !condition.is_trivial() && !self.lasts(condition, underway, motion, span)
+            };
+            if fails(&body.over_all) {
+                let parts = body.over_all.conjuncts().into_iter().enumerate();
+                let failing = parts.filter(|(_, part)| fails(part));
+                let failing = failing.map(|(index, _)| index).collect();
+                lost.conditions.push((ticket, failing));
+            }
+            let ends = body.end.effects.iter().enumerate();
+            let ends = ends.filter(|(_, effect)| fails(&effect.guard.over_all));
+            lost.guards
+                .extend(ends.map(|(index, _)| (ticket, index, true)));
+            let rates = body.continuous.iter().enumerate();
+            let rates = rates.filter(|(_, effect)| fails(&effect.guard.over_all));
+            lost.guards
+                .extend(rates.map(|(index, _)| (ticket, index, false)));
+        }
+        lost
+    }
+
+    /// Whether a condition of a running action holds in a span, and now if that lies inside the
+    /// action.
+    fn lasts(
+        &self,
+        condition: &Condition,
+        underway: &Underway,
+        motion: &Motion,
+        span: Span<'_>,
+    ) -> bool {
+        let holds_now = || self.holds(condition, Some(&underway.planned)) == Ok(true);
+        if motion.is_still() {
+            return holds_now();
+        }
+        if underway.start < self.time && !holds_now() {
+            return false;
+        }
+        let mut view = View {
+            state: self,
+            motion,
+            duration: &underway.planned,
+            cell: Cell::Soon,
+        };
+        let parts = match span {
+            Span::Soon => vec![Cell::Soon],
+            Span::Until(elapsed) => cells(&view.boundaries(condition), elapsed, None),
+        };
+        parts.into_iter().all(|cell| {
+            view.cell = cell;
+            view.holds(condition) == Ok(true)
+        })
+    }
+}
+
+/// The state in a part of the time until the next group.
+struct View<'a> {
+    state: &'a Progression,
+    motion: &'a Motion,
+    duration: &'a Rational,
+    cell: Cell,
+}
+
+impl View<'_> {
+    fn holds(&self, condition: &Condition) -> Result<bool, Unreadable> {
+        match self.state.task.derivation() {
+            Some(derivation) if derivation.is_read_by(condition) => {
+                let derived = derivation.derive(self);
+                holds(condition, &derivation.on_top_of(self, &derived))
+            }
+            _ => holds(condition, self),
+        }
+    }
+
+    /// Where these are zero, comparisons that the condition reads may turn.
+    fn boundaries(&self, condition: &Condition) -> Vec<super::polynomial::Polynomial> {
+        let mut found = Vec::new();
+        let mut note = |left: &Expression, right: &Expression| {
+            if let Ok(difference) = self.difference(left, right) {
+                found.push(difference.numerator);
+                found.push(difference.denominator);
+            }
+        };
+        visit_comparisons(condition, &mut note);
+        if let Some(derivation) = self.state.task.derivation()
+            && derivation.is_read_by(condition)
+        {
+            derivation.visit_bodies(&mut |body| visit_comparisons(body, &mut note));
+        }
+        found
+    }
+
+    fn difference(&self, left: &Expression, right: &Expression) -> Result<Fraction, Unreadable> {
+        for side in [left, right] {
+            if let Some(fluent) = self.state.doubtful_fluent(side) {
+                return Err(Unreadable::DoubtfulValue(fluent));
+            }
+        }
+        let now = |fluent| {
+            let value = self.state.value(fluent).cloned();
+            value.ok_or(Unreadable::Undefined(fluent))
+        };
+        let read = |fluent| self.motion.value(fluent, &now);
+        let side = |side: &Expression| Fraction::of(side, Some(self.duration), &read);
+        Ok(side(left)?.minus(side(right)?))
+    }
+}
+
+impl Moment<Unreadable> for View<'_> {
+    fn fact(&self, fact: FactId) -> Result<bool, Unreadable> {
+        self.state.fact_in_doubt(fact)
+    }
+
+    fn compare(
+        &self,
+        comparison: Comparison,
+        left: &Expression,
+        right: &Expression,
+    ) -> Result<bool, Unreadable> {
+        let difference = self.difference(left, right)?;
+        let divisor = difference.denominator.sign_in(&self.cell);
+        if divisor == 0 {
+            return Err(Unreadable::DivisionByZero);
+        }
+        let sign = difference.numerator.sign_in(&self.cell) * divisor;
+        Ok(comparison.holds(&Rational::from(i64::from(sign)), &Rational::ZERO))
+    }
+}
+
+fn visit_comparisons(condition: &Condition, visit: &mut impl FnMut(&Expression, &Expression)) {
+    match condition {
+        Condition::Fact(_) => {}
+        Condition::Compare(_, left, right) => visit(left, right),
+        Condition::Not(part) => visit_comparisons(part, visit),
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                visit_comparisons(part, visit);
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! A plan's network with what the world decides in it.
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{ContingentLink, UncertainNetwork};
+use elbowroom_stn::{ConstraintId, Network};
+
+use crate::decoupled::DecoupledEnvelope;
+use crate::network::network_node;
+use crate::parameter::{ParameterId, ParametrizedPlan};
+use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
+
+/// What a constraint of a plan means to an executor.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// `lower <= to - from <= upper` has to be seen to; `None` is no bound.
+    Requirement {
+        /// Least difference.
+        lower: Option<Rational>,
+        /// Greatest difference.
+        upper: Option<Rational>,
+    },
+    /// The world decides on a difference between `lower` and `upper`, and shows it when `to`
+    /// happens.
+    Contingent {
+        /// Least difference; not negative.
+        lower: Rational,
+        /// Greatest difference; `None` if there is none.
+        upper: Option<Rational>,
+    },
+    /// Nothing satisfies it: it asks for something that depends on a value which is never known
+    /// and has no limit.
+    Impossible,
+}
+
+/// A plan's network, and what its parts come from. Nodes keep their positions.
+#[derive(Clone, Debug)]
+pub struct PlanNetwork {
+    /// The network.
+    pub network: UncertainNetwork,
+    /// For each requirement, the plan's constraint that it comes from, by position; `None` if it
+    /// only says that a node comes at 0 or later.
+    pub requirements: Vec<Option<usize>>,
+    /// For each contingent link, the plan's constraint that it comes from, by position.
+    pub links: Vec<usize>,
+}
+
+/// A constraint that nothing satisfies ([`Reading::Impossible`]), by position in the plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Impossible(pub usize);
+
+impl PlanNetwork {
+    /// The plan's constraint behind a requirement.
+    pub fn constraint_of(&self, id: ConstraintId) -> Option<usize> {
+        self.requirements.get(id.index()).copied().flatten()
+    }
+}
+
+impl StnPlan {
+    /// The plan as a network, each constraint as `reading` says.
+    ///
+    /// Contingent are at most the durations of actions and the times of timed initials, each of
+    /// which has one node that the world decides on: a second contingent reading of the same node
+    /// counts as a requirement.
+    ///
+    /// # Errors
+    /// A constraint that nothing satisfies.
+    pub fn uncertain_network(
+        &self,
+        reading: &dyn Fn(&Constraint) -> Reading,
+    ) -> Result<PlanNetwork, Impossible> {
+        let mut network = Network::with_nodes(self.nodes.len());
+        let mut requirements = Vec::new();
+        let mut links: Vec<ContingentLink> = Vec::new();
+        let mut sources = Vec::new();
+        let mut is_end = vec![false; self.nodes.len()];
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+            let (lower, upper) = match reading(constraint) {
+                Reading::Impossible => return Err(Impossible(index)),
+                Reading::Contingent { lower, upper }
+                    if self.is_up_to_the_world(constraint) && !is_end[to.index()] =>
+                {
+                    is_end[to.index()] = true;
+                    links.push(ContingentLink {
+                        activation: from,
+                        end: to,
+                        lower,
+                        upper,
+                    });
+                    sources.push(index);
+                    continue;
+                }
+                Reading::Contingent { lower, upper } => (Some(lower), upper),
+                Reading::Requirement { lower, upper } => (lower, upper),
+            };
+            if let Some(lower) = lower {
+                network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
+                requirements.push(Some(index));
+            }
+            if let Some(upper) = upper {
+                network.add(elbowroom_stn::Constraint::at_most(from, to, upper));
+                requirements.push(Some(index));
+            }
+        }
+        let zero = network_node(NodeId::ZERO);
+        for (node, _) in self.nodes().skip(1) {
+            if !is_end[node.index()] {
+                let node = network_node(node);
+                network.add(elbowroom_stn::Constraint::at_least(
+                    zero,
+                    node,
+                    Rational::ZERO,
+                ));
+                requirements.push(None);
+            }
+        }
+        Ok(PlanNetwork {
+            network: UncertainNetwork::new(network, links)
+                .expect("links lead from starts to ends, or from zero to timed initials"),
+            requirements,
+            links: sources,
+        })
+    }
+
+    /// Whether a constraint bounds a difference that the world can decide on: the duration of an
+    /// action, or the time of a timed initial.
+    pub fn is_up_to_the_world(&self, constraint: &Constraint) -> bool {
+        let node = |id: NodeId| self.nodes[id.index()];
+        match (node(constraint.from), node(constraint.to)) {
+            (Node::Start(start), Node::End(end)) => start == end,
+            (Node::Zero, Node::Timed(_)) => true,
+            _ => false,
+        }
+    }
+}
+
+impl ParametrizedPlan {
+    /// What a constraint means to an executor who knows that each parameter is in its interval,
+    /// and learns the value of a duration when the action ends, of the time of a timed initial
+    /// when that happens, and of any other bound never.
+    ///
+    /// A parameter that bounds several differences may be another value in each, which asks for
+    /// more than need be.
+    pub fn reading(&self, constraint: &Constraint, envelope: &DecoupledEnvelope) -> Reading {
+        let least = |id: ParameterId| envelope.interval(id).lower.value().cloned();
+        let greatest = |id: ParameterId| envelope.interval(id).upper.value().cloned();
+        if let (Bound::Parameter(lower), Bound::Parameter(upper)) =
+            (&constraint.lower, &constraint.upper)
+            && lower == upper
+            && self.plan.is_up_to_the_world(constraint)
+            && let Some(least) = least(*lower).filter(|least| !least.is_negative())
+        {
+            return Reading::Contingent {
+                lower: least,
+                upper: greatest(*lower),
+            };
+        }
+        // Whatever the value is, the constraint has to hold.
+        let lower = match &constraint.lower {
+            Bound::Infinite => None,
+            Bound::Finite(value) => Some(value.clone()),
+            Bound::Parameter(id) => match greatest(*id) {
+                None => return Reading::Impossible,
+                greatest => greatest,
+            },
+        };
+        let upper = match &constraint.upper {
+            Bound::Infinite => None,
+            Bound::Finite(value) => Some(value.clone()),
+            Bound::Parameter(id) => match least(*id) {
+                None => return Reading::Impossible,
+                least => least,
+            },
+        };
+        Reading::Requirement { lower, upper }
+    }
+
+    /// The plan's network for an executor who relies on a box: see [`ParametrizedPlan::reading`].
+    ///
+    /// # Errors
+    /// A constraint that nothing satisfies in all of the box.
+    pub fn uncertain_network(
+        &self,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<PlanNetwork, Impossible> {
+        let reading = |constraint: &Constraint| self.reading(constraint, envelope);
+        self.plan.uncertain_network(&reading)
+    }
+}

@@ -1,0 +1,65 @@
+//! Why a network is not dynamically controllable.
+
+use elbowroom_num::Rational;
+
+use super::{Extended, LinkId};
+use crate::{ConstraintId, NodeId, Weight};
+
+/// What one step of a [`Conflict`] goes by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Ground {
+    /// A requirement.
+    Requirement(ConstraintId),
+    /// The end of the link may come as early as its lower bound.
+    Early(LinkId),
+    /// The end of the link may come as late as its upper bound.
+    Late(LinkId),
+}
+
+/// `to - from <= bound` in the case that the conflict tells of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Step<W = Rational> {
+    /// The time point that is subtracted.
+    pub from: NodeId,
+    /// The time point it is subtracted from.
+    pub to: NodeId,
+    /// What the difference does not exceed; infinite where a link without an upper bound lasts
+    /// for ever.
+    pub bound: Extended<W>,
+    /// Where it comes from.
+    pub ground: Ground,
+}
+
+/// A semi-reducible cycle of negative length (Morris 2006): requirements that would have to be
+/// satisfied although some links end early and others late, without anyone knowing in time which.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Conflict<W = Rational> {
+    /// The cycle, step by step; each begins where the one before ends, the first where the last
+    /// ends. A very long cycle is cut short ([`Conflict::is_whole`]).
+    pub steps: Vec<Step<W>>,
+    /// Whether `steps` has all of the cycle.
+    pub is_whole: bool,
+    /// The length of the whole cycle; negative.
+    pub total: Extended<W>,
+}
+
+impl<W: Weight> Conflict<W> {
+    /// The links that the cycle takes to end early, and those it takes to end late, in order and
+    /// without repetition.
+    pub fn links(&self) -> (Vec<LinkId>, Vec<LinkId>) {
+        let mut early = Vec::new();
+        let mut late = Vec::new();
+        for step in &self.steps {
+            match step.ground {
+                Ground::Requirement(_) => {}
+                Ground::Early(link) => early.push(link),
+                Ground::Late(link) => late.push(link),
+            }
+        }
+        for links in [&mut early, &mut late] {
+            links.sort_unstable();
+            links.dedup();
+        }
+        (early, late)
+    }
+}

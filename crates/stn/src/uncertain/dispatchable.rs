@@ -1,0 +1,243 @@
+//! A network in a form by which it can be executed event by event.
+
+use super::dynamic::{EdgeId, Graph, Kind, Origin};
+use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
+use crate::{Constraint, Network, NodeId, Weight};
+
+/// Why an edge is there is told in at most so many steps.
+const MOST_STEPS: usize = 1_000;
+
+/// A dynamically controllable network with all edges that executing it needs: what an event means
+/// for the future shows at its neighbours (Morris 2014; Hunsberger & Posenato, ICAART 2024, call
+/// it an *ESTNU*).
+///
+/// An executor that keeps to it satisfies every requirement, whatever the world does within the
+/// bounds of the contingent links. [`Dispatcher`](super::Dispatcher) does.
+#[derive(Clone, Debug)]
+pub struct Dispatchable<W> {
+    network: UncertainNetwork<W>,
+    graph: Graph<W>,
+    /// For each node, the plain edges that begin and those that end there, infinite ones excepted.
+    leaving: Vec<Vec<EdgeId>>,
+    entering: Vec<Vec<EdgeId>>,
+    /// For each node, the waits that begin when it happens.
+    waits_at: Vec<Vec<Wait<W>>>,
+    /// For each node, those that have to have happened before.
+    before: Vec<Vec<NodeId>>,
+    /// For each node, those that may not be later although they may fall together with it, and
+    /// that no other edge holds to that; and the edge that says so.
+    not_after: Vec<Vec<(NodeId, EdgeId)>>,
+}
+
+/// `to - from <= bound`, given or found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DispatchableEdge<'a, W> {
+    /// The time point that is subtracted.
+    pub from: NodeId,
+    /// The time point it is subtracted from.
+    pub to: NodeId,
+    /// What the difference does not exceed.
+    pub bound: &'a W,
+}
+
+/// Once the link is activated, `node` waits until its end has happened, but not longer than
+/// `delay` after the activation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wait<W> {
+    /// The node that has to wait.
+    pub node: NodeId,
+    /// The link whose end it waits for.
+    pub link: LinkId,
+    /// For how long at most; `None` if there is no other way than the link's end.
+    pub delay: Option<W>,
+    pub(super) edge: EdgeId,
+}
+
+impl<W: Weight> Dispatchable<W> {
+    pub(super) fn new(network: UncertainNetwork<W>, graph: Graph<W>) -> Self {
+        let count = network.requirements.node_count();
+        let mut form = Self {
+            leaving: vec![Vec::new(); count],
+            entering: vec![Vec::new(); count],
+            waits_at: vec![Vec::new(); count],
+            before: vec![Vec::new(); count],
+            not_after: vec![Vec::new(); count],
+            network,
+            graph,
+        };
+        for (id, edge) in form.graph.edges.iter().enumerate() {
+            let (from, to) = (edge.from, edge.to);
+            match edge.kind {
+                Kind::Plain if edge.bound.infinite == 0 && from != to => {
+                    form.leaving[from.index()].push(id);
+                    form.entering[to.index()].push(id);
+                    if edge.bound.is_negative() && !form.network.is_contingent(from) {
+                        form.before[from.index()].push(to);
+                    }
+                    // A link that takes no time at all: its end is as late as its activation.
+                    let is_link = matches!(edge.origin, Origin::Link(_));
+                    if is_link && edge.bound == Extended::zero() {
+                        form.not_after[from.index()].push((to, id));
+                    }
+                }
+                Kind::Upper(link) if !form.network.is_contingent(from) => {
+                    form.before[from.index()].push(to);
+                    form.waits_at[to.index()].push(Wait {
+                        node: from,
+                        link,
+                        delay: edge.bound.negated().into_finite(),
+                        edge: id,
+                    });
+                }
+                _ => {}
+            }
+        }
+        form.follow_at_once();
+        for before in &mut form.before {
+            before.sort_unstable();
+            before.dedup();
+        }
+        form
+    }
+
+    /// What comes at the same time or later waits for what comes first: that the two may fall
+    /// together says nothing of their order. Nodes that have to fall together wait for none of
+    /// each other, but all for the world.
+    fn follow_at_once(&mut self) {
+        let together = self.together();
+        let requirements = &self.network.requirements;
+        // The requirements are the first edges.
+        for (edge, constraint) in requirements.constraints().iter().enumerate() {
+            let (later, first) = (constraint.from, constraint.to);
+            let is_together = together[later.index()] == together[first.index()];
+            if later == first
+                || constraint.bound != W::zero()
+                || self.network.is_contingent(later)
+                || (is_together && !self.is_up_to_the_world(first))
+            {
+                continue;
+            }
+            self.before[later.index()].push(first);
+            if !self.network.is_contingent(first) {
+                self.not_after[later.index()].push((first, edge));
+            }
+        }
+    }
+
+    /// Those that have to have happened by the node's own latest time.
+    pub(super) fn not_after(&self, node: NodeId) -> &[(NodeId, EdgeId)] {
+        &self.not_after[node.index()]
+    }
+
+    /// Whether the world has a choice when a node happens.
+    fn is_up_to_the_world(&self, node: NodeId) -> bool {
+        let mut at = node;
+        while let Some(link) = self.network.ending_at(at) {
+            let link = self.network.link(link);
+            if link.upper != Some(W::zero()) {
+                return true;
+            }
+            at = link.activation;
+        }
+        false
+    }
+
+    /// For each node, a number that it shares with those that have to happen at the same time.
+    fn together(&self) -> Vec<usize> {
+        let requirements = self.network.requirements.constraints().iter();
+        let mut zero = Network::with_nodes(self.network.requirements.node_count());
+        for constraint in requirements.filter(|constraint| constraint.bound == W::zero()) {
+            zero.add(constraint.clone());
+        }
+        for link in &self.network.links {
+            if link.upper == Some(W::zero()) {
+                zero.add(Constraint::at_most(link.activation, link.end, W::zero()));
+                zero.add(Constraint::at_least(link.activation, link.end, W::zero()));
+            }
+        }
+        // Kosaraju's algorithm: the last one left first, and against the edges.
+        let order = zero.depth_first_postorder(|_| true);
+        let mut component = vec![usize::MAX; zero.node_count()];
+        for &root in order.iter().rev() {
+            let mut stack = vec![root];
+            while let Some(node) = stack.pop() {
+                if component[node.index()] != usize::MAX {
+                    continue;
+                }
+                component[node.index()] = root.index();
+                stack.extend(zero.entering(node).map(|id| zero.constraint(id).from));
+            }
+        }
+        component
+    }
+
+    /// The network that it is the form of.
+    pub fn network(&self) -> &UncertainNetwork<W> {
+        &self.network
+    }
+
+    /// All edges to keep to, the given ones first. The bounds of contingent links are not among
+    /// them.
+    pub fn edges(&self) -> impl Iterator<Item = DispatchableEdge<'_, W>> {
+        self.graph
+            .edges
+            .iter()
+            .filter(|edge| edge.kind == Kind::Plain && edge.bound.infinite == 0)
+            .filter(|edge| !matches!(edge.origin, Origin::Link(_)))
+            .map(|edge| DispatchableEdge {
+                from: edge.from,
+                to: edge.to,
+                bound: &edge.bound.finite,
+            })
+    }
+
+    /// All waits, by the node that activates their link.
+    pub fn waits(&self) -> impl Iterator<Item = (NodeId, &Wait<W>)> {
+        let nodes = self.network.requirements.nodes();
+        nodes.flat_map(|node| {
+            self.waits_at[node.index()]
+                .iter()
+                .map(move |wait| (node, wait))
+        })
+    }
+
+    pub(super) fn waits_at(&self, node: NodeId) -> &[Wait<W>] {
+        &self.waits_at[node.index()]
+    }
+
+    /// Those that have to have happened before a node that the executor chooses.
+    pub fn before(&self, node: NodeId) -> &[NodeId] {
+        &self.before[node.index()]
+    }
+
+    /// The edges that begin at a node: where, how long, which.
+    pub(super) fn leaving(&self, node: NodeId) -> impl Iterator<Item = (NodeId, &W, EdgeId)> {
+        self.leaving[node.index()].iter().map(|&id| {
+            let edge = &self.graph.edges[id];
+            (edge.to, &edge.bound.finite, id)
+        })
+    }
+
+    /// The edges that end at a node: from where, how long, which.
+    pub(super) fn entering(&self, node: NodeId) -> impl Iterator<Item = (NodeId, &W, EdgeId)> {
+        self.entering[node.index()].iter().map(|&id| {
+            let edge = &self.graph.edges[id];
+            (edge.from, &edge.bound.finite, id)
+        })
+    }
+
+    /// What stands behind an edge, from its beginning to its end.
+    pub(super) fn behind(&self, edge: EdgeId) -> Vec<Step<W>> {
+        let mut edges = Vec::new();
+        self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
+        edges.into_iter().map(|id| self.graph.step(id)).collect()
+    }
+
+    /// The requirements among steps, in order.
+    pub fn requirements_of(steps: &[Step<W>]) -> impl Iterator<Item = crate::ConstraintId> {
+        steps.iter().filter_map(|step| match step.ground {
+            Ground::Requirement(id) => Some(id),
+            Ground::Early(_) | Ground::Late(_) => None,
+        })
+    }
+}

@@ -1,0 +1,507 @@
+//! Dynamic controllability, by the algorithm of Morris (2014).
+//!
+//! Drawn as a graph, a requirement is an edge, and a link `[x, y]` from `A` to `C` is two: a
+//! *lower-case* edge `A --x--> C` ("C may come as early as that") and an *upper-case* edge
+//! `C --y--> A` of length `-y` ("as late as that"). The network is dynamically controllable unless
+//! there is a semi-reducible cycle of negative length. Such a cycle is looked for backwards from
+//! each *negative node*, one at which an edge of negative length ends: along edges that are not
+//! negative, until the way is not negative any more. What is found on the way becomes an edge of
+//! its own, so that nobody goes that way again. A negative node on the way is dealt with first; if
+//! it is being dealt with already, the ways add up to the cycle.
+//!
+//! Where a way begins with an upper-case edge, it holds only until the link's end has happened: its
+//! edges are *waits*, until they are so long that the link cannot end earlier. Such ways are walked
+//! first, by themselves, and may not use the lower-case edge of the same link.
+//!
+//! The edges found make the network dispatchable: every way of a positive edge followed by a
+//! negative one has an edge beside it (*Dynamic Controllability and Dispatchability Relationships*,
+//! CPAIOR 2014, where links are brought into a normal form with lower bound 0; here the lower bound
+//! stays where it is, and what falls short of it is handed from the waits to the plain edges).
+//!
+//! O(n³) at worst (Dijkstra's algorithm for each negative node); in the networks of plans, where
+//! ways end after a few edges, in proportion to their size.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use super::conflict::{Conflict, Ground, Step};
+use super::dispatchable::Dispatchable;
+use super::extended::Extended;
+use super::{LinkId, UncertainNetwork};
+use crate::{ConstraintId, NodeId, Weight};
+
+/// A conflict is spelt out up to so many steps.
+const MOST_STEPS: usize = 10_000;
+
+/// An edge by its place in [`Graph::edges`].
+pub(super) type EdgeId = usize;
+
+/// `to - from <= bound`, or, for a wait, "until the link has ended".
+#[derive(Clone, Debug)]
+pub(super) struct Edge<W> {
+    pub(super) from: NodeId,
+    pub(super) to: NodeId,
+    pub(super) bound: Extended<W>,
+    pub(super) kind: Kind,
+    pub(super) origin: Origin,
+}
+
+/// When an edge holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Always.
+    Plain,
+    /// If the world lets the link end early.
+    Lower(LinkId),
+    /// Until the link has ended.
+    Upper(LinkId),
+}
+
+/// Where an edge comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    Requirement(ConstraintId),
+    Link(LinkId),
+    /// It stands for a way.
+    Way(WayId),
+}
+
+/// A way by its place in [`Graph::ways`].
+pub(super) type WayId = usize;
+
+/// An edge, and the rest of the way behind it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    pub(super) edge: EdgeId,
+    pub(super) rest: Option<WayId>,
+}
+
+/// The network as a graph, with the edges found.
+#[derive(Clone, Debug)]
+pub(super) struct Graph<W> {
+    pub(super) edges: Vec<Edge<W>>,
+    pub(super) ways: Vec<Way>,
+    /// For each node, the edges not negative that end there, upper-case ones excepted.
+    positive_into: Vec<Vec<EdgeId>>,
+    /// For each node, the negative plain edges of the network that end there.
+    negative_into: Vec<Vec<EdgeId>>,
+    /// For each node, the upper-case edges of the network that end there.
+    upper_into: Vec<Vec<EdgeId>>,
+}
+
+impl<W: Weight> UncertainNetwork<W> {
+    /// The network's dispatchable form, if it is dynamically controllable.
+    ///
+    /// # Errors
+    /// The cycle that shows that it is not.
+    pub fn dynamic(&self) -> Result<Dispatchable<W>, Conflict<W>> {
+        let graph = self.search(true)?;
+        Ok(Dispatchable::new(self.clone(), graph))
+    }
+
+    /// Why the network is not dynamically controllable; `None` if it is. Quicker than
+    /// [`dynamic`](Self::dynamic), because what only dispatching needs is left out.
+    pub fn conflict(&self) -> Option<Conflict<W>> {
+        self.search(false).err()
+    }
+
+    /// Whether a strategy that decides with nothing but what has been observed satisfies every
+    /// requirement whatever the world does.
+    pub fn is_dynamically_controllable(&self) -> bool {
+        self.search(false).is_ok()
+    }
+
+    fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
+        let mut search = Search {
+            links: self,
+            graph: Graph::new(self),
+            stage: vec![Stage::New; self.requirements.node_count()],
+            frames: Vec::new(),
+            keeps_edges,
+        };
+        for node in self.requirements.nodes() {
+            search.settle(node)?;
+        }
+        Ok(search.graph)
+    }
+}
+
+impl<W: Weight> Graph<W> {
+    fn new(network: &UncertainNetwork<W>) -> Self {
+        let count = network.requirements.node_count();
+        let mut graph = Self {
+            edges: Vec::with_capacity(network.requirements.constraints().len()),
+            ways: Vec::new(),
+            positive_into: vec![Vec::new(); count],
+            negative_into: vec![Vec::new(); count],
+            upper_into: vec![Vec::new(); count],
+        };
+        for id in network.requirements.constraint_ids() {
+            let constraint = network.requirements.constraint(id);
+            graph.add(Edge {
+                from: constraint.from,
+                to: constraint.to,
+                bound: constraint.bound.clone().into(),
+                kind: Kind::Plain,
+                origin: Origin::Requirement(id),
+            });
+        }
+        for id in network.link_ids() {
+            let link = network.link(id);
+            graph.add(Edge {
+                from: link.activation,
+                to: link.end,
+                bound: link.lower.clone().into(),
+                kind: Kind::Lower(id),
+                origin: Origin::Link(id),
+            });
+            let upper = link
+                .upper
+                .clone()
+                .map_or_else(Extended::infinity, Into::into);
+            let is_upper = upper > Extended::zero();
+            graph.add(Edge {
+                from: link.end,
+                to: link.activation,
+                bound: upper.negated(),
+                // A link without any duration has a plain edge back.
+                kind: if is_upper {
+                    Kind::Upper(id)
+                } else {
+                    Kind::Plain
+                },
+                origin: Origin::Link(id),
+            });
+        }
+        graph
+    }
+
+    fn add(&mut self, edge: Edge<W>) -> EdgeId {
+        let id = self.edges.len();
+        let to = edge.to.index();
+        match edge.kind {
+            Kind::Upper(_) => self.upper_into[to].push(id),
+            Kind::Plain if edge.bound.is_negative() => self.negative_into[to].push(id),
+            Kind::Plain | Kind::Lower(_) => self.positive_into[to].push(id),
+        }
+        self.edges.push(edge);
+        id
+    }
+
+    /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
+    ///
+    /// Whether these are all.
+    pub(super) fn spelt_out(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
+        let mut stack = vec![edge];
+        while let Some(id) = stack.pop() {
+            let Origin::Way(way) = self.edges[id].origin else {
+                if into.len() >= most {
+                    return false;
+                }
+                into.push(id);
+                continue;
+            };
+            let mut along = Vec::new();
+            let mut next = Some(way);
+            while let Some(way) = next {
+                along.push(self.ways[way].edge);
+                next = self.ways[way].rest;
+            }
+            stack.extend(along.into_iter().rev());
+        }
+        true
+    }
+
+    /// One edge of the network in a conflict.
+    pub(super) fn step(&self, id: EdgeId) -> Step<W> {
+        let edge = &self.edges[id];
+        let ground = match (edge.kind, edge.origin) {
+            (_, Origin::Requirement(id)) => Ground::Requirement(id),
+            (Kind::Lower(link), _) => Ground::Early(link),
+            (Kind::Upper(link), _) | (_, Origin::Link(link)) => Ground::Late(link),
+            (_, Origin::Way(_)) => unreachable!("ways are spelt out"),
+        };
+        Step {
+            from: edge.from,
+            to: edge.to,
+            bound: edge.bound.clone(),
+            ground,
+        }
+    }
+}
+
+/// How far the search has come with a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    New,
+    Underway,
+    Done,
+}
+
+struct Search<'a, W> {
+    links: &'a UncertainNetwork<W>,
+    graph: Graph<W>,
+    stage: Vec<Stage>,
+    /// The negative nodes being dealt with, each for the sake of the one before.
+    frames: Vec<Frame<W>>,
+    /// Whether negative edges found are kept, for the sake of dispatching.
+    keeps_edges: bool,
+}
+
+/// A negative node being dealt with.
+struct Frame<W> {
+    node: NodeId,
+    /// The upper-case edges into it that are still to be followed.
+    upper: Vec<EdgeId>,
+    /// The upper-case edge being followed; `None` for the plain edges.
+    label: Option<LinkId>,
+    /// Plain edges that the waits have been found to be.
+    plain: Vec<EdgeId>,
+    /// Whether the plain edges have been begun with.
+    is_last: bool,
+    reached: BTreeMap<NodeId, Reached<W>>,
+    queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
+}
+
+/// A way from a node to the frame's.
+struct Reached<W> {
+    distance: Extended<W>,
+    /// Its first edge.
+    edge: EdgeId,
+    /// The way, once it is known to be the shortest.
+    way: Option<WayId>,
+}
+
+impl<W: Weight> Search<'_, W> {
+    /// Deals with a node, and with those that have to be dealt with before.
+    fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
+        self.begin(node);
+        while let Some(frame) = self.frames.last_mut() {
+            let Some(Reverse((distance, node))) = frame.queue.pop() else {
+                if !self.next_pass() {
+                    let done = self.frames.pop().expect("the last frame is there");
+                    self.stage[done.node.index()] = Stage::Done;
+                }
+                continue;
+            };
+            let reached = frame.reached.get_mut(&node).expect("queued when reached");
+            if reached.distance < distance || reached.way.is_some() {
+                continue;
+            }
+            if !distance.is_negative() {
+                self.keep(node);
+                continue;
+            }
+            match self.stage[node.index()] {
+                Stage::Underway => return Err(self.conflict(node)),
+                Stage::New => {
+                    // It comes back to this one when that node has been dealt with.
+                    frame.queue.push(Reverse((distance, node)));
+                    self.begin(node);
+                }
+                Stage::Done => {
+                    if self.keep(node) {
+                        self.extend(node);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, node: NodeId) {
+        let index = node.index();
+        if self.stage[index] != Stage::New {
+            return;
+        }
+        let upper = self.graph.upper_into[index].clone();
+        if upper.is_empty() && self.graph.negative_into[index].is_empty() {
+            self.stage[index] = Stage::Done;
+            return;
+        }
+        self.stage[index] = Stage::Underway;
+        self.frames.push(Frame {
+            node,
+            upper,
+            label: None,
+            plain: Vec::new(),
+            is_last: false,
+            reached: BTreeMap::new(),
+            queue: BinaryHeap::new(),
+        });
+    }
+
+    /// Goes on to the next upper-case edge of the last frame, or to the plain edges. `false` if
+    /// there is nothing left.
+    fn next_pass(&mut self) -> bool {
+        let Some(frame) = self.frames.last_mut() else {
+            return false;
+        };
+        if frame.is_last {
+            return false;
+        }
+        frame.reached.clear();
+        let first = if let Some(edge) = frame.upper.pop() {
+            frame.label = match self.graph.edges[edge].kind {
+                Kind::Upper(link) => Some(link),
+                _ => None,
+            };
+            vec![edge]
+        } else {
+            frame.label = None;
+            frame.is_last = true;
+            let mut first = self.graph.negative_into[frame.node.index()].clone();
+            first.append(&mut frame.plain);
+            first
+        };
+        for edge in first {
+            let distance = self.graph.edges[edge].bound.clone();
+            self.reach(edge, distance);
+        }
+        true
+    }
+
+    /// Notes a way that begins with that edge.
+    fn reach(&mut self, edge: EdgeId, distance: Extended<W>) {
+        let from = self.graph.edges[edge].from;
+        let Some(frame) = self.frames.last_mut() else {
+            return;
+        };
+        if let Some(known) = frame.reached.get(&from)
+            && known.distance <= distance
+        {
+            return;
+        }
+        frame.queue.push(Reverse((distance.clone(), from)));
+        let reached = Reached {
+            distance,
+            edge,
+            way: None,
+        };
+        frame.reached.insert(from, reached);
+    }
+
+    /// The shortest way from a node to the last frame's is known: keeps it as an edge. `false` if
+    /// it need not be followed any further as what it is now: a wait that is none.
+    fn keep(&mut self, node: NodeId) -> bool {
+        let way = self.way(node);
+        let links = self.links;
+        let Some(frame) = self.frames.last_mut() else {
+            return false;
+        };
+        let distance = frame.reached[&node].distance.clone();
+        let is_one_edge = self.graph.ways[way].rest.is_none();
+        let edge = |kind| Edge {
+            from: node,
+            to: frame.node,
+            bound: distance.clone(),
+            kind,
+            origin: Origin::Way(way),
+        };
+        match frame.label {
+            // The link cannot have ended before: it holds in any case.
+            Some(link) if distance >= Extended::from(links.link(link).lower.clone()).negated() => {
+                if node == frame.node {
+                    return false;
+                }
+                let id = self.graph.edges.len();
+                let edge = edge(Kind::Plain);
+                if edge.bound.is_negative() {
+                    // It is followed with the other plain edges.
+                    self.graph.edges.push(edge);
+                    frame.plain.push(id);
+                } else {
+                    self.graph.add(edge);
+                }
+                false
+            }
+            Some(link) => {
+                if !is_one_edge && self.keeps_edges {
+                    let edge = edge(Kind::Upper(link));
+                    self.graph.edges.push(edge);
+                }
+                true
+            }
+            None if is_one_edge || node == frame.node => true,
+            None => {
+                let edge = edge(Kind::Plain);
+                if !edge.bound.is_negative() {
+                    self.graph.add(edge);
+                } else if self.keeps_edges {
+                    self.graph.edges.push(edge);
+                }
+                true
+            }
+        }
+    }
+
+    /// The shortest way from a node to the last frame's.
+    fn way(&mut self, node: NodeId) -> WayId {
+        let frame = self.frames.last_mut().expect("a way leads to a frame");
+        let edge = frame.reached[&node].edge;
+        let next = self.graph.edges[edge].to;
+        let rest = match frame.reached.get(&next) {
+            Some(reached) if next != frame.node => reached.way,
+            _ => None,
+        };
+        let id = self.graph.ways.len();
+        self.graph.ways.push(Way { edge, rest });
+        if let Some(reached) = frame.reached.get_mut(&node) {
+            reached.way = Some(id);
+        }
+        id
+    }
+
+    /// Follows the edges that end at a node.
+    fn extend(&mut self, node: NodeId) {
+        let Some(frame) = self.frames.last() else {
+            return;
+        };
+        let label = frame.label;
+        let distance = frame.reached[&node].distance.clone();
+        for index in 0..self.graph.positive_into[node.index()].len() {
+            let id = self.graph.positive_into[node.index()][index];
+            let edge = &self.graph.edges[id];
+            if label.is_some_and(|link| edge.kind == Kind::Lower(link)) {
+                continue;
+            }
+            let through = distance.plus(&edge.bound);
+            self.reach(id, through);
+        }
+    }
+
+    /// The ways from each frame's node to the one before, from `node`'s frame on, are a cycle.
+    fn conflict(&mut self, node: NodeId) -> Conflict<W> {
+        let first = self.frames.iter().position(|frame| frame.node == node);
+        let first = first.expect("a node under way has a frame");
+        let mut total = Extended::zero();
+        let mut steps = Vec::new();
+        let mut is_whole = true;
+        let mut from = node;
+        while self.frames.len() > first {
+            let way = self.way(from);
+            let frame = self.frames.pop().expect("there are more frames than that");
+            total = total.plus(&frame.reached[&from].distance);
+            let mut edges = Vec::new();
+            let mut next = Some(way);
+            while let Some(way) = next {
+                let edge = self.graph.ways[way].edge;
+                is_whole &= self.graph.spelt_out(edge, MOST_STEPS, &mut edges);
+                next = self.graph.ways[way].rest;
+            }
+            for edge in edges {
+                if steps.len() < MOST_STEPS {
+                    steps.push(self.graph.step(edge));
+                } else {
+                    is_whole = false;
+                }
+            }
+            from = frame.node;
+        }
+        Conflict {
+            steps,
+            is_whole,
+            total,
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! A world that beats every executor where a network is not dynamically controllable.
+
+use std::collections::BTreeSet;
+
+use elbowroom_num::{Delta, Rational};
+
+use super::{ContingentLink, LinkId, UncertainNetwork};
+use crate::{Constraint, Network, NodeId};
+
+/// Chooses when links end, so that the executor loses if it can be made to lose.
+///
+/// Where a network is not dynamically controllable, no executor can be sure to win. So whatever an
+/// executor has done, it loses either if a link ends now, or if it goes on: the spoiler asks which,
+/// each time that something has happened or could happen, and sees to it. It knows nothing of what
+/// the executor is going to do.
+#[derive(Clone, Debug)]
+pub struct Spoiler {
+    network: UncertainNetwork,
+    origin: NodeId,
+}
+
+impl Spoiler {
+    /// A spoiler for a network whose times count from `origin`.
+    pub fn new(network: UncertainNetwork, origin: NodeId) -> Self {
+        Self { network, origin }
+    }
+
+    /// The network.
+    pub fn network(&self) -> &UncertainNetwork {
+        &self.network
+    }
+
+    /// The links that end now, in order. `happened` has the times of what has happened, by node,
+    /// counted from the origin.
+    pub fn ends_now(&self, now: &Rational, happened: &[Option<Rational>]) -> Vec<LinkId> {
+        let mut happened = happened.to_vec();
+        let mut ending = Vec::new();
+        let mut later = BTreeSet::new();
+        // The end of one link may activate another one that takes no time.
+        while let Some(id) = self.next_candidate(now, &happened, &later) {
+            let link = self.network.link(id);
+            let begun = running_since(link, &happened);
+            let is_over = begun
+                .zip(link.upper.as_ref())
+                .is_some_and(|(begun, upper)| begun + upper <= *now);
+            let mut ended = happened.clone();
+            ended[link.end.index()] = Some(now.clone());
+            if is_over || self.is_lost(now, &ended, &later) {
+                happened = ended;
+                ending.push(id);
+            } else {
+                later.insert(id);
+            }
+        }
+        ending
+    }
+
+    /// A link that may end now, and of which it has not been decided that it ends later.
+    fn next_candidate(
+        &self,
+        now: &Rational,
+        happened: &[Option<Rational>],
+        later: &BTreeSet<LinkId>,
+    ) -> Option<LinkId> {
+        let may_end = |id: &LinkId| {
+            let link = self.network.link(*id);
+            let begun = running_since(link, happened);
+            begun.is_some_and(|begun| begun + &link.lower <= *now)
+        };
+        let mut links = self.network.link_ids().filter(|id| !later.contains(id));
+        links.find(may_end)
+    }
+
+    /// When to ask again if nothing happens before.
+    pub fn next_look(&self, now: &Rational, happened: &[Option<Rational>]) -> Option<Rational> {
+        let links = self.network.links().iter();
+        let looks = links.flat_map(|link| {
+            let begun = running_since(link, happened);
+            let bounds = [Some(&link.lower), link.upper.as_ref()];
+            bounds.map(|bound| Some(begun.as_ref()? + bound?))
+        });
+        looks.flatten().filter(|look| look > now).min()
+    }
+
+    /// Whether no executor can be sure to win any more, if these links do not end now.
+    fn is_lost(
+        &self,
+        now: &Rational,
+        happened: &[Option<Rational>],
+        later: &BTreeSet<LinkId>,
+    ) -> bool {
+        let Some(rest) = self.rest(now, happened, later) else {
+            return true;
+        };
+        !rest.is_dynamically_controllable()
+    }
+
+    /// The network with what has happened fixed and everything else not before now, or after now.
+    fn rest(
+        &self,
+        now: &Rational,
+        happened: &[Option<Rational>],
+        later: &BTreeSet<LinkId>,
+    ) -> Option<UncertainNetwork<Delta>> {
+        let given = self.network.requirements();
+        let mut requirements = Network::with_nodes(given.node_count());
+        for constraint in given.constraints() {
+            let bound = Delta::from(constraint.bound.clone());
+            requirements.add(Constraint::at_most(constraint.from, constraint.to, bound));
+        }
+        for node in given.nodes().filter(|&node| node != self.origin) {
+            if let Some(time) = &happened[node.index()] {
+                let time = Delta::from(time.clone());
+                requirements.add(Constraint::at_least(self.origin, node, time.clone()));
+                requirements.add(Constraint::at_most(self.origin, node, time));
+            } else if !self.network.is_contingent(node) {
+                let now = Delta::from(now.clone());
+                requirements.add(Constraint::at_least(self.origin, node, now));
+            }
+        }
+        let mut links = Vec::new();
+        for id in self.network.link_ids() {
+            let link = self.network.link(id);
+            if happened[link.end.index()].is_some() {
+                continue;
+            }
+            let mut lower = Delta::from(link.lower.clone());
+            let upper = link.upper.clone().map(Delta::from);
+            if let Some(begun) = &happened[link.activation.index()] {
+                let elapsed = now - begun;
+                lower = lower.max(if later.contains(&id) {
+                    Delta::just_above(elapsed)
+                } else {
+                    Delta::from(elapsed)
+                });
+            }
+            if upper.as_ref().is_some_and(|upper| lower > *upper) {
+                return None;
+            }
+            links.push(ContingentLink {
+                activation: link.activation,
+                end: link.end,
+                lower,
+                upper,
+            });
+        }
+        UncertainNetwork::new(requirements, links).ok()
+    }
+}
+
+/// When a link that is not over was activated.
+fn running_since(link: &ContingentLink, happened: &[Option<Rational>]) -> Option<Rational> {
+    let is_over = happened[link.end.index()].is_some();
+    happened[link.activation.index()]
+        .clone()
+        .filter(|_| !is_over)
+}
