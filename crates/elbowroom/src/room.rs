@@ -14,7 +14,7 @@ use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
 use elbowroom_plan::{
-    Bound, BoxEnd, DecoupledEnvelope, NodeId, Parameter, ParameterId, ParameterKind,
+    Bound, BoxEnd, DecoupledEnvelope, InstanceId, NodeId, Parameter, ParameterId, ParameterKind,
     ParametrizedPlan, Reason, Side, StnPlan,
 };
 
@@ -83,7 +83,17 @@ fn pinned(
     };
     let at_nominal = plan.plan.at(&plan.nominal());
     let fixed = pin_until_sound(at_nominal, nominal, &mut oracle)?;
-    (!is_refused).then(|| loosened(task, with_pins(&fixed), epsilon))
+    let scale = longest(&plan.plan, nominal);
+    (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale, epsilon))
+}
+
+/// How long the longest action takes.
+fn longest(plan: &StnPlan, nominal: &[Rational]) -> Rational {
+    let durations = plan.instances.iter().enumerate().map(|(index, _)| {
+        let id = InstanceId::from(index);
+        &nominal[plan.end(id).index()] - &nominal[plan.start(id).index()]
+    });
+    durations.max().unwrap_or_default()
 }
 
 /// The time points that a broken obligation is about.
@@ -116,27 +126,36 @@ fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
     nodes
 }
 
-/// The plan with each pin that fixes a difference replaced by the bounds on it that were found.
-fn loosened(task: &Task, plan: ParametrizedPlan, epsilon: &Rational) -> ParametrizedPlan {
+/// The plan with the bounds in its constraints from number `given` on moved out as far as was
+/// found.
+fn loosened(
+    task: &Task,
+    plan: ParametrizedPlan,
+    given: usize,
+    scale: &Rational,
+    epsilon: &Rational,
+) -> ParametrizedPlan {
     let mut open = plan.clone();
     let mut pins = Vec::new();
-    for (index, constraint) in open.plan.constraints.iter_mut().enumerate() {
-        let (Reason::Pinned, Bound::Finite(exact)) = (&constraint.reason, &constraint.lower) else {
+    for (index, constraint) in open.plan.constraints.iter_mut().enumerate().skip(given) {
+        let Bound::Finite(least) = &constraint.lower else {
             continue;
         };
-        if constraint.lower != constraint.upper {
-            continue;
-        }
         let id = ParameterId::from(open.parameters.len());
         open.parameters.push(Parameter {
             name: format!("pin {index}"),
             kind: ParameterKind::Bound,
-            nominal: exact.clone(),
+            nominal: least.clone(),
             weight: Rational::ONE,
-            range: Interval::EVERYTHING,
+            range: match constraint.upper {
+                Bound::Infinite => Interval::at_most(least.clone()),
+                _ => Interval::EVERYTHING,
+            },
         });
+        if constraint.lower == constraint.upper {
+            constraint.upper = Bound::Parameter(id);
+        }
         constraint.lower = Bound::Parameter(id);
-        constraint.upper = Bound::Parameter(id);
         pins.push((index, id));
     }
     if pins.is_empty() {
@@ -150,7 +169,7 @@ fn loosened(task: &Task, plan: ParametrizedPlan, epsilon: &Rational) -> Parametr
         plan: &open,
         checks: 0,
     };
-    growth.run(epsilon);
+    growth.run(scale, epsilon);
     for &(_, id) in &pins {
         growth.beyond(id);
     }
@@ -161,12 +180,14 @@ fn loosened(task: &Task, plan: ParametrizedPlan, epsilon: &Rational) -> Parametr
         let interval = envelope.interval(id);
         let constraint = &mut loose.plan.constraints[index];
         constraint.lower = bound(&interval.lower);
-        constraint.upper = bound(&interval.upper);
+        if constraint.upper != Bound::Infinite {
+            constraint.upper = bound(&interval.upper);
+        }
     }
     loose.plan.constraints.retain(|constraint| {
         let is_empty =
             (&constraint.lower, &constraint.upper) == (&Bound::Infinite, &Bound::Infinite);
-        !is_empty || constraint.reason != Reason::Pinned
+        !is_empty || matches!(constraint.reason, Reason::Duration(_) | Reason::Timed(_))
     });
     loose
 }
@@ -186,20 +207,16 @@ struct Growth<'a> {
 
 impl Growth<'_> {
     /// Moves all ends that are times out, by ever smaller steps, in turn: 500, 200, 100, 50, …
-    /// down to ε, or to a thousandth of the greatest where there are others to share with.
-    fn run(&mut self, epsilon: &Rational) {
+    /// down to ε, or to a thousandth of `scale` where there are others to share with.
+    fn run(&mut self, scale: &Rational, epsilon: &Rational) {
         let ends = self.ends();
-        let nominal = ends
-            .iter()
-            .map(|end| &self.plan.parameter(end.parameter).nominal);
-        let largest = nominal.map(Rational::abs).max().unwrap_or_default();
         let is_shared = ends.len() > 2;
-        let share = &largest * &Rational::new(1, 1000);
-        let steps = steps(&largest, epsilon).into_iter();
+        let share = scale * &Rational::new(1, 1000);
+        let steps = steps(scale, epsilon).into_iter();
         for step in steps.filter(|step| !is_shared || *step >= share) {
             let mut open = ends.clone();
-            // Ten steps of one size are one of the next larger: that one was refused, or nothing
-            // stops this end at all.
+            // A few steps of one size make the next larger one: that was refused, or nothing stops
+            // this end at all.
             for _ in 0..MOST_STEPS {
                 open.retain(|&end| self.moves(end, &step));
             }

@@ -5,9 +5,9 @@
 //! - What makes a fact as the action needs it does no harm wherever it happens. One such writer
 //!   must come before the action, if the fact is not so from the beginning; the others are free.
 //! - Increases and decreases that a comparison of numbers reads may do harm or not; that depends
-//!   on the numbers. Where keeping them on their sides would tie ends to each other, or starts that
-//!   fall together, these sides ([`Reason::Side`]) are listed by themselves, for
-//!   [`pin_until_sound`](super::pin_until_sound) to take those that it needs.
+//!   on the numbers. Where keeping them on their sides would tie together what falls together in
+//!   the plan, or the ends of actions that overlap, these sides ([`Reason::Side`]) are listed by
+//!   themselves, for [`pin_until_sound`](super::pin_until_sound) to take those that it needs.
 
 use std::collections::BTreeMap;
 
@@ -90,11 +90,13 @@ pub(super) fn order(
                 end,
                 distance: &Rational::ZERO,
             };
-            // In which order things start is for the executor to choose, so that order costs
-            // nothing. But that two things start together, or how ends lie, is not.
+            let span = |node: NodeId| match plan.nodes[node.index()] {
+                Node::Start(id) | Node::End(id) => (starts[id.index()], ends[id.index()]),
+                _ => (node, node),
+            };
             let costs_nothing = |from: NodeId, to: NodeId| {
-                let is_end = |node| matches!(plan.nodes[NodeId::index(node)], Node::End(_));
-                timeline.time(from) < timeline.time(to) && !is_end(from) && !is_end(to)
+                timeline.time(from) < timeline.time(to)
+                    && !overlap_in_part(span(from), span(to), timeline)
             };
             keep_sides(
                 writers,
@@ -110,6 +112,23 @@ pub(super) fn order(
             );
         }
     }
+}
+
+/// Whether two actions, from start to end each, run together for a while, but neither within the
+/// other. Nobody would then want the one to end before the other, or to start before it ends, as
+/// little as that they start or end together.
+fn overlap_in_part(
+    (start, end): (NodeId, NodeId),
+    (other_start, other_end): (NodeId, NodeId),
+    timeline: &Timeline<'_>,
+) -> bool {
+    let time = |node| timeline.time(node);
+    let (first, second) = if time(start) <= time(other_start) {
+        (end, (other_start, other_end))
+    } else {
+        (other_end, (start, end))
+    };
+    time(second.0) < time(first) && time(first) < time(second.1)
 }
 
 /// What an action reads throughout, besides what decides its conditional effects.
