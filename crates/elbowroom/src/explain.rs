@@ -119,6 +119,7 @@ impl<'a> Explainer<'a> {
         match limit {
             Limit::Unbounded => None,
             Limit::Range => Some(self.range(id, side)),
+            Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
             Limit::Objection { objection, .. } => Some(match objection {
                 Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
                 Objection::Broken(broken) => self.requirement(&broken.requirement),

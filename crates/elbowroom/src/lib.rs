@@ -63,6 +63,7 @@ mod makespan;
 pub mod network;
 pub mod perturbed;
 mod plan_file;
+mod room;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;

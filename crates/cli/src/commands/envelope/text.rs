@@ -224,6 +224,10 @@ fn ended(request: &EnvelopeRequest, stop: Stop) -> String {
             "The time limit came before the search was done; the intervals could be wider"
                 .to_owned()
         }
+        Stop::Undecided => {
+            "Some wider boxes have too many cases to tell apart; the intervals could be wider"
+                .to_owned()
+        }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
         }

@@ -199,6 +199,9 @@ pub enum Stop {
     /// The watcher wanted no more.
     #[serde(rename = "cancelled")]
     Cancelled,
+    /// Of some wider boxes nothing could be told: too many cases to tell apart.
+    #[serde(rename = "too many cases")]
+    Undecided,
 }
 
 /// The box has grown.

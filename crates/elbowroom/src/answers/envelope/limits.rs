@@ -6,8 +6,7 @@ use elbowroom_plan::{DecoupledEnvelope, ParameterId, Side};
 
 use super::Subject;
 use super::search::flow;
-use crate::answers::{RequestError, Watcher};
-use crate::flow::FlowError;
+use crate::answers::Watcher;
 
 /// By what part of the precision a sharpened end is moved to see what it touches.
 const SHARP: i64 = 1_000_000_000;
@@ -21,10 +20,10 @@ pub(super) fn what_limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     watcher: &mut dyn Watcher,
-) -> Result<Vec<[Option<String>; 2]>, RequestError> {
+) -> Vec<[Option<String>; 2]> {
     let how = &subject.request.search;
     if flow(watcher).is_break() {
-        return Ok(vec![[None, None]; subject.plan.parameters.len()]);
+        return vec![[None, None]; subject.plan.parameters.len()];
     }
     // A sharpened end has no room at all, so the smallest step tells what it touches.
     let mut distance = if how.sharpen {
@@ -32,14 +31,14 @@ pub(super) fn what_limits(
     } else {
         how.precision.clone()
     };
-    let mut words = at_distance(subject, oracle, envelope, &distance)?;
+    let mut words = at_distance(subject, oracle, envelope, &distance);
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
         if flow(watcher).is_break() || words.iter().flatten().all(Option::is_some) {
             break;
         }
         distance = &distance + &distance;
-        let farther = at_distance(subject, oracle, envelope, &distance)?;
+        let farther = at_distance(subject, oracle, envelope, &distance);
         for (known, found) in words
             .iter_mut()
             .flatten()
@@ -50,7 +49,7 @@ pub(super) fn what_limits(
             }
         }
     }
-    Ok(words)
+    words
 }
 
 /// What refuses each end that far out.
@@ -59,18 +58,18 @@ fn at_distance(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     distance: &Rational,
-) -> Result<Vec<[Option<String>; 2]>, RequestError> {
-    let limits = limits(oracle, envelope, distance).map_err(FlowError::Refused)?;
+) -> Vec<[Option<String>; 2]> {
+    let limits = limits(oracle, envelope, distance);
     let words = |id, side, limit: &Option<Limit>| {
         let limit = limit.as_ref()?;
         subject.explainer.limit(id, side, limit)
     };
-    Ok(limits
+    limits
         .iter()
         .enumerate()
         .map(|(index, limits)| {
             let id = ParameterId::from(index);
             Side::BOTH.map(|side| words(id, side, &limits[side.index()]))
         })
-        .collect())
+        .collect()
 }

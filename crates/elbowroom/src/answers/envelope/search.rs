@@ -43,6 +43,7 @@ pub(super) fn search(
     let mut stop = match (search.stop, history.halt) {
         (_, Some(halt)) => halt.into(),
         (StopReason::CheckLimit, None) => Stop::CheckLimit,
+        (StopReason::Undecided, None) => Stop::Undecided,
         (StopReason::Converged | StopReason::Cancelled, None) => Stop::Converged,
     };
     let mut envelope = match search.envelope {
@@ -64,7 +65,7 @@ pub(super) fn search(
     }
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
-    let limits = what_limits(subject, &mut oracle, &envelope, watcher)?;
+    let limits = what_limits(subject, &mut oracle, &envelope, watcher);
     let foresight = match stop {
         Stop::Converged => foresight(subject, &mut oracle, &envelope, watcher)?,
         _ => None,
