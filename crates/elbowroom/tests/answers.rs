@@ -11,11 +11,13 @@ use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Stop, envelope};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
+use elbowroom::execute::Analyst;
+use elbowroom::execution::{Need, Preparer};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
-use elbowroom::{AnyPlan, plan};
+use elbowroom::{AnyPlan, flow, plan};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -186,6 +188,20 @@ fn ends_that_share_a_reason_stand_together_in_the_answer() {
     let makespans = makespans.as_ref().expect("a plan with a schedule");
     assert!(makespans.at_lower.as_ref() < Some(&makespans.nominal));
     assert!(makespans.at_upper.as_ref() > Some(&makespans.nominal));
+}
+
+#[test]
+fn an_envelope_computed_in_mid_execution_can_be_cut_short() {
+    let (task, plan) = read("delivery");
+    let prepared = |mut analyst: Analyst| {
+        let prepared = analyst.prepare(&task, &plan, Need::Envelope);
+        let envelope = prepared.expect("a valid plan").envelope;
+        envelope.expect("it was asked for")
+    };
+    let whole = prepared(Analyst::new(flow::Settings::default()));
+    let cut = Analyst::new(flow::Settings::default()).until(|| ControlFlow::Break(()));
+    let cut = prepared(cut);
+    assert!(whole.includes(&cut) && whole != cut, "{cut:?}");
 }
 
 /// Wants no more after so many looks at a box, and remembers the last box.
