@@ -21,7 +21,7 @@ use elbowroom::{AnyPlan, flow, plan};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-const CASES: [&str; 5] = ["battery", "delivery", "errand", "match", "tank"];
+const CASES: [&str; 4] = ["battery", "delivery", "match", "tank"];
 
 fn text(case: &str, file: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
@@ -149,7 +149,7 @@ fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
 
 #[test]
 fn documents_of_another_format_or_version_are_not_read() {
-    let (task, plan) = read("errand");
+    let (task, plan) = read("match");
     let written = assert_stored(&asked(&EnvelopeRequest::new(&task, plan)).answer);
     let refuses = |text: &str| serde_json::from_str::<EnvelopeAnswer>(text).is_err();
     assert!(!refuses(&written));
