@@ -175,6 +175,14 @@ pub(crate) struct EnvelopeArgs {
     /// What is guaranteed inside the envelope
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
+    /// Have the dispatcher keep to every obligation that is a bound on the difference of two times,
+    /// so that schedules which break one do not count
+    #[arg(long)]
+    pub(crate) enforce: bool,
+    /// Actions whose durations the executor chooses, so that they are not left open: a name, a
+    /// label or `(name argument …)`, `_` for any argument; may be repeated
+    #[arg(long, value_name = "ACTION")]
+    pub(crate) controllable: Vec<String>,
     /// How far apart interfering happenings must be
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     pub(crate) epsilon: Rational,

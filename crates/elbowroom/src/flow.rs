@@ -32,7 +32,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// ε = 0.001, all durations, the weak guarantee, precision 1.
+    /// ε = 0.001, all durations, the dynamic guarantee, precision 1.
     fn default() -> Self {
         Self {
             epsilon: Rational::new(1, 1000),

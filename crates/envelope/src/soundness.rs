@@ -295,7 +295,10 @@ impl DirectCase {
 }
 
 /// The earliest schedule at these values, by node.
-fn earliest_schedule(reduction: &Reduction, valuation: &[Rational]) -> Option<Vec<Rational>> {
+pub(crate) fn earliest_schedule(
+    reduction: &Reduction,
+    valuation: &[Rational],
+) -> Option<Vec<Rational>> {
     let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;

@@ -21,13 +21,15 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     refuse_what_is_not_there_yet(arguments)?;
     let mut watch = Watch::start(arguments);
     let mut task = input::task(&arguments.problem)?;
-    let vary = specifications(&arguments.vary)?;
+    let mut vary = specifications(&arguments.vary)?;
+    vary.extend(specifications(&controllable(&arguments.controllable))?);
     let plan = input::any_plan(&mut task, &arguments.plan)?;
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
         epsilon: arguments.epsilon.clone(),
         guarantee: arguments.guarantee.into(),
+        enforce: arguments.enforce,
         contains: arguments.contains.clone(),
         search: Search {
             precision: arguments.precision.clone(),
@@ -57,6 +59,14 @@ fn exit(outcome: &EnvelopeOutcome) -> Exit {
         EnvelopeFinding::Fails(_) | EnvelopeFinding::Outside { .. } => Exit::No,
         EnvelopeFinding::None { .. } => Exit::Limit,
     }
+}
+
+/// What says that the executor chooses the durations of these actions.
+fn controllable(actions: &[String]) -> Vec<String> {
+    actions
+        .iter()
+        .map(|action| format!("controllable {action}"))
+        .collect()
 }
 
 fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Failure> {

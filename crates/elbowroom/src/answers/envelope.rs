@@ -1,6 +1,7 @@
 //! How far may each quantity of a plan deviate?
 
 mod answer;
+mod foresight;
 mod limits;
 mod search;
 
@@ -23,6 +24,7 @@ pub use answer::{
     Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
     Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
+pub use foresight::Foresight;
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.
 #[derive(Clone, Debug)]
@@ -39,6 +41,9 @@ pub struct EnvelopeRequest {
     pub epsilon: Rational,
     /// What to guarantee inside the envelope.
     pub guarantee: Guarantee,
+    /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
+    /// ([`elbowroom_envelope::enforced`]).
+    pub enforce: bool,
     /// Whether this box lies inside the envelope: `d0=[5,30] d1=[10,20]`, as [`parse_box`] reads
     /// it. If there is none, a large box inside it is searched for.
     pub contains: Option<String>,
@@ -99,6 +104,7 @@ impl EnvelopeRequest {
             vary: Vec::new(),
             epsilon: Rational::new(1, 1000),
             guarantee: Guarantee::default(),
+            enforce: false,
             contains: None,
             search: Search::default(),
         }
@@ -129,6 +135,11 @@ pub fn envelope(
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
     let plan = match opened(request, watcher) {
+        Ok(plan) if request.enforce => {
+            let enforced = elbowroom_envelope::enforced(&request.task, &plan, &request.epsilon);
+            // Without a schedule there is nothing to keep to, which will be said with its reason.
+            Arc::new(enforced.map_or(plan, |(enforced, _)| enforced))
+        }
         Ok(plan) => Arc::new(plan),
         Err(FlowError::Invalid(violation)) => {
             let violation = (&*violation).into();

@@ -5,9 +5,11 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Makespans, QuantityKind, Range,
-    Room, Stop,
+    EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind,
+    Range, Room, Stop,
 };
+
+use elbowroom::num::Rational;
 
 use crate::limits::{self, push_paragraph, push_wrapped};
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
@@ -77,7 +79,15 @@ fn push_reason(
 ) {
     if let (Some(why_not), Some(plan)) = (&outcome.why_not, &outcome.plan) {
         push_wrapped(text, &what(why_not), 2, look.width);
-        text.push_str(&example(&request.task, plan, why_not, look));
+        if why_not.plays.is_empty() {
+            text.push_str(&example(&request.task, plan, why_not, look));
+            return;
+        }
+        let title = "Whatever an executor does, the world can spoil it";
+        let _ = write!(text, "\n{}\n", styled(STRONG, title));
+        for play in &why_not.plays {
+            push_wrapped(text, play, 2, look.width);
+        }
     }
 }
 
@@ -89,6 +99,7 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
         stop,
         checks,
         widenings,
+        foresight,
         seconds,
     } = &outcome.answer.finding
     else {
@@ -110,6 +121,9 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
         text.push_str(&limits);
         text.push('\n');
     }
+    if let Some(foresight) = foresight {
+        push_paragraph(&mut text, &worth(foresight), look.width);
+    }
     if let Some(makespans) = makespans {
         push_paragraph(&mut text, &makespan(makespans), look.width);
     }
@@ -125,6 +139,34 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     text.push_str(&styled(FAINT, how.trim_end()));
     text.push('\n');
     text
+}
+
+/// What foresight would be worth, in one sentence.
+fn worth(foresight: &Foresight) -> String {
+    /// Of a long list only the first are named.
+    const MOST_NAMED: usize = 4;
+    let more = &foresight.weak_width.0 - &foresight.width.0;
+    let much = if foresight.width.0.is_zero() {
+        format!("{} wider", number::nearest(&more))
+    } else {
+        let share = more / &foresight.width.0 * Rational::from(100);
+        format!("{} % wider", number::nearest(&share.ceil()))
+    };
+    let named: Vec<&str> = foresight
+        .unknown
+        .iter()
+        .take(MOST_NAMED)
+        .map(String::as_str)
+        .collect();
+    let others = foresight.unknown.len() - named.len();
+    let others = match others {
+        0 => String::new(),
+        others => format!(" and {others} more"),
+    };
+    format!(
+        "Who knew {}{others} in advance would have {much} intervals in sum (--guarantee weak).",
+        named.join(", ")
+    )
 }
 
 fn row(room: &Room) -> Row {

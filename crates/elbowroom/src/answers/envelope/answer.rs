@@ -8,7 +8,7 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{EnvelopeRequest, Subject};
+use super::{EnvelopeRequest, Foresight, Subject};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -77,6 +77,9 @@ pub enum EnvelopeFinding {
         seconds: f64,
         /// Each box found to be inside, in order.
         widenings: Vec<Widened>,
+        /// What it would be worth to know values in advance, if anything.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        foresight: Option<Foresight>,
         /// When the plan is done. Not in the document.
         #[serde(skip)]
         makespans: Option<Makespans>,
@@ -238,6 +241,10 @@ pub struct Counterexample {
     pub values: IndexMap<String, Exact>,
     /// When everything happens; empty if there is no schedule for these values.
     pub schedule: Vec<Happening>,
+    /// How the world beats an executor that cannot know in advance what it learns too late: one
+    /// that starts everything early, and one that starts everything late.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plays: Vec<String>,
 }
 
 /// When an action starts and ends.
@@ -446,6 +453,7 @@ impl Subject<'_> {
             verdict: explanation.verdict.clone(),
             values: names.zip(values).collect(),
             schedule: times.map_or_else(Vec::new, |times| self.happenings(times)),
+            plays: explanation.plays.clone(),
         }
     }
 

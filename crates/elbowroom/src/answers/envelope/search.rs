@@ -7,6 +7,7 @@ use elbowroom_envelope::{Oracle, StopReason, Widening, irr, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
+use super::foresight::foresight;
 use super::limits::what_limits;
 use super::{EnvelopeOutcome, Subject};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
@@ -64,12 +65,17 @@ pub(super) fn search(
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
     let limits = what_limits(subject, &mut oracle, &envelope, watcher)?;
+    let foresight = match stop {
+        Stop::Converged => foresight(subject, &mut oracle, &envelope, watcher)?,
+        _ => None,
+    };
     let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
         parameters: subject.rooms(&envelope, limits),
         stop,
         checks,
         seconds,
         widenings,
+        foresight,
         makespans: Makespans::of(subject.plan, &envelope),
     });
     outcome.envelope = Some(envelope);
