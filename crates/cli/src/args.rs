@@ -115,7 +115,7 @@ pub(crate) struct PlanArgs {
 pub(crate) const NOBODY: &str = "none";
 
 /// The planner that is always there.
-pub(crate) const EMBEDDED: &str = "embedded";
+pub(crate) const EMBEDDED: &str = elbowroom::answers::plan::EMBEDDED;
 
 const PLANNER_HELP: &str = "\
 Planners:

@@ -11,7 +11,6 @@ mod commands;
 mod exit;
 mod input;
 mod interrupt;
-mod json;
 mod limits;
 mod look;
 mod number;

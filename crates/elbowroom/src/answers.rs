@@ -9,6 +9,7 @@
 //!
 //! | question | request | answer |
 //! |---|---|---|
+//! | is there a plan? | [`PlanRequest`] | [`PlanAnswer`] |
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
 //! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
@@ -17,6 +18,7 @@ pub mod check;
 pub mod envelope;
 mod exact;
 mod format;
+pub mod plan;
 pub mod stn;
 mod violation;
 mod watch;
@@ -25,9 +27,10 @@ pub use check::{CheckAnswer, CheckRequest};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 pub use exact::Exact;
 pub use format::Version;
+pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
-pub use watch::{EnvelopeProgress, Event, Halt, Unwatched, Watcher};
+pub use watch::{EnvelopeProgress, Event, Halt, PlanProgress, Unwatched, Watcher};
 
 use crate::box_text::BoxTextError;
 use crate::flow::FlowError;
@@ -46,4 +49,7 @@ pub enum RequestError {
     /// The judge cannot tell whether the plan is valid: why.
     #[error("cannot tell whether the plan is valid: {0}")]
     Undecided(String),
+    /// The embedded planner does not support something in the problem, which this names.
+    #[error("{0}")]
+    Unsupported(String),
 }

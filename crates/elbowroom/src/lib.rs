@@ -37,6 +37,9 @@
 //! # }
 //! ```
 //!
+//! Each question of the command line is a request with an answer in [`answers`]; an answer is plain
+//! data, and its JSON is the document that `docs/formats` describes.
+//!
 //! The crates behind it, each under its own name:
 //!
 //! - [`num`]: exact rationals and intervals.
@@ -47,6 +50,11 @@
 //! - [`envelope`]: the box check, and the search for a box.
 //! - [`network`]: temporal networks in the formats of the field, and what can be promised about
 //!   them.
+//! - [`probability`]: how likely a plan is to succeed, and the best order.
+//! - [`planner`]: finds plans, or has other planners find them.
+//! - [`execution`]: what to do next, given what has happened: executors, and the run of a plan.
+//! - [`sim`]: worlds to execute in.
+//! - [`report`]: traces, replays, statistics, tables and plots.
 //!
 //! What stands here adds words to what these find out ([`Explainer`]), reads and writes boxes
 //! ([`parse_box`]), and draws pictures ([`graph`]). It does not look at clocks or files, and it

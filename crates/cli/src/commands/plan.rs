@@ -1,16 +1,16 @@
 //! `elbowroom plan`: find a plan, or have another planner find one.
 
-mod conclusion;
-mod embedded;
-mod external;
+mod text;
 mod watch;
 
-use elbowroom::model::Task;
-use elbowroom::pddl::Source;
+use elbowroom::answers::RequestError;
+use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, plan, plan_with};
+use elbowroom::planner::external::Planner;
 
 use crate::args::{EMBEDDED, PlanArgs};
-use crate::exit::Answer;
-use crate::input;
+use crate::exit::{Answer, Exit, Failure};
+use crate::{input, output};
+use watch::Watch;
 
 /// Plans.
 pub(crate) fn run(arguments: &PlanArgs) -> Answer {
@@ -18,25 +18,69 @@ pub(crate) fn run(arguments: &PlanArgs) -> Answer {
     let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
         None
     } else {
-        Some(external::planner(arguments)?)
+        Some(named(arguments)?)
     };
-    let (task, domain, problem) = input::task_with_sources(&arguments.problem)?;
-    let subject = Subject {
-        arguments,
-        task,
-        domain,
-        problem,
+    let (mut task, domain, problem) = input::task_with_sources(&arguments.problem)?;
+    let mut watch = Watch::start(arguments, planner.is_some());
+    let mut request = PlanRequest {
+        task: &mut task,
+        epsilon: arguments.epsilon.clone(),
+        first_plan_only: arguments.first || watch.limit().is_none(),
+        most_memory: arguments.memory.map(|megabytes| megabytes << 20),
     };
-    match planner {
-        None => embedded::run(subject),
-        Some(planner) => external::run(&planner, subject),
-    }
+    let outcome = match &planner {
+        None => plan(&mut request, &mut watch).map_err(unsupported)?,
+        Some(planner) => {
+            let limit = watch.limit();
+            let sources = [&domain, &problem];
+            plan_with(planner, &mut request, sources, limit, &mut watch).map_err(text::failure)?
+        }
+    };
+    // The line on the terminal goes before the answer comes.
+    drop(watch);
+    print(arguments, &outcome)
 }
 
-/// What to plan.
-struct Subject<'a> {
-    arguments: &'a PlanArgs,
-    task: Task,
-    domain: Source,
-    problem: Source,
+/// The planner that the command line asks for.
+fn named(arguments: &PlanArgs) -> Result<Planner, Failure> {
+    Planner::named(&arguments.planner).map_err(|error| {
+        Failure::new(
+            error,
+            "`elbowroom plan --help` says more; --planner embedded is always there",
+        )
+    })
+}
+
+fn unsupported(error: RequestError) -> Failure {
+    Failure::new(
+        error,
+        "docs/planners.md says what the embedded planner supports; --planner names another one",
+    )
+}
+
+fn print(arguments: &PlanArgs, outcome: &PlanOutcome) -> Answer {
+    let answer = &outcome.answer;
+    if let PlanFinding::Plan {
+        repaired: Some(objection),
+        ..
+    } = &answer.finding
+    {
+        output::tell(&text::repaired(&answer.planner, objection));
+    }
+    let plan = text::plan(&answer.finding);
+    if let (Some(plan), Some(path)) = (&plan, &arguments.output) {
+        output::write_file(path, plan)?;
+    }
+    if arguments.json {
+        output::print_document(answer)?;
+    } else if let PlanFinding::NoPlan { reason } | PlanFinding::None { reason } = &answer.finding {
+        output::print(&format!("{reason}\n"))?;
+    } else if let (Some(plan), None) = (&plan, &arguments.output) {
+        output::print(plan)?;
+    }
+    Ok(match &answer.finding {
+        PlanFinding::Plan { .. } => Exit::Yes,
+        PlanFinding::NoPlan { .. } => Exit::No,
+        PlanFinding::None { .. } => Exit::Limit,
+    })
 }

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom_model::validate::Violation;
+use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
 /// Hears how far a request has come, and says when it has to end.
@@ -43,6 +44,8 @@ pub enum Event<'a> {
     Repaired(&'a Violation),
     /// The search for an envelope has tried a step.
     Envelope(EnvelopeProgress<'a>),
+    /// A planner is at work, or has found a plan.
+    Plan(PlanProgress<'a>),
 }
 
 /// How far the search for an envelope has come.
@@ -56,6 +59,21 @@ pub struct EnvelopeProgress<'a> {
     pub widenings: usize,
     /// How many steps have been tried.
     pub steps: usize,
+}
+
+/// How far a planner has come.
+#[derive(Clone, Debug)]
+pub struct PlanProgress<'a> {
+    /// When the last action ends, if this is about a new plan.
+    pub makespan: Option<&'a Rational>,
+    /// The value of the problem's metric, if this is about a new plan and it has one.
+    pub metric: Option<&'a Rational>,
+    /// How many plans there have been.
+    pub plans: usize,
+    /// How many states have been looked at; the embedded planner only.
+    pub states: Option<u64>,
+    /// How much memory is used, in bytes; other planners only.
+    pub memory: Option<u64>,
 }
 
 /// Nobody watches: the work goes on until it is done.

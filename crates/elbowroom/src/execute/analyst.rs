@@ -1,5 +1,6 @@
 //! Makes plans ready: deordering, parameters, envelopes.
 
+use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -16,16 +17,48 @@ use super::vary::is_about_an_absent_action;
 use crate::flow;
 
 /// Makes plans ready with [`flow`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Analyst {
     settings: flow::Settings,
+    limit: Option<Limit>,
+}
+
+/// Says, while an envelope is computed, whether to go on.
+type Limit = Arc<dyn Fn() -> ControlFlow<()> + Send + Sync>;
+
+impl fmt::Debug for Analyst {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { settings, limit } = self;
+        f.debug_struct("Analyst")
+            .field("settings", settings)
+            .field("has_limit", &limit.is_some())
+            .finish()
+    }
 }
 
 impl Analyst {
     /// `settings.vary` says what to leave open of each plan; what a plan does not have, it cannot
     /// leave open.
     pub fn new(settings: flow::Settings) -> Self {
-        Self { settings }
+        Self {
+            settings,
+            limit: None,
+        }
+    }
+
+    /// The same, but content with the envelope so far as soon as `limit` says so. It is asked after
+    /// each step; the box is sound at any moment, only smaller than it could be.
+    #[must_use]
+    pub fn until(mut self, limit: impl Fn() -> ControlFlow<()> + Send + Sync + 'static) -> Self {
+        self.limit = Some(Arc::new(limit));
+        self
+    }
+
+    fn flow(&self) -> ControlFlow<()> {
+        match &self.limit {
+            Some(limit) => limit(),
+            None => ControlFlow::Continue(()),
+        }
     }
 
     /// The specifications that fit something in the plan.
@@ -80,7 +113,7 @@ impl Analyst {
         let mut oracle =
             Oracle::new(task, plan, epsilon, guarantee).map_err(|error| error.to_string())?;
         let search = &self.settings.search;
-        let run = irr(&mut oracle, search, &mut |_| ControlFlow::Continue(()));
+        let run = irr(&mut oracle, search, &mut |_| self.flow());
         let run = run.map_err(|error| error.to_string())?;
         run.envelope
             .map_err(|_| "the plan is not guaranteed to work even if nothing deviates".to_owned())

@@ -110,9 +110,7 @@ impl Explainer<'_> {
             }
             let look = spoiler.next_look(&now, &times);
             let next = next.map(|(time, _)| time);
-            let Some(later) = look.into_iter().chain(next).min() else {
-                return None;
-            };
+            let later = look.into_iter().chain(next).min()?;
             now = later;
         }
         None

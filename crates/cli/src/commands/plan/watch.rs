@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use elbowroom::answers::{Event, Halt, PlanProgress, Watcher};
 use elbowroom::num::Rational;
 
 use crate::args::PlanArgs;
+use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 use crate::number;
 use crate::output::counted;
@@ -14,12 +16,11 @@ use crate::progress::Progress;
 
 /// Watches the plans that come, Ctrl-C, and, for who keeps no time of its own, the time.
 pub(super) struct Watch {
+    clock: Clock,
     line: Progress,
     interrupt: Interrupt,
     limit: Option<Duration>,
-    stops_at_first: bool,
-    plans: usize,
-    first: Option<Duration>,
+    keeps_time: bool,
     best: Option<Worth>,
 }
 
@@ -30,16 +31,14 @@ struct Worth {
 }
 
 impl Watch {
-    /// Starts to watch.
-    pub(super) fn start(arguments: &PlanArgs) -> Self {
-        let limit = arguments.time_limit.as_ref().map(duration);
+    /// Starts to watch. Another planner keeps its time limit itself.
+    pub(super) fn start(arguments: &PlanArgs, is_other_planner: bool) -> Self {
         Self {
+            clock: Clock::start(),
             line: Progress::new(),
             interrupt: Interrupt::listen(),
-            limit,
-            stops_at_first: arguments.first || limit.is_none(),
-            plans: 0,
-            first: None,
+            limit: arguments.time_limit.as_ref().map(duration),
+            keeps_time: !is_other_planner,
             best: None,
         }
     }
@@ -48,60 +47,20 @@ impl Watch {
         self.limit
     }
 
-    /// Whether the first plan is enough.
-    pub(super) fn stops_at_first(&self) -> bool {
-        self.stops_at_first
-    }
-
-    /// How many plans there were.
-    pub(super) fn plans(&self) -> usize {
-        self.plans
-    }
-
-    /// When the first plan was there.
-    pub(super) fn first(&self) -> Option<Duration> {
-        self.first
-    }
-
-    /// Whether Ctrl-C was pressed.
-    pub(super) fn is_cancelled(&self) -> bool {
-        self.interrupt.is_requested()
-    }
-
-    /// Whether the time is up.
-    pub(super) fn is_late(&self, elapsed: Duration) -> bool {
-        self.limit.is_some_and(|limit| elapsed >= limit)
-    }
-
-    /// A plan has come. Says whether to go on.
-    pub(super) fn plan(
-        &mut self,
-        makespan: &Rational,
-        metric: Option<&Rational>,
-        elapsed: Duration,
-    ) -> ControlFlow<()> {
-        self.plans += 1;
-        self.first.get_or_insert(elapsed);
-        self.best = Some(Worth {
-            makespan: makespan.clone(),
-            metric: metric.filter(|metric| *metric != makespan).cloned(),
-        });
-        if self.stops_at_first {
-            return ControlFlow::Break(());
-        }
-        self.flow()
-    }
-
-    /// Shows how far the search has come; `what` it counts stands at the beginning. Says whether
-    /// to go on.
-    pub(super) fn show(
-        &mut self,
-        elapsed: Duration,
-        what: impl FnOnce() -> String,
-    ) -> ControlFlow<()> {
-        let (plans, best, limit) = (self.plans, &self.best, self.limit);
+    /// Shows how far the search has come.
+    fn show(&mut self, progress: &PlanProgress<'_>) {
+        let elapsed = self.clock.elapsed();
+        let (best, limit) = (&self.best, self.limit);
         self.line.show(elapsed, || {
-            let mut line = format!("{}, {}", what(), counted(plans, "plan"));
+            let mut line = match (progress.states, progress.memory) {
+                (Some(states), _) => {
+                    let states = usize::try_from(states).unwrap_or(usize::MAX);
+                    format!("{}, ", counted(states, "state"))
+                }
+                (None, Some(memory)) => format!("{} MB, ", memory >> 20),
+                (None, None) => String::new(),
+            };
+            line.push_str(&counted(progress.plans, "plan"));
             if let Some(best) = best {
                 let makespan = number::nearest(&best.makespan);
                 let _ = write!(line, ", the last ends at {makespan}");
@@ -119,15 +78,39 @@ impl Watch {
             };
             line
         });
-        self.flow()
+    }
+}
+
+impl Watcher for Watch {
+    fn elapsed(&mut self) -> Duration {
+        self.clock.elapsed()
     }
 
-    fn flow(&self) -> ControlFlow<()> {
-        if self.is_cancelled() {
-            ControlFlow::Break(())
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let is_late = |limit: Duration| self.keeps_time && self.clock.elapsed() >= limit;
+        if self.interrupt.is_requested() {
+            ControlFlow::Break(Halt::Cancelled)
+        } else if self.limit.is_some_and(is_late) {
+            ControlFlow::Break(Halt::TimeLimit)
         } else {
             ControlFlow::Continue(())
         }
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        let Event::Plan(progress) = event else {
+            return;
+        };
+        if let Some(makespan) = progress.makespan {
+            self.best = Some(Worth {
+                makespan: makespan.clone(),
+                metric: progress
+                    .metric
+                    .filter(|metric| *metric != makespan)
+                    .cloned(),
+            });
+        }
+        self.show(progress);
     }
 }
 

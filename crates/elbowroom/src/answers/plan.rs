@@ -1,0 +1,374 @@
+//! Is there a plan?
+
+#[cfg(feature = "external")]
+mod external;
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_pddl::write_plan;
+use elbowroom_planner::{Answer, Counts, Found, Progress, Settings, Stopped};
+use serde::{Deserialize, Serialize};
+
+use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
+
+#[cfg(feature = "external")]
+pub use external::{PlannerFailure, plan_with};
+
+/// Asks for a plan.
+#[derive(Debug)]
+pub struct PlanRequest<'a> {
+    /// The problem. Planning names facts in it that it did not name before.
+    pub task: &'a mut Task,
+    /// The least separation of interfering happenings (ε); positive.
+    pub epsilon: Rational,
+    /// Whether the first plan is enough. Otherwise better ones are looked for until the watcher
+    /// wants no more, or there is none.
+    pub first_plan_only: bool,
+    /// About how much memory the search may use, in bytes.
+    pub most_memory: Option<u64>,
+}
+
+/// The answer, and the plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanOutcome {
+    /// The answer as a document.
+    pub answer: PlanAnswer,
+    /// The plan, if there is one.
+    pub plan: Option<TimeTriggeredPlan>,
+}
+
+/// A plan, or why there is none: `docs/formats/plan-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanAnswer {
+    /// Always the same.
+    pub format: PlanFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// The planner's name.
+    pub planner: String,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: PlanFinding,
+    /// Why the search ended.
+    pub stop: PlanStop,
+    /// How many plans were found, each better than the one before as far as the planner knows.
+    pub plans: usize,
+    /// How long it took.
+    pub seconds: f64,
+    /// When the first plan was there.
+    pub first_plan_seconds: Option<f64>,
+    /// What else the planner counts.
+    pub statistics: PlanStatistics,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PlanFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-plan")]
+    Plan,
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer")]
+pub enum PlanFinding {
+    /// A plan.
+    #[serde(rename = "plan")]
+    Plan {
+        /// The time of the last happening.
+        #[serde(with = "exact")]
+        makespan: Rational,
+        /// The value of the problem's metric, if it has one.
+        #[serde(with = "exact::option")]
+        metric: Option<Rational>,
+        /// What the judge had to object to in the planner's own times, if they were repaired.
+        repaired: Option<String>,
+        /// By start time.
+        steps: Vec<PlanStep>,
+        /// The same as text.
+        plan: String,
+    },
+    /// There is no plan, or the planner says so.
+    #[serde(rename = "no plan")]
+    NoPlan {
+        /// Why.
+        reason: String,
+    },
+    /// Nothing is known.
+    #[serde(rename = "none")]
+    None {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// An action of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanStep {
+    /// When it starts.
+    pub start: Exact,
+    /// Its name: `(drive rover depot shelf)`.
+    pub action: String,
+    /// How long it takes; `None` for an instantaneous action.
+    pub duration: Option<Exact>,
+}
+
+/// Why a search for plans ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PlanStop {
+    /// The first plan was enough.
+    #[serde(rename = "first plan")]
+    FirstPlan,
+    /// Time was up.
+    #[serde(rename = "time limit")]
+    TimeLimit,
+    /// More memory would have been needed.
+    #[serde(rename = "memory limit")]
+    MemoryLimit,
+    /// The watcher wanted no more.
+    #[serde(rename = "cancelled")]
+    Cancelled,
+    /// Nothing is left to search (embedded planner).
+    #[serde(rename = "exhausted")]
+    Exhausted,
+    /// It is proved that there is no plan (embedded planner).
+    #[serde(rename = "proved")]
+    Proved,
+    /// By itself (other planners).
+    #[serde(rename = "ended")]
+    Ended,
+}
+
+/// What a planner counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum PlanStatistics {
+    /// The embedded planner.
+    Embedded {
+        /// Ground actions.
+        actions: u64,
+        /// States whose successors were listed.
+        expanded: u64,
+        /// Successors listed.
+        generated: u64,
+        /// States made and estimated.
+        evaluated: u64,
+        /// About how many bytes the states take.
+        memory_bytes: usize,
+    },
+    /// Another planner.
+    External {
+        /// How many plans were refused, or could not be read.
+        refused: usize,
+        /// The most memory that its processes were seen to use together.
+        peak_memory_bytes: u64,
+        /// How many bytes it printed.
+        printed_bytes: u64,
+    },
+}
+
+/// The name by which answers mention the embedded planner.
+pub const EMBEDDED: &str = "embedded";
+
+/// Has the embedded planner look for a plan.
+///
+/// That there is none, or none was found until the watcher wanted no more, is an answer.
+///
+/// # Errors
+/// When the problem needs what the embedded planner does not support.
+pub fn plan(
+    request: &mut PlanRequest<'_>,
+    watcher: &mut dyn Watcher,
+) -> Result<PlanOutcome, RequestError> {
+    let begun = watcher.elapsed();
+    let situation = Situation::initial(request.task);
+    let mut settings = Settings {
+        epsilon: request.epsilon.clone(),
+        first_plan_only: request.first_plan_only,
+        ..Settings::default()
+    };
+    if let Some(bytes) = request.most_memory {
+        settings.max_memory = usize::try_from(bytes).unwrap_or(usize::MAX);
+    }
+    let mut course = Course {
+        watcher,
+        begun,
+        plans: 0,
+        first: None,
+        halt: None,
+    };
+    let answer = elbowroom_planner::plan(request.task, &situation, &settings, &mut |progress| {
+        course.step(progress)
+    });
+    let (found, stop, counts) = match answer {
+        Answer::Plan {
+            found,
+            stopped,
+            counts,
+        } => (Ok(found), course.stop(stopped), counts),
+        Answer::Unsolvable { proof, counts } => {
+            let reason = proof.to_string();
+            (
+                Err(PlanFinding::NoPlan { reason }),
+                PlanStop::Proved,
+                counts,
+            )
+        }
+        Answer::NoneFound { stopped, counts } => {
+            let stop = course.stop(stopped);
+            let reason = none_found(stop, counts);
+            (Err(PlanFinding::None { reason }), stop, counts)
+        }
+        Answer::Unsupported(unsupported) => {
+            return Err(RequestError::Unsupported(unsupported.to_string()));
+        }
+    };
+    let (plan, finding) = match found {
+        Ok(Found {
+            plan,
+            makespan,
+            metric,
+            ..
+        }) => {
+            let finding = PlanFinding::of(request.task, &plan, makespan, metric, None);
+            (Some(plan), finding)
+        }
+        Err(finding) => (None, finding),
+    };
+    let problem = request.task.problem();
+    let answer = PlanAnswer {
+        format: PlanFormat::Plan,
+        version: Version,
+        domain: problem.domain.clone(),
+        problem: problem.name.clone(),
+        planner: EMBEDDED.to_owned(),
+        finding,
+        stop,
+        plans: course.plans,
+        seconds: course.elapsed().as_secs_f64(),
+        first_plan_seconds: course.first.map(|first| first.as_secs_f64()),
+        statistics: counts.into(),
+    };
+    Ok(PlanOutcome { answer, plan })
+}
+
+impl PlanFinding {
+    fn of(
+        task: &Task,
+        plan: &TimeTriggeredPlan,
+        makespan: Rational,
+        metric: Option<Rational>,
+        repaired: Option<String>,
+    ) -> Self {
+        let mut steps: Vec<_> = plan.steps.iter().collect();
+        steps.sort_by(|a, b| a.start.cmp(&b.start));
+        let steps = steps.into_iter().map(|step| PlanStep {
+            start: Exact(step.start.clone()),
+            action: step.action.name.clone(),
+            duration: step.duration.clone().map(Exact),
+        });
+        Self::Plan {
+            makespan,
+            metric,
+            repaired,
+            steps: steps.collect(),
+            plan: write_plan(task, plan),
+        }
+    }
+}
+
+impl From<Counts> for PlanStatistics {
+    fn from(counts: Counts) -> Self {
+        Self::Embedded {
+            actions: counts.actions,
+            expanded: counts.expanded,
+            generated: counts.generated,
+            evaluated: counts.evaluated,
+            memory_bytes: counts.memory,
+        }
+    }
+}
+
+impl From<Halt> for PlanStop {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::TimeLimit => Self::TimeLimit,
+            Halt::Cancelled => Self::Cancelled,
+        }
+    }
+}
+
+/// Counts the plans that come, and tells the watcher.
+struct Course<'a> {
+    watcher: &'a mut dyn Watcher,
+    begun: Duration,
+    plans: usize,
+    /// When the first plan was there.
+    first: Option<Duration>,
+    /// Why the watcher wanted no more.
+    halt: Option<Halt>,
+}
+
+impl Course<'_> {
+    fn elapsed(&mut self) -> Duration {
+        self.watcher.elapsed().saturating_sub(self.begun)
+    }
+
+    fn step(&mut self, progress: &Progress) -> ControlFlow<()> {
+        if progress.plan.is_some() {
+            self.plans += 1;
+            let elapsed = self.elapsed();
+            self.first.get_or_insert(elapsed);
+        }
+        let found = progress.plan.as_ref();
+        self.tell(&PlanProgress {
+            makespan: found.map(|found| &found.makespan),
+            metric: found.and_then(|found| found.metric.as_ref()),
+            plans: self.plans,
+            states: Some(progress.counts.evaluated),
+            memory: None,
+        })
+    }
+
+    fn tell(&mut self, progress: &PlanProgress<'_>) -> ControlFlow<()> {
+        self.watcher.notice(&Event::Plan(progress.clone()));
+        match self.watcher.flow() {
+            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+            ControlFlow::Break(halt) => {
+                self.halt = Some(halt);
+                ControlFlow::Break(())
+            }
+        }
+    }
+
+    fn stop(&self, stopped: Stopped) -> PlanStop {
+        match stopped {
+            Stopped::Interrupted => self.halt.map_or(PlanStop::Cancelled, PlanStop::from),
+            Stopped::OutOfMemory => PlanStop::MemoryLimit,
+            Stopped::FirstPlan => PlanStop::FirstPlan,
+            Stopped::Exhausted => PlanStop::Exhausted,
+        }
+    }
+}
+
+fn none_found(stop: PlanStop, counts: Counts) -> String {
+    let why = match stop {
+        PlanStop::Cancelled => "before it was stopped",
+        PlanStop::TimeLimit => "within the time limit",
+        PlanStop::MemoryLimit => "within the memory limit",
+        _ => "within what the search can reach",
+    };
+    format!(
+        "no plan was found {why}, and none is known not to exist ({} states)",
+        counts.evaluated
+    )
+}

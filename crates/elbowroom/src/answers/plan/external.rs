@@ -1,0 +1,165 @@
+//! Has another planner look for a plan.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom_model::Situation;
+use elbowroom_pddl::Source;
+use elbowroom_planner::external::{
+    Ending, Event, Outcome, Planner, Report, Request, Settings, Statistics, plan,
+};
+
+use super::{
+    Course, Halt, PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics,
+    PlanStop, Version,
+};
+use crate::answers::{PlanProgress, Watcher};
+use crate::flow;
+
+/// A planner that failed: neither a plan nor an answer came of it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{planner}: {outcome}")]
+pub struct PlannerFailure {
+    /// Which.
+    pub planner: String,
+    /// How.
+    pub outcome: Outcome,
+}
+
+/// Has another planner look for a plan. It reads the texts of domain and problem itself, and gets a
+/// time limit of its own, so that it can end in its own way.
+///
+/// # Errors
+/// When the planner fails.
+pub fn plan_with(
+    planner: &Planner,
+    request: &mut PlanRequest<'_>,
+    [domain, problem]: [&Source; 2],
+    time_limit: Option<Duration>,
+    watcher: &mut dyn Watcher,
+) -> Result<PlanOutcome, PlannerFailure> {
+    let situation = Situation::initial(request.task);
+    let settings = Settings {
+        work_limit: None,
+        epsilon: request.epsilon.clone(),
+        time_limit,
+        memory_limit: request.most_memory,
+        scratch: None,
+    };
+    let epsilon = request.epsilon.clone();
+    let first_plan_only = request.first_plan_only;
+    let mut course = Course {
+        begun: watcher.elapsed(),
+        watcher,
+        plans: 0,
+        first: None,
+        halt: None,
+    };
+    let report = plan(
+        planner,
+        &mut Request {
+            task: &mut *request.task,
+            situation: &situation,
+            domain,
+            problem,
+        },
+        &settings,
+        &mut |task, plan| flow::repaired(task, plan, &epsilon),
+        &mut |event| course.hear(event, first_plan_only),
+    );
+    let halt = course.halt;
+    conclude(planner, request, report, halt)
+}
+
+impl Course<'_> {
+    fn hear(&mut self, event: &Event<'_>, first_plan_only: bool) -> ControlFlow<()> {
+        match event {
+            Event::Running { memory, .. } => self.tell(&PlanProgress {
+                makespan: None,
+                metric: None,
+                plans: self.plans,
+                states: None,
+                memory: Some(*memory),
+            }),
+            Event::Plan { found, .. } => {
+                self.plans += 1;
+                let flow = self.tell(&PlanProgress {
+                    makespan: Some(&found.makespan),
+                    metric: found.metric.as_ref(),
+                    plans: self.plans,
+                    states: None,
+                    memory: None,
+                });
+                if first_plan_only {
+                    return ControlFlow::Break(());
+                }
+                flow
+            }
+            Event::Refused { .. } => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// The answer; failures of the planner are failures.
+fn conclude(
+    planner: &Planner,
+    request: &PlanRequest<'_>,
+    report: Report,
+    halt: Option<Halt>,
+) -> Result<PlanOutcome, PlannerFailure> {
+    let name = &planner.name;
+    let reason = format!("{name}: {}", report.outcome);
+    let (plan, finding) = match report.outcome {
+        Outcome::Plan(found) => {
+            let finding = PlanFinding::of(
+                request.task,
+                &found.plan,
+                found.makespan,
+                found.metric,
+                found.repaired,
+            );
+            (Some(found.plan), finding)
+        }
+        Outcome::Unsolvable { .. } => (None, PlanFinding::NoPlan { reason }),
+        Outcome::NoneInTime
+        | Outcome::Stopped
+        | Outcome::GaveUp { .. }
+        | Outcome::OutOfMemory { .. } => (None, PlanFinding::None { reason }),
+        outcome => {
+            return Err(PlannerFailure {
+                planner: name.clone(),
+                outcome,
+            });
+        }
+    };
+    let statistics = report.statistics;
+    let problem = request.task.problem();
+    let answer = PlanAnswer {
+        format: PlanFormat::Plan,
+        version: Version,
+        domain: problem.domain.clone(),
+        problem: problem.name.clone(),
+        planner: name.clone(),
+        finding,
+        stop: stop(&statistics, halt),
+        plans: statistics.plans,
+        seconds: statistics.elapsed.as_secs_f64(),
+        first_plan_seconds: statistics.first_plan.map(|first| first.as_secs_f64()),
+        statistics: PlanStatistics::External {
+            refused: statistics.refused,
+            peak_memory_bytes: statistics.peak_memory,
+            printed_bytes: statistics.printed,
+        },
+    };
+    Ok(PlanOutcome { answer, plan })
+}
+
+/// Why it ended.
+fn stop(statistics: &Statistics, halt: Option<Halt>) -> PlanStop {
+    match statistics.ending {
+        Some(Ending::TimeLimit) => PlanStop::TimeLimit,
+        Some(Ending::MemoryLimit) => PlanStop::MemoryLimit,
+        Some(Ending::Stopped) => halt.map_or(PlanStop::FirstPlan, PlanStop::from),
+        Some(Ending::Exited(_) | Ending::Signalled(_)) | None => PlanStop::Ended,
+    }
+}
