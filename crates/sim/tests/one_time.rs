@@ -69,7 +69,9 @@ fn played(stage: &Stage, commands: &[(Rational, Command)]) -> Vec<(Rational, Vec
     let mut answers = Vec::new();
     let mut wait = |world: &mut SimWorld<'_>, until: &Rational| {
         loop {
-            let passage = world.wait(until).expect("a simulated world is always there");
+            let passage = world
+                .wait(until)
+                .expect("a simulated world is always there");
             let ends = passage.observations.iter().filter_map(ended);
             let ends: Vec<String> = ends.map(|(n, how)| format!("{n} {how}")).collect();
             if !ends.is_empty() {

@@ -179,7 +179,7 @@ impl ProcessWorld {
             let line = match self.ears.hear(left.min(GLANCE)) {
                 Heard::Line(line) => line,
                 Heard::EndlessLine => return Err(endless_line()),
-                Heard::TooMuch => return Err(babbles()),
+                Heard::TooMuch => return Err(babbles(babble.as_deref())),
                 Heard::Nothing if self.hurried.is_none() && self.interrupt.is_requested() => {
                     self.hurried = Some(Clock::start());
                     let now = self.now.clone();
@@ -198,7 +198,7 @@ impl ProcessWorld {
             };
             said += line.len();
             if said > LONGEST_ANSWER {
-                return Err(babbles());
+                return Err(babbles(babble.as_deref()));
             }
             let line = line.trim();
             if line.is_empty() {
@@ -255,7 +255,7 @@ impl ProcessWorld {
             match self.ears.hear(Duration::ZERO) {
                 Heard::Line(_) => {}
                 Heard::EndlessLine => return endless_line(),
-                Heard::TooMuch => return babbles(),
+                Heard::TooMuch => return babbles(None),
                 Heard::Nothing | Heard::End => break,
             }
         }
@@ -278,10 +278,12 @@ fn endless_line() -> WorldError {
     ))
 }
 
-fn babbles() -> WorldError {
+/// `last` is what could not be understood of that.
+fn babbles(last: Option<&str>) -> WorldError {
     WorldError::new(format!(
-        "it said more than {} MB without ending its answer with `time`",
-        LONGEST_ANSWER >> 20
+        "it said more than {} MB without ending its answer with `time`{}",
+        LONGEST_ANSWER >> 20,
+        last.unwrap_or_default()
     ))
 }
 
