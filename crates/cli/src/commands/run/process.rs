@@ -45,7 +45,7 @@ pub(super) struct ProcessWorld {
     mouth: Mouth,
     ears: Ears,
     patience: Duration,
-    is_strict: bool,
+    manners: Manners,
     interrupt: Interrupt,
     /// When a wait was ended because the user has asked to end.
     hurried: Option<Clock>,
@@ -65,7 +65,7 @@ impl ProcessWorld {
     pub(super) fn start(
         command: &str,
         task: &Arc<Task>,
-        manners: &Manners,
+        manners: Manners,
         interrupt: Interrupt,
     ) -> Result<Self, Failure> {
         let cannot = |why: String| {
@@ -99,7 +99,7 @@ impl ProcessWorld {
             ears: Ears::new(stdout),
             patience: Duration::try_from_secs_f64(manners.patience.to_f64())
                 .unwrap_or(Duration::MAX),
-            is_strict: manners.is_strict,
+            manners,
             interrupt,
             hurried: None,
             is_asked: false,
@@ -213,7 +213,7 @@ impl ProcessWorld {
                 Ok(Said::Observation(observation)) => observations.push(observation),
                 Err(why) => {
                     let said = excerpt(line);
-                    if self.is_strict {
+                    if self.manners.is_strict {
                         return Err(WorldError::new(format!("it said `{said}`: {why}")));
                     }
                     babble = Some(format!("; it said `{said}`: {why}"));
