@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
                     is_strict: arguments.strict_world,
                 };
                 let mut world =
-                    process::ProcessWorld::start(command, &job.task, &manners, interrupt)?;
+                    process::ProcessWorld::start(command, &job.task, manners, interrupt)?;
                 let report = job.run(&mut world, None, None, &mut writer);
                 world.stop();
                 report

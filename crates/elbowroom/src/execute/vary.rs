@@ -19,10 +19,9 @@ pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeErro
     for spec in specs {
         let is_about_the_problem = matches!(spec.target, Target::Initial(_) | Target::Timed { .. });
         match parametrize(task, plan.clone(), &nominal, std::slice::from_ref(spec)) {
-            Ok(_) => {}
+            // Another specification may have the value; if not, that is said when there is a plan.
+            Ok(_) | Err(ParametrizeError::NoNominal { .. }) => {}
             Err(ParametrizeError::NothingMatches { .. }) if !is_about_the_problem => {}
-            // Another specification may have it; if not, that is said when there is a plan.
-            Err(ParametrizeError::NoNominal { .. }) => {}
             Err(error) if is_about_an_absent_action(task, spec, &error) => {}
             Err(ParametrizeError::UnknownName { name, .. }) if is_label(&name) => {}
             Err(error) => return Err(error),

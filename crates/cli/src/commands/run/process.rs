@@ -45,7 +45,7 @@ pub(super) struct ProcessWorld {
     mouth: Mouth,
     ears: Ears,
     patience: Duration,
-    is_strict: bool,
+    manners: Manners,
     interrupt: Interrupt,
     /// When a wait was ended because the user has asked to end.
     hurried: Option<Clock>,
@@ -65,7 +65,7 @@ impl ProcessWorld {
     pub(super) fn start(
         command: &str,
         task: &Arc<Task>,
-        manners: &Manners,
+        manners: Manners,
         interrupt: Interrupt,
     ) -> Result<Self, Failure> {
         let cannot = |why: String| {
@@ -99,7 +99,7 @@ impl ProcessWorld {
             ears: Ears::new(stdout),
             patience: Duration::try_from_secs_f64(manners.patience.to_f64())
                 .unwrap_or(Duration::MAX),
-            is_strict: manners.is_strict,
+            manners,
             interrupt,
             hurried: None,
             is_asked: false,
@@ -179,7 +179,7 @@ impl ProcessWorld {
             let line = match self.ears.hear(left.min(GLANCE)) {
                 Heard::Line(line) => line,
                 Heard::EndlessLine => return Err(endless_line()),
-                Heard::TooMuch => return Err(babbles()),
+                Heard::TooMuch => return Err(babbles(babble.as_deref())),
                 Heard::Nothing if self.hurried.is_none() && self.interrupt.is_requested() => {
                     self.hurried = Some(Clock::start());
                     let now = self.now.clone();
@@ -198,7 +198,7 @@ impl ProcessWorld {
             };
             said += line.len();
             if said > LONGEST_ANSWER {
-                return Err(babbles());
+                return Err(babbles(babble.as_deref()));
             }
             let line = line.trim();
             if line.is_empty() {
@@ -213,7 +213,7 @@ impl ProcessWorld {
                 Ok(Said::Observation(observation)) => observations.push(observation),
                 Err(why) => {
                     let said = excerpt(line);
-                    if self.is_strict {
+                    if self.manners.is_strict {
                         return Err(WorldError::new(format!("it said `{said}`: {why}")));
                     }
                     babble = Some(format!("; it said `{said}`: {why}"));
@@ -255,7 +255,7 @@ impl ProcessWorld {
             match self.ears.hear(Duration::ZERO) {
                 Heard::Line(_) => {}
                 Heard::EndlessLine => return endless_line(),
-                Heard::TooMuch => return babbles(),
+                Heard::TooMuch => return babbles(None),
                 Heard::Nothing | Heard::End => break,
             }
         }
@@ -278,10 +278,12 @@ fn endless_line() -> WorldError {
     ))
 }
 
-fn babbles() -> WorldError {
+/// `last` is what could not be understood of that.
+fn babbles(last: Option<&str>) -> WorldError {
     WorldError::new(format!(
-        "it said more than {} MB without ending its answer with `time`",
-        LONGEST_ANSWER >> 20
+        "it said more than {} MB without ending its answer with `time`{}",
+        LONGEST_ANSWER >> 20,
+        last.unwrap_or_default()
     ))
 }
 
