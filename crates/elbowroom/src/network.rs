@@ -28,7 +28,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::Dispatchable;
 
 pub use answer::{
-    Answer, Broken, Duration, Number, Promise, Reason, Simulated, Step, Time, Verdict,
+    Answer, Broken, LinkDuration, Number, Promise, Reason, Simulated, Step, Time, Verdict,
 };
 pub use elbowroom_network::*;
 pub use simulate::{Durations, Simulation, SimulationError};

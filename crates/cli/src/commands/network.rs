@@ -107,7 +107,7 @@ fn not_written(path: &Path, why: &str) {
 
 /// In the format that the name of the file asks for.
 fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
-    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
     let ending = ending.as_ref().and_then(|ending| ending.to_str());
     let text = if matches!(ending, Some("stn" | "stnu" | "graphml" | "xml")) {
         network::write_graphml(file).ok_or_else(|| {

@@ -105,7 +105,7 @@ pub struct Reason {
     /// Whether `steps` has all of the cycle.
     pub is_whole: bool,
     /// The links that matter, and at which end each is taken.
-    pub durations: Vec<Duration>,
+    pub durations: Vec<LinkDuration>,
 }
 
 /// One bound of a reason.
@@ -120,7 +120,7 @@ pub struct Step {
 
 /// How long a link takes in a reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Duration {
+pub struct LinkDuration {
     /// The point from which the link counts.
     pub activation: String,
     /// The point that the world chooses.

@@ -186,6 +186,10 @@ fn fine(width: &Rational) -> Rational {
 impl Group {
     /// Cholesky's decomposition. Where a matrix is none of correlations, what does not fit is left
     /// independent.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "rows and columns of two matrices at once"
+    )]
     fn of(correlation: &Correlation) -> Self {
         let size = correlation.links.len();
         let mut factors = vec![vec![0.0; size]; size];

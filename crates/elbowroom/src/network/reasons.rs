@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{Conflict, Ground, LinkId};
 use elbowroom_stn::{ConstraintId, NodeId};
 
-use super::answer::{Duration, Number, Promise, Reason, Step, Time, Verdict};
+use super::answer::{LinkDuration, Number, Promise, Reason, Step, Time, Verdict};
 
 /// Whether there is a schedule if the world is kind.
 pub(super) fn consistent(file: &NetworkFile) -> Promise {
@@ -153,7 +153,7 @@ fn step(given: &str, words: String) -> Step {
 }
 
 /// Which links matter, and at which end each is taken.
-fn ends(file: &NetworkFile, grounds: &[Ground]) -> Vec<Duration> {
+fn ends(file: &NetworkFile, grounds: &[Ground]) -> Vec<LinkDuration> {
     let mut known: Vec<Ground> = Vec::new();
     let mut durations = Vec::new();
     for &ground in grounds {
@@ -167,7 +167,7 @@ fn ends(file: &NetworkFile, grounds: &[Ground]) -> Vec<Duration> {
             Ground::Late(id) => (id, "upper", file.network.link(id).upper.as_ref()),
         };
         let link = file.network.link(id);
-        durations.push(Duration {
+        durations.push(LinkDuration {
             activation: file.point(link.activation).to_owned(),
             end: file.point(link.end).to_owned(),
             at: at.to_owned(),
@@ -177,14 +177,14 @@ fn ends(file: &NetworkFile, grounds: &[Ground]) -> Vec<Duration> {
     durations
 }
 
-fn duration(file: &NetworkFile, id: LinkId, value: &Rational) -> Duration {
+fn duration(file: &NetworkFile, id: LinkId, value: &Rational) -> LinkDuration {
     let link = file.network.link(id);
     let at = match value {
         _ if *value == link.lower => "lower",
         _ if Some(value) == link.upper.as_ref() => "upper",
         _ => "within",
     };
-    Duration {
+    LinkDuration {
         activation: file.point(link.activation).to_owned(),
         end: file.point(link.end).to_owned(),
         at: at.to_owned(),
