@@ -267,7 +267,7 @@ fn nothing_ties_ends_together_that_do_not_need_each_other() {
 fn twin_chains(count: usize) -> String {
     let mut lines = Vec::new();
     for index in 0..count {
-        lines.push(format!("parameter p{index} default 10 lb 0;"));
+        lines.push(format!("parameter p{index} default 10 lb 5 ub 20;"));
         for chain in ["a", "b"] {
             lines.push(format!("durative-action instance {chain}{index} : (tick);"));
         }
