@@ -14,8 +14,8 @@ use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
 use elbowroom_plan::{
-    Bound, BoxEnd, DecoupledEnvelope, InstanceId, NodeId, Parameter, ParameterId, ParameterKind,
-    ParametrizedPlan, Reason, Side, StnPlan,
+    Bound, BoxEnd, Constraint, DecoupledEnvelope, InstanceId, Node, NodeId, Parameter, ParameterId,
+    ParameterKind, ParametrizedPlan, Reason, Side, StnPlan,
 };
 
 /// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
@@ -137,10 +137,20 @@ fn loosened(
 ) -> ParametrizedPlan {
     let mut open = plan.clone();
     let mut pins = Vec::new();
+    // How far something may deviate is asked with all that is not left open as it is in the plan.
+    let stays = |constraint: &Constraint| {
+        let node = |id: NodeId| plan.plan.nodes[id.index()];
+        let ends = (node(constraint.from), node(constraint.to));
+        !plan.parameters.is_empty()
+            && matches!(ends, (Node::Start(from), Node::End(to)) if from == to)
+    };
     for (index, constraint) in open.plan.constraints.iter_mut().enumerate().skip(given) {
         let Bound::Finite(least) = &constraint.lower else {
             continue;
         };
+        if stays(constraint) {
+            continue;
+        }
         let id = ParameterId::from(open.parameters.len());
         open.parameters.push(Parameter {
             name: format!("pin {index}"),

@@ -192,6 +192,14 @@ fn orders(lines: &[&str]) -> Vec<String> {
     all
 }
 
+/// What is done, in the order in which deordering numbers it. (Facts are numbered as they are met.)
+fn names(plan: &ParametrizedPlan) -> Vec<&str> {
+    let instances = plan.plan.instances.iter();
+    instances
+        .map(|instance| instance.action.name.as_str())
+        .collect()
+}
+
 #[test]
 fn the_order_of_the_lines_of_a_plan_does_not_matter() {
     for kind in kinds() {
@@ -203,13 +211,11 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
         for text in orders(&lines) {
             let (task, plan) = kind.read_with(&text);
             assert!(judge(&task, &plan).is_valid(), "{}:\n{text}", kind.name);
-            let found = opened(&task, &plan);
-            assert_eq!(
-                found,
-                (Arc::clone(&open), nominal.clone()),
-                "{}:\n{text}",
-                kind.name
-            );
+            let (found, times) = opened(&task, &plan);
+            let here = format!("{}:\n{text}", kind.name);
+            assert_eq!(found.plan.constraints, open.plan.constraints, "{here}");
+            assert_eq!(found.parameters, open.parameters, "{here}");
+            assert_eq!((names(&found), &times), (names(&open), &nominal), "{here}");
             let found = flow::robust_plan(&task, &plan, &flow::Settings::default());
             let found = found.expect("within reach").run.envelope;
             assert_eq!(found, envelope, "{}:\n{text}", kind.name);
@@ -255,30 +261,33 @@ fn nothing_ties_ends_together_that_do_not_need_each_other() {
     }
 }
 
-/// Two chains of actions, of which each has its namesake in the other: they take the same time,
-/// whatever that is, so both chains end together. A box does not show that before it has been taken
-/// apart at every duration.
+/// Two chains of actions, the one the other's mirror image: each action takes as long as its
+/// namesake in the other chain, whatever that is, so both chains end together. A box does not show
+/// that before it has been taken apart at every duration.
 fn twin_chains(count: usize) -> String {
-    let mut text = String::new();
+    let mut lines = Vec::new();
     for index in 0..count {
-        text += &format!("parameter p{index} default 10 lb 0;\n");
+        lines.push(format!("parameter p{index} default 10 lb 5 ub 20;"));
         for chain in ["a", "b"] {
-            text += &format!("durative-action instance {chain}{index} : (tick);\n");
+            lines.push(format!("durative-action instance {chain}{index} : (tick);"));
         }
     }
     for chain in ["a", "b"] {
-        text += &format!("c: {chain}0.start - .zero in [0, 0];\n");
+        lines.push(format!("c: {chain}0.start - .zero in [0, 0];"));
         for index in 0..count {
-            text +=
-                &format!("c: {chain}{index}.end - {chain}{index}.start in [p{index}, p{index}];\n");
-        }
-        for index in 1..count {
-            let before = index - 1;
-            text += &format!("c: {chain}{index}.start - {chain}{before}.end in [0, 0];\n");
+            let own = format!("{chain}{index}");
+            lines.push(format!(
+                "c: {own}.end - {own}.start in [p{index}, p{index}];"
+            ));
+            if index > 0 {
+                let before = format!("{chain}{}", index - 1);
+                lines.push(format!("c: {own}.start - {before}.end in [0, 0];"));
+            }
         }
     }
     let last = count - 1;
-    text + &format!("c: b{last}.end - a{last}.end in [-1, 1];\n")
+    lines.push(format!("c: b{last}.end - a{last}.end in [-1, 1];"));
+    lines.join("\n")
 }
 
 #[test]
@@ -306,4 +315,28 @@ fn what_was_found_is_kept_when_there_are_too_many_cases_to_tell_apart() {
         Ok(None),
         "what was kept is inside"
     );
+}
+
+#[test]
+fn a_number_in_a_continuous_decrease_is_left_open_as_it_is_written() {
+    let all = kinds();
+    let jobs = all.iter().find(|kind| kind.domain.contains("workshop"));
+    let (task, plan) = jobs.expect("the jobs with a battery").read();
+    let opened = |spec: &str| {
+        let freed = flow::free(&task, &plan, &epsilon()).expect("a valid plan");
+        let spec = spec.parse().expect("a specification");
+        flow::open(&task, freed, &[spec], &epsilon())
+    };
+    let open = Arc::new(opened("constant work charge shared").expect("a number"));
+    assert_eq!(open.nominal(), [Rational::ONE]);
+    assert!(opened("constant work charge 1 shared").is_ok());
+    assert!(opened("constant work charge -1 shared").is_err());
+    // Three jobs of 10 each, and 39 to spend.
+    let mut oracle = Oracle::new(&task, &open, &epsilon(), Guarantee::Weak).expect("within reach");
+    for (text, expected) in [("[0,13/10]", true), ("[1/2,1301/1000]", false)] {
+        let name = &open.parameters[0].name;
+        let envelope = parse_box(&format!("{name}={text}"), &open).expect("a box");
+        let objection = oracle.objection(&envelope).expect("few cases");
+        assert_eq!(objection.is_none(), expected, "{text}");
+    }
 }

@@ -1,5 +1,6 @@
 //! Kinds of plans in which it is easy to promise, or to do, something wrong: one small plan for
 //! each, with what is true of it.
+#![allow(dead_code, reason = "each test uses some of it")]
 
 use std::sync::Arc;
 
