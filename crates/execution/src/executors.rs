@@ -11,6 +11,7 @@ mod fixed;
 mod guarded;
 mod live;
 mod lookahead;
+mod promise;
 mod stn;
 
 use std::fmt;

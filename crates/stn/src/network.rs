@@ -246,6 +246,24 @@ impl<W: Weight> Network<W> {
         finished
     }
 
+    /// For each node, a number that it shares with just those nodes to and from which edges lead,
+    /// whatever their bounds.
+    pub fn components(&self) -> Vec<usize> {
+        // Kosaraju's algorithm: the last one left first, and against the edges.
+        let order = self.depth_first_postorder(|_| true);
+        let mut component = vec![usize::MAX; self.node_count()];
+        for &root in order.iter().rev() {
+            let mut stack = vec![root];
+            while let Some(node) = stack.pop() {
+                if component[node.index()] == usize::MAX {
+                    component[node.index()] = root.index();
+                    stack.extend(self.entering(node).map(|id| self.constraint(id).from));
+                }
+            }
+        }
+        component
+    }
+
     /// Takes back the last constraints and nodes, until so many are left.
     ///
     /// No constraint that stays may mention a node that goes.

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan};
+use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
+use elbowroom_stn::Network;
 
 use super::duration_of;
 
@@ -37,11 +38,13 @@ impl Progress {
             left: plan.instances.len(),
         };
         let mut before = vec![BTreeSet::new(); count];
+        let together = falling_together(count, constraints);
         let mut order = |earlier: NodeId, later: NodeId, least: &Rational| {
             let is_end = matches!(plan.nodes[earlier.index()], Node::End(_));
             let is_timed = matches!(plan.nodes[earlier.index()], Node::Timed(_));
-            // A start that may fall together with another one does not wait for it.
-            let waits = least.is_positive() || (least.is_zero() && is_end);
+            // Starts that have to fall together do not wait for each other.
+            let follows = is_end || together[earlier.index()] != together[later.index()];
+            let waits = least.is_positive() || (least.is_zero() && follows);
             if waits && !is_timed && earlier != NodeId::ZERO {
                 before[later.index()].insert(earlier);
             }
@@ -91,6 +94,27 @@ impl Progress {
             }
         }
     }
+}
+
+/// For each node, a number that it shares with those that have to happen at the same time.
+fn falling_together(count: usize, constraints: &[Constraint]) -> Vec<usize> {
+    let mut network = Network::with_nodes(count);
+    let node = |id: NodeId| network_node(id);
+    let zero = Bound::Finite(Rational::ZERO);
+    for constraint in constraints {
+        let (from, to) = (node(constraint.from), node(constraint.to));
+        if constraint.lower == zero {
+            network.add(elbowroom_stn::Constraint::at_least(
+                from,
+                to,
+                Rational::ZERO,
+            ));
+        }
+        if constraint.upper == zero {
+            network.add(elbowroom_stn::Constraint::at_most(from, to, Rational::ZERO));
+        }
+    }
+    network.components()
 }
 
 /// What a start waits for: what comes before it, and the ends that come before ends among these.

@@ -1,14 +1,14 @@
 //! `guarded`: paper 1's executor DREEX.
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{Constraint, DecoupledEnvelope};
+use elbowroom_plan::{Constraint, DecoupledEnvelope, Valuation};
 
-use super::Registered;
+use super::{Registered, promise};
 use crate::dispatch::{Dispatch, replan};
-use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
-use crate::quantities::{Reading, amounts};
-use crate::reason::{Cause, Reason};
+use crate::quantities::{Reading, amounts, duration_parameters};
+use crate::reason::{Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "guarded",
@@ -33,6 +33,10 @@ struct Guard {
     dispatch: Dispatch,
     mission: Mission,
     envelope: DecoupledEnvelope,
+    /// What dispatching keeps: less than the envelope, if that takes knowing values in advance.
+    promise: Promise,
+    /// What was observed, and for the rest what is planned.
+    values: Valuation,
 }
 
 impl Executor for Guarded {
@@ -42,8 +46,14 @@ impl Executor for Guarded {
             return Err(Box::new(Reason::new(Cause::GuaranteeLost).about(about)));
         };
         let reading = |constraint: &Constraint| mission.plan.reading(constraint, &envelope);
+        let (dispatch, promise) = match Dispatch::controlled(mission, &reading) {
+            Ok(dispatch) => (dispatch, Promise::Envelope),
+            Err(_) => promise::begin(mission)?,
+        };
         self.state = Some(Guard {
-            dispatch: Dispatch::controlled(mission, &reading)?,
+            dispatch,
+            promise,
+            values: mission.plan.nominal(),
             mission: mission.clone(),
             envelope,
         });
@@ -54,7 +64,16 @@ impl Executor for Guarded {
         let Some(guard) = &mut self.state else {
             return super::without_plan();
         };
-        if let Some(reason) = guard.dispatch.take(moment) {
+        let trouble = guard.dispatch.take(moment);
+        if let Some(reason) = trouble
+            && let Some(reason) = guard.outlast(moment.now, *reason)
+        {
+            return replan(*reason);
+        }
+        if guard.promise != Promise::Envelope
+            && let Some(reason) = guard.dispatch.overdue(moment)
+            && let Some(reason) = guard.outlast(moment.now, reason)
+        {
             return replan(*reason);
         }
         let amounts = amounts(&guard.mission.plan, moment);
@@ -70,7 +89,12 @@ impl Executor for Guarded {
                 return replan(reason);
             }
         }
-        guard.dispatch.next(moment)
+        let mut decided = guard.dispatch.next(moment);
+        decided.reason.promise = match decided.decision {
+            Decision::Start(_) | Decision::Wait { .. } => Some(guard.promise),
+            _ => None,
+        };
+        decided
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
@@ -79,6 +103,31 @@ impl Executor for Guarded {
 }
 
 impl Guard {
+    /// Why the plan is to be given up, if something happened at another time than dispatching
+    /// reckoned with. Where it never reckoned with all of the envelope, and the quantity is still
+    /// inside, it may go on with the rest.
+    fn outlast(&mut self, now: &Rational, reason: Reason) -> Option<Box<Reason>> {
+        for (parameter, instance) in duration_parameters(&self.mission.plan) {
+            let [start, end] = self.dispatch.nodes_of(instance);
+            let happened = |node| self.dispatch.happened(node);
+            if let (Some(start), Some(end)) = (happened(start), happened(end)) {
+                self.values[parameter.index()] = end - start;
+            }
+        }
+        let stays_inside = self.envelope.contains(&self.values);
+        if self.promise == Promise::Envelope || !stays_inside || !promise::is_about_time(&reason) {
+            return Some(Box::new(reason));
+        }
+        let (mission, values) = (&self.mission, &self.values);
+        match promise::weaken(&mut self.dispatch, mission, values, now, reason) {
+            Ok(promise) => {
+                self.promise = promise.max(Promise::PartOfEnvelope);
+                None
+            }
+            Err(reason) => Some(reason),
+        }
+    }
+
     /// Why an amount that was measured is not guaranteed to do.
     fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
         let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {

@@ -1,7 +1,6 @@
 //! `live`: the envelope after each observation, with what was observed fixed.
 
 mod limits;
-mod promise;
 
 use std::collections::BTreeMap;
 
@@ -11,7 +10,7 @@ use elbowroom_plan::{
     Bound, Constraint, InstanceId, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
 };
 
-use super::Registered;
+use super::{Registered, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
 use crate::event::Measured;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planned, StepId};
@@ -124,6 +123,14 @@ impl Executor for Live {
 }
 
 impl Rest {
+    /// Something was not as promised: makes the most of what is left.
+    fn weaken(&mut self, now: &Rational, reason: Reason) -> Result<(), Box<Reason>> {
+        let (mission, values) = (&self.mission, &self.values);
+        let weaker = promise::weaken(&mut self.dispatch, mission, values, now, reason)?;
+        self.promise = self.promise.max(weaker);
+        Ok(())
+    }
+
     /// Takes note of what is new, and asks whether the rest is still guaranteed.
     fn learn(&mut self, moment: &Moment<'_>, region: &mut dyn Region) -> Option<Box<Reason>> {
         let trouble = self.dispatch.take(moment);

@@ -155,20 +155,7 @@ impl<W: Weight> Dispatchable<W> {
                 zero.add(Constraint::at_least(link.activation, link.end, W::zero()));
             }
         }
-        // Kosaraju's algorithm: the last one left first, and against the edges.
-        let order = zero.depth_first_postorder(|_| true);
-        let mut component = vec![usize::MAX; zero.node_count()];
-        for &root in order.iter().rev() {
-            let mut stack = vec![root];
-            while let Some(node) = stack.pop() {
-                if component[node.index()] != usize::MAX {
-                    continue;
-                }
-                component[node.index()] = root.index();
-                stack.extend(zero.entering(node).map(|id| zero.constraint(id).from));
-            }
-        }
-        component
+        zero.components()
     }
 
     /// The network that it is the form of.

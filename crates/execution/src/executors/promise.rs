@@ -4,7 +4,6 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
 
-use super::Rest;
 use crate::dispatch::Dispatch;
 use crate::executor::{Mission, StepId};
 use crate::reason::{Cause, Promise, Reason};
@@ -31,16 +30,14 @@ pub(super) fn begin(mission: &Mission) -> Result<(Dispatch, Promise), Box<Reason
     let values = mission.plan.nominal();
     let runs = |instance: InstanceId| mission.running.contains_key(&StepId::from(instance));
     let mut attempt = |share: &Rational, overrun: Overrun| {
-        let reading = |constraint: &Constraint| {
-            let room = Room {
-                mission,
-                values: &values,
-                share,
-                overrun,
-                elapsed: &|instance| runs(instance).then_some(Rational::ZERO),
-            };
-            room.reading(constraint)
+        let room = Room {
+            mission,
+            values: &values,
+            share,
+            overrun,
+            elapsed: &|instance| runs(instance).then_some(Rational::ZERO),
         };
+        let reading = |constraint: &Constraint| room.reading(constraint);
         Dispatch::controlled(mission, &reading)
     };
     // Without an envelope nothing is known of numbers but what the plan says.
@@ -57,55 +54,53 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
     )
 }
 
-impl Rest {
-    /// Something was not as promised: makes the most of what is left.
-    ///
-    /// # Errors
-    /// When the rest does not work even if nothing deviates any more.
-    pub(super) fn weaken(&mut self, now: &Rational, reason: Reason) -> Result<(), Box<Reason>> {
-        let local = self.dispatch.local(now);
-        let Self {
-            dispatch,
+/// Something was not as promised: makes the most of what is left. `values` are what was observed,
+/// and for the rest what is planned.
+///
+/// # Errors
+/// When the rest does not work even if nothing deviates any more.
+pub(super) fn weaken(
+    dispatch: &mut Dispatch,
+    mission: &Mission,
+    values: &[Rational],
+    now: &Rational,
+    reason: Reason,
+) -> Result<Promise, Box<Reason>> {
+    let local = dispatch.local(now);
+    let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
+        .map(|index| {
+            let [start, end] = dispatch.nodes_of(InstanceId::from(index));
+            let begun = dispatch.happened(start)?;
+            dispatch.happened(end).is_none().then(|| &local - begun)
+        })
+        .collect();
+    let mut behind = Vec::new();
+    let mut attempt = |share: &Rational, overrun: Overrun| {
+        let room = Room {
             mission,
             values,
-            ..
-        } = self;
-        let mut behind = Vec::new();
-        let elapsed: Vec<Option<Rational>> = (0..dispatch.plan().instances.len())
-            .map(|index| {
-                let [start, end] = dispatch.nodes_of(InstanceId::from(index));
-                let begun = dispatch.happened(start)?;
-                dispatch.happened(end).is_none().then(|| &local - begun)
-            })
-            .collect();
-        let mut attempt = |share: &Rational, overrun: Overrun| {
-            let reading = |constraint: &Constraint| {
-                let room = Room {
-                    mission,
-                    values,
-                    share,
-                    overrun,
-                    elapsed: &|instance| elapsed[instance.index()].clone(),
-                };
-                room.reading(constraint)
-            };
-            dispatch
-                .rebound(&local, &reading)
-                .map_err(|words| behind = words)
+            share,
+            overrun,
+            elapsed: &|instance| elapsed[instance.index()].clone(),
         };
-        if let Ok(((), promise)) = most(self.reads_numbers, !self.reads_numbers, &mut attempt) {
-            self.promise = promise.max(self.promise);
-            return Ok(());
-        }
-        let mut lost = Reason {
-            cause: Cause::GuaranteeLost,
-            ..reason
-        };
-        let about = "even if nothing deviates any more, too little time is left";
-        lost.about = Some(about.to_owned());
-        lost.behind = behind;
-        Err(Box::new(lost.since(now.clone())))
+        let reading = |constraint: &Constraint| room.reading(constraint);
+        dispatch
+            .rebound(&local, &reading)
+            .map_err(|words| behind = words)
+    };
+    // What numbers bear is known only where nothing has left the envelope.
+    let reads_numbers = mission.plan.reads_numbers(&mission.task);
+    if let Ok(((), promise)) = most(reads_numbers, !reads_numbers, &mut attempt) {
+        return Ok(promise);
     }
+    let mut lost = Reason {
+        cause: Cause::GuaranteeLost,
+        ..reason
+    };
+    let about = "even if nothing deviates any more, too little time is left";
+    lost.about = Some(about.to_owned());
+    lost.behind = behind;
+    Err(Box::new(lost.since(now.clone())))
 }
 
 /// The first attempt to succeed, with what it promises. What numbers bear is known of all of the
