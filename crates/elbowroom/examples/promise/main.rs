@@ -22,9 +22,10 @@
     reason = "that is what the example does"
 )]
 
+mod boxes;
+mod grow;
 mod nominal;
 mod options;
-mod own;
 mod planning;
 mod runs;
 mod sources;
@@ -33,11 +34,12 @@ mod tally;
 mod trial;
 mod worlds;
 
+use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use options::Options;
-use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
 use sources::{Origin, Source};
 use subject::Subject;
 
@@ -52,6 +54,8 @@ fn main() -> ExitCode {
             "plan" => plan(&options),
             "nominal" => nominal::main(&options),
             "runs" => runs::main(&options),
+            "grow" => grow::main(&options),
+            "boxes" => boxes::main(&options),
             _ => Err("the first word says what to do; the source says what there is".to_owned()),
         })
     });
@@ -73,6 +77,45 @@ fn wanted(options: &Options) -> Vec<Source> {
         only.is_empty() || only.iter().any(|text| name.contains(text.as_str()))
     });
     sources
+}
+
+/// What there is to say of each plan, by family; and why others do not count, and how many.
+fn counted<T: Send>(
+    options: &Options,
+    say: &(dyn Fn(&Source) -> Result<(String, T), String> + Sync),
+) -> (BTreeMap<String, Vec<T>>, BTreeMap<String, usize>) {
+    let sources = wanted(options);
+    let done = AtomicUsize::new(0);
+    let said: Vec<_> = sources
+        .par_iter()
+        .with_max_len(1)
+        .map(|source| {
+            let said = say(source);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if done.is_multiple_of(20) {
+                eprintln!("{done}/{}", sources.len());
+            }
+            said
+        })
+        .collect();
+    let mut families: BTreeMap<String, Vec<T>> = BTreeMap::new();
+    let mut skipped = BTreeMap::new();
+    for said in said {
+        match said {
+            Ok((family, said)) => families.entry(family).or_default().push(said),
+            Err(why) => *skipped.entry(why).or_default() += 1,
+        }
+    }
+    (families, skipped)
+}
+
+/// A table of plans that do not count.
+fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
+    let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
+    for (why, count) in skipped {
+        text.push_str(&format!("| {why} | {count} |\n"));
+    }
+    text
 }
 
 /// Makes plans, and keeps them.

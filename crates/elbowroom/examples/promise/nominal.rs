@@ -1,15 +1,12 @@
 //! Every plan where nothing deviates: no executor may fail.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
-
-use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 use super::options::Options;
 use super::sources::Source;
 use super::subject::Subject;
 use super::trial::{Ready, Search};
-use super::wanted;
+use super::{counted, not_counted};
 
 /// Those that keep the promise, and two for comparison.
 const EXECUTORS: [&str; 5] = ["guarded", "live", "stn", "fixed:60", "esterel"];
@@ -19,7 +16,6 @@ const KEEP: usize = 3;
 
 /// What came of one plan.
 struct Row {
-    family: String,
     /// Whether each executor failed.
     failed: [bool; EXECUTORS.len()],
     /// Whether one failed whose lines stood in another order.
@@ -27,30 +23,20 @@ struct Row {
 }
 
 pub(crate) fn main(options: &Options) -> Result<(), String> {
-    let sources = wanted(options);
-    let rows: Vec<Result<Row, String>> = sources
-        .par_iter()
-        .map(|source| row(source, options))
-        .collect();
-    let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
-    let mut families: BTreeMap<String, Vec<Row>> = BTreeMap::new();
-    for row in rows {
-        match row {
-            Ok(row) => families.entry(row.family.clone()).or_default().push(row),
-            Err(why) => *skipped.entry(why).or_default() += 1,
-        }
-    }
-    println!("| family | plans | {} | lines in another order |", EXECUTORS.join(" | "));
+    let (families, skipped) = counted(options, &|source| {
+        row(source, options).map(|row| (source.family.clone(), row))
+    });
+    println!(
+        "| family | plans | {} | lines in another order |",
+        EXECUTORS.join(" | ")
+    );
     println!("|---|--:|{}--:|", "--:|".repeat(EXECUTORS.len()));
     for (family, rows) in &families {
         println!("| {family} {}", line(&rows.iter().collect::<Vec<_>>()));
     }
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    println!("\n| not counted | plans |\n|---|--:|");
-    for (why, count) in skipped {
-        println!("| {why} | {count} |");
-    }
+    print!("{}", not_counted(&skipped));
     Ok(())
 }
 
@@ -64,7 +50,10 @@ fn line(rows: &[&Row]) -> String {
     format!("{line} {missed} |")
 }
 
-#[allow(clippy::disallowed_methods, reason = "boxes are widened for a limited time")]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "boxes are widened for a limited time"
+)]
 fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let label = format!("{} {}", subject.family, subject.name);
@@ -112,7 +101,6 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
         is_order_missed = !failures.is_empty();
     }
     Ok(Row {
-        family: subject.family.clone(),
         failed,
         is_order_missed,
     })

@@ -1,40 +1,25 @@
 //! Every plan in worlds in which every duration is somewhere in its interval of the dynamic box:
 //! no failure, no new plan, and the judge accepts what was done.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use super::options::Options;
 use super::sources::Source;
 use super::subject::Subject;
 use super::tally::{Tally, run};
 use super::trial::{Ready, Search};
-use super::wanted;
+
 use super::worlds::{Kind, Worlds};
+use super::{counted, not_counted, wanted};
 
 #[allow(clippy::disallowed_methods, reason = "runs are timed")]
 pub(crate) fn main(options: &Options) -> Result<(), String> {
-    let sources = wanted(options);
     let begin = Instant::now();
     let total = AtomicU64::new(0);
-    let most = 4 * options.runs.div_ceil(sources.len().max(1) as u64);
-    let tallies: Vec<Result<(String, Tally), String>> = sources
-        .par_iter()
-        .with_max_len(1)
-        .map(|source| tally(source, options, &total, most))
-        .collect();
-    let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
-    let mut families: BTreeMap<String, Vec<Tally>> = BTreeMap::new();
-    for tally in tallies {
-        match tally {
-            Ok((family, tally)) => families.entry(family).or_default().push(tally),
-            Err(why) => *skipped.entry(why).or_default() += 1,
-        }
-    }
+    let most = 4 * options.runs.div_ceil(wanted(options).len().max(1) as u64);
+    let (families, skipped) = counted(options, &|source| tally(source, options, &total, most));
     let kinds = Kind::ALL.map(Kind::name).join(" | ");
     println!("| family | plans | {kinds} | failures |\n|---|--:|--:|--:|--:|--:|");
     for (family, tallies) in &families {
@@ -42,10 +27,7 @@ pub(crate) fn main(options: &Options) -> Result<(), String> {
     }
     let all: Vec<&Tally> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
-    println!("\n| not counted | plans |\n|---|--:|");
-    for (why, count) in skipped {
-        println!("| {why} | {count} |");
-    }
+    print!("{}", not_counted(&skipped));
     let seconds = begin.elapsed().as_secs();
     let runs: u64 = all.iter().map(|tally| tally.runs()).sum();
     println!("\n{runs} runs, {seconds} s.");
@@ -69,7 +51,10 @@ fn line(tallies: &[&Tally]) -> String {
     line
 }
 
-#[allow(clippy::disallowed_methods, reason = "boxes and runs have a limited time")]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "boxes and runs have a limited time"
+)]
 fn tally(
     source: &Source,
     options: &Options,

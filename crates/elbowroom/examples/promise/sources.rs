@@ -77,7 +77,16 @@ fn problems(data: &Path) -> Vec<Source> {
     }
     let folder = data.join("pddl");
     for row in table(&folder.join("manifest.csv")) {
-        let [collection, domain, instance, domain_file, problem_file, _, durative, ..] = &row[..]
+        let [
+            collection,
+            domain,
+            instance,
+            domain_file,
+            problem_file,
+            _,
+            durative,
+            ..,
+        ] = &row[..]
         else {
             continue;
         };

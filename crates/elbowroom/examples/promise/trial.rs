@@ -3,10 +3,12 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom::envelope::{Guarantee, Oracle, irr};
+use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, WholeRegion};
 use elbowroom::execution::executors::{ExecutorSpec, Means};
-use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
+use elbowroom::execution::run::{
+    self, Patience, PlanningTime, Ports, Report, RunSettings, Verdict,
+};
 use elbowroom::execution::{Need, NoPlanner, NoRecord, Prepared, Preparer, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
@@ -49,6 +51,8 @@ pub(crate) struct Search<'a> {
 pub(crate) struct Boxed {
     pub(crate) envelope: DecoupledEnvelope,
     pub(crate) checks: usize,
+    /// Whether the search came to its end.
+    pub(crate) is_finished: bool,
 }
 
 impl<'a> Ready<'a> {
@@ -114,7 +118,13 @@ impl<'a> Ready<'a> {
         let spec: ExecutorSpec = executor.parse().expect("an executor that there is");
         let region = Box::new(WholeRegion { epsilon: epsilon() });
         let mut decider = spec.build(Means::from(region));
+        // What may go on without end is waited for.
+        let patience = Patience {
+            at_least: Rational::from(1_000_000_000_000_i64),
+            ..Patience::default()
+        };
         let settings = RunSettings {
+            patience,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             time_limit: Rational::from(1_000_000_000_000_i64),
             ..RunSettings::default()
@@ -214,9 +224,9 @@ pub(crate) fn boxed(
     let run = run.map_err(beyond)?;
     let envelope = run.envelope;
     Ok(Boxed {
-        envelope: envelope.map_err(|objection| {
-            format!("not guaranteed even as planned ({objection})")
-        })?,
+        is_finished: run.stop == StopReason::Converged,
+        envelope: envelope
+            .map_err(|objection| format!("not guaranteed even as planned ({objection})"))?,
         checks: run.checks,
     })
 }

@@ -7,13 +7,14 @@ use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
 use elbowroom_plan::{InstanceId, Node, NodeId, Schedule, StnPlan, network_node};
 use elbowroom_sim::{Begun, Pace};
-use elbowroom_stn::uncertain::Spoiler;
+use elbowroom_stn::uncertain::{Spoiler, UncertainNetwork};
 
 /// A [`Spoiler`] behind the port of [`sim`](crate::sim): sees what is started, and says when it
 /// ends.
 ///
 /// Durations that the box does not leave open, and actions that are not in the plan, last as long
-/// as planned.
+/// as planned. What the box lets go on without end comes to an end all the same, but late: patience
+/// with silent actions ([`Patience`](elbowroom_execution::run::Patience)) can end before.
 #[derive(Clone, Debug)]
 pub struct Spoiling {
     spoiler: Spoiler,
@@ -50,10 +51,8 @@ impl Spoiling {
         let mut happened = vec![None; plan.nodes.len()];
         happened[NodeId::ZERO.index()] = Some(Rational::ZERO);
         Self {
-            spoiler: Spoiler::new(network.network.clone(), network_node(NodeId::ZERO)),
-            timed: timed
-                .map(|(node, _)| (node, time(node).clone()))
-                .collect(),
+            spoiler: Spoiler::new(in_the_end(&network.network), network_node(NodeId::ZERO)),
+            timed: timed.map(|(node, _)| (node, time(node).clone())).collect(),
             plan: plan.clone(),
             instances,
             happened,
@@ -70,6 +69,25 @@ impl Spoiling {
     fn end_of(&self, instance: InstanceId) -> NodeId {
         self.plan.end(instance)
     }
+}
+
+/// The same network, in which everything ends at some time: what the world may draw out without
+/// end lasts at most longer than all other bounds together. No conflict needs more.
+fn in_the_end(network: &UncertainNetwork) -> UncertainNetwork {
+    let mut longest = Rational::ONE;
+    for constraint in network.requirements().constraints() {
+        longest = &longest + &constraint.bound.abs();
+    }
+    for link in network.links() {
+        longest = &longest + &link.lower;
+        longest = link.upper.iter().fold(longest, |sum, upper| &sum + upper);
+    }
+    let mut links = network.links().to_vec();
+    for link in &mut links {
+        link.upper.get_or_insert_with(|| longest.clone());
+    }
+    UncertainNetwork::new(network.requirements().clone(), links)
+        .expect("the links are those of a network, and none has become empty")
 }
 
 impl Pace for Spoiling {
@@ -128,6 +146,10 @@ impl Pace for Spoiling {
         let timed = self.timed.iter().map(|(_, time)| time.clone());
         let ends = self.ends.values().cloned();
         let look = self.spoiler.next_look(now, &self.happened);
-        timed.chain(ends).chain(look).filter(|time| time > now).min()
+        timed
+            .chain(ends)
+            .chain(look)
+            .filter(|time| time > now)
+            .min()
     }
 }
