@@ -1,9 +1,13 @@
 //! What can be said on the command line.
 
+mod network;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use elbowroom::num::Rational;
+
+pub(crate) use network::{DurationsChoice, NetworkArgs};
 
 /// How much elbow room does a temporal plan have?
 #[derive(Debug, Parser)]
@@ -41,6 +45,8 @@ pub(crate) enum Command {
     Run(Box<RunArgs>),
     /// Compare executors in many runs of an experiment
     Compare(CompareArgs),
+    /// Say what can be promised about a temporal network in a format of the field
+    Network(NetworkArgs),
 }
 
 /// The problem that every command is about.
@@ -175,6 +181,14 @@ pub(crate) struct EnvelopeArgs {
     /// What is guaranteed inside the envelope
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
+    /// Have the dispatcher keep to every obligation that is a bound on the difference of two times,
+    /// so that schedules which break one do not count
+    #[arg(long)]
+    pub(crate) enforce: bool,
+    /// Actions whose durations the executor chooses, so that they are not left open: a name, a
+    /// label or `(name argument …)`, `_` for any argument; may be repeated
+    #[arg(long, value_name = "ACTION")]
+    pub(crate) controllable: Vec<String>,
     /// How far apart interfering happenings must be
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     pub(crate) epsilon: Rational,
@@ -226,6 +240,10 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "S", default_value = "3600", value_parser = positive)]
     #[arg(requires = "world_process")]
     pub(crate) answer_within: Rational,
+    /// End the run when that program says something that cannot be understood, or names what the
+    /// problem does not have; otherwise the trace has it, and the run goes on
+    #[arg(long, requires = "world_process")]
+    pub(crate) strict_world: bool,
     /// Who decides
     #[arg(long, value_name = "NAME", default_value = "guarded")]
     pub(crate) executor: String,
@@ -248,7 +266,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "B", default_value = "1", value_parser = positive)]
     pub(crate) precision: Rational,
     /// What becomes of running actions when a new plan is made
-    #[arg(long, value_enum, default_value_t = RunningChoice::Cancel)]
+    #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
     /// How long making a plan takes in the world: `measured`, or always so many seconds; by default
     /// 0, and with --realtime `measured`
@@ -291,6 +309,7 @@ const IN_THE_TRACE: &[&str] = &[
     "world",
     "world_process",
     "answer_within",
+    "strict_world",
     "executor",
     "likelihoods",
     "seed",

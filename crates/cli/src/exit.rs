@@ -16,6 +16,8 @@ pub(crate) enum Exit {
     Limit = 3,
     /// A mistake in this program.
     Bug = 70,
+    /// Somebody asked the run to end before it was over.
+    Interrupted = 130,
 }
 
 impl From<Exit> for ExitCode {

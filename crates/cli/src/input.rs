@@ -7,11 +7,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use elbowroom::PlanKind;
-use elbowroom::flow::Freed;
-use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
+use elbowroom::model::validate::Violation;
+use elbowroom::model::{Problem, Task};
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
-use elbowroom::plan::ParametrizedPlan;
 use elbowroom::plan::format::{self, FormatErrors};
+
+pub(crate) use elbowroom::AnyPlan;
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
@@ -36,12 +37,6 @@ pub(crate) fn task_with_sources(
     Ok((Task::new(Arc::new(read)), domain, problem))
 }
 
-/// A plan of either kind, as it stands in a file.
-pub(crate) enum AnyPlan {
-    TimeTriggered(TimeTriggeredPlan),
-    Stn(ParametrizedPlan),
-}
-
 /// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
 pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure> {
     let text = source(path, "plan")?;
@@ -57,17 +52,15 @@ pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure>
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
-/// Says on standard error if not the plan's own times are taken, but valid ones close to them.
-pub(crate) fn tell_repair(path: &Path, freed: &Freed) {
-    if let Some(violation) = &freed.repaired {
-        output::tell(&format!(
-            "{}: {} is not valid as it stands, perhaps because its times are rounded\n  \
-             {violation}\n  {}: times close to these, which are valid, are taken instead",
-            styled(HINT, "warning"),
-            path.display(),
-            styled(HINT, "note"),
-        ));
-    }
+/// Says on standard error that not the plan's own times are taken, but valid ones close to them.
+pub(crate) fn tell_repair(path: &Path, violation: &Violation) {
+    output::tell(&format!(
+        "{}: {} is not valid as it stands, perhaps because its times are rounded\n  \
+         {violation}\n  {}: times close to these, which are valid, are taken instead",
+        styled(HINT, "warning"),
+        path.display(),
+        styled(HINT, "note"),
+    ));
 }
 
 /// The mistakes in an STN plan file, with excerpts.

@@ -1,7 +1,9 @@
-//! Ctrl-C, or a request to terminate, ends a search with the best result so far.
+//! Ctrl-C, or a request to terminate, ends a search with the best result so far, and a run in order.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::exit::Exit;
 
 /// Whether the user has asked to stop.
 #[derive(Clone, Debug, Default)]
@@ -15,7 +17,7 @@ impl Interrupt {
         // Where no handler can be installed, Ctrl-C ends the program, as it does anyway.
         let _ = ctrlc::set_handler(move || {
             if flag.0.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
+                std::process::exit(Exit::Interrupted as i32);
             }
         });
         interrupt

@@ -6,41 +6,23 @@
 //!     upper end of d0, d2, d3
 //! ```
 
+use elbowroom::answers::envelope::LimitGroup;
 use unicode_width::UnicodeWidthStr;
 
 use crate::look::{FAINT, Look, STRONG, styled};
 
-/// One end of one parameter's interval, and what keeps it from moving.
-#[derive(Clone, Debug)]
-pub(crate) struct Limit {
-    /// The parameter's name.
-    pub(crate) parameter: String,
-    /// Whether it is the upper end.
-    pub(crate) is_upper: bool,
-    /// Why it cannot move further out.
-    pub(crate) reason: String,
-}
-
-/// The limits by reason, in the order in which the reasons first occur; empty without limits.
-pub(crate) fn render(limits: &[Limit], look: Look) -> String {
+/// The limits, one reason after the other; empty without limits.
+pub(crate) fn render(limits: &[LimitGroup], look: Look) -> String {
     if limits.is_empty() {
         return String::new();
     }
-    let mut reasons: Vec<&str> = Vec::new();
-    for limit in limits {
-        if !reasons.contains(&limit.reason.as_str()) {
-            reasons.push(&limit.reason);
-        }
-    }
     let mut text = format!("{}\n", styled(STRONG, "What limits the ends"));
-    for reason in reasons {
-        push_wrapped(&mut text, reason, 2, look.width);
-        for (is_upper, label) in [(false, "lower end of"), (true, "upper end of")] {
-            let names: Vec<&str> = limits
-                .iter()
-                .filter(|limit| limit.reason == reason && limit.is_upper == is_upper)
-                .map(|limit| limit.parameter.as_str())
-                .collect();
+    for limit in limits {
+        push_wrapped(&mut text, &limit.reason, 2, look.width);
+        for (names, label) in [
+            (&limit.lower, "lower end of"),
+            (&limit.upper, "upper end of"),
+        ] {
             if !names.is_empty() {
                 let mut line = String::new();
                 push_wrapped(
@@ -93,23 +75,21 @@ fn push_lines(text: &mut String, words: &str, [indent, hanging]: [usize; 2], wid
 mod tests {
     use insta::assert_snapshot;
 
-    use super::{Limit, render};
+    use super::{LimitGroup, render};
     use crate::look::Look;
 
     #[test]
     fn ends_with_the_same_reason_stand_together() {
-        let limit = |parameter: &str, is_upper, reason: &str| Limit {
-            parameter: parameter.to_owned(),
-            is_upper,
+        let limit = |reason: &str, lower: &[&str], upper: &[&str]| LimitGroup {
             reason: reason.to_owned(),
+            lower: lower.iter().map(ToString::to_string).collect(),
+            upper: upper.iter().map(ToString::to_string).collect(),
         };
         let deadline = "deadline of (counter-open office) at 40: end of (drop rover parcel office) \
                         must come 0.001 before it";
         let limits = [
-            limit("d0", false, "a duration is at least 0"),
-            limit("d0", true, deadline),
-            limit("d1", false, "a duration is at least 0"),
-            limit("d1", true, deadline),
+            limit("a duration is at least 0", &["d0", "d1"], &[]),
+            limit(deadline, &[], &["d0", "d1"]),
         ];
         let text = anstream::adapter::strip_str(&render(&limits, Look::PLAIN)).to_string();
         assert_snapshot!(text, @r"

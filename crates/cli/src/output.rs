@@ -3,6 +3,7 @@
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::exit::Failure;
@@ -23,10 +24,23 @@ pub(crate) fn print_json(document: &Value) -> Result<(), Failure> {
     print(&format!("{document:#}\n"))
 }
 
+/// Writes an answer to standard output, as one JSON document.
+pub(crate) fn print_document(answer: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(answer)
+        .map_err(|error| Failure::new(format!("cannot write the answer as JSON: {error}"), ""))?;
+    print(&format!("{text}\n"))
+}
+
 /// Writes text to standard error. There is nobody to tell when that fails.
 pub(crate) fn tell(text: &str) {
     let mut stderr = anstream::stderr().lock();
     let _ = writeln!(stderr, "{text}");
+}
+
+/// Writes a warning to standard error.
+pub(crate) fn warn(text: &str) {
+    let label = crate::look::styled(crate::look::WARNING, "warning");
+    tell(&format!("{label}: {text}"));
 }
 
 /// Writes a file; `-` is standard output.

@@ -136,7 +136,7 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
             "30",
             "signal: 9",
         ),
-        ("rude", answering("hello"), "30", "it said `hello`"),
+        ("rude", answering("hello"), "1", "it said `hello`"),
     ];
     for (name, script, seconds, message) in cases {
         let output = in_shell(name, &script, seconds);
@@ -148,7 +148,7 @@ fn every_way_to_be_no_world_ends_the_run_and_is_named() {
 }
 
 /// A world like `examples/world.py`, but for what it says first in its first answer.
-fn example_that_says(name: &str, first: &str) -> Option<(Output, String)> {
+fn example_that_says(name: &str, first: &str, options: &[&str]) -> Option<(Output, String)> {
     if Command::new("python3").arg("--version").output().is_err() {
         return None;
     }
@@ -157,12 +157,14 @@ fn example_that_says(name: &str, first: &str) -> Option<(Output, String)> {
     assert!(example.contains(begins), "{example}");
     // JSON's way to write a text is also Python's.
     let first = serde_json::to_string(first).expect("a text");
-    let first = format!("now, ends, news = 0.0, {{}}, [json.loads({first})]");
+    let said = format!("print({first}, flush=True)\n");
+    let says = example.find("for message in").expect("the loop");
+    let example = format!("{}{said}{}", &example[..says], &example[says..]);
     let (file, trace) = (temporary(name), temporary(&format!("{name}.jsonl")));
-    fs::write(&file, example.replace(begins, &first)).expect("written");
+    fs::write(&file, example).expect("written");
     let command = format!("python3 {file}");
     let run = ["run", DELIVERY[0], DELIVERY[1], "--world-process", &command];
-    let output = elbowroom(&[&run[..], &["--trace", &trace]].concat());
+    let output = elbowroom(&[&run[..], &["--trace", &trace], options].concat());
     fs::remove_file(file).expect("the script is there");
     Some((output, trace))
 }
@@ -175,7 +177,7 @@ fn every_fact_of_the_problem_may_be_reported() {
         ("now-true", "(LIES parcel depot)", "true"),
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
-        let Some((output, trace)) = example_that_says(name, &first) else {
+        let Some((output, trace)) = example_that_says(name, &first, &["--strict-world"]) else {
             eprintln!("skipped: there is no python3");
             return;
         };
@@ -189,18 +191,40 @@ fn every_fact_of_the_problem_may_be_reported() {
         assert!(replayed.status.success(), "{replayed:?}");
         fs::remove_file(trace).expect("the trace is there");
     }
-    for fact in [
-        "(lies parcel moon)",
-        "(lies depot parcel)",
-        "(lies parcel)",
-        "(flies rover)",
+}
+
+/// A robot's slip of the tongue is no reason to end its mission, unless somebody wants it so.
+#[test]
+fn what_cannot_be_understood_is_a_remark_in_the_trace() {
+    let fact = |fact: &str| format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
+    for first in [
+        fact("(lies parcel moon)"),
+        fact("(lies depot parcel)"),
+        fact("(lies parcel)"),
+        fact("(flies rover)"),
+        "hello".to_owned(),
+        "{\"type\":\"started\"".to_owned(),
+        r#"{"type":"value","fluent":"(height rover)","value":3,"time":0}"#.to_owned(),
+        r#"{"type":"dance","time":0}"#.to_owned(),
     ] {
-        let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":true,"time":0}}"#);
-        let Some((output, trace)) = example_that_says("no-fact", &first) else {
+        let Some((output, trace)) = example_that_says("slip", &first, &[]) else {
             eprintln!("skipped: there is no python3");
             return;
         };
-        assert_eq!(output.status.code(), Some(2), "{fact}: {output:?}");
+        assert!(output.status.success(), "{first}: {output:?}");
+        let entries = fs::read_to_string(&trace).expect("a trace");
+        assert!(entries.contains("\"unintelligible\""), "{first}: {entries}");
+        assert!(
+            entries.contains("cannot be understood; nothing was made of it"),
+            "{first}"
+        );
+        let replayed = elbowroom(&["run", "--replay", &trace]);
+        assert!(replayed.status.success(), "{replayed:?}");
+        fs::remove_file(trace).expect("the trace is there");
+
+        let strict = example_that_says("strict-slip", &first, &["--strict-world"]);
+        let (output, trace) = strict.expect("python3 is there");
+        assert_eq!(output.status.code(), Some(2), "{first}: {output:?}");
         fs::remove_file(trace).expect("the trace is there");
     }
 }
@@ -211,7 +235,7 @@ fn what_a_world_says_is_shown_tame_and_wrapped() {
     let why = format!(r"line\n\u001b[2J {}", "word ".repeat(60));
     let first =
         format!(r#"{{"type":"ended","ticket":0,"outcome":"failed","why":"{why}","time":0}}"#);
-    let Some((output, trace)) = example_that_says("rude", &first) else {
+    let Some((output, trace)) = example_that_says("rude", &first, &[]) else {
         eprintln!("skipped: there is no python3");
         return;
     };

@@ -48,7 +48,8 @@ impl Part {
     }
 }
 
-/// Makes the trials. `observe` is told how many are done, and says whether to go on.
+/// Makes the trials. `observe` is told how many are done, and says whether to go on. If not, what
+/// has been made until then is kept ([`Results::is_interrupted`]).
 ///
 /// # Errors
 /// When a problem cannot be read, has no plan to begin with, or a plan cannot be made ready.
@@ -92,8 +93,14 @@ pub fn run(
     });
     // In the order of the settings, whichever was ready first.
     let mut whole = Results::empty(experiment, part);
+    whole.is_interrupted = done.load(Ordering::Relaxed) < part.count(experiment) && !goes_on();
     for part in parts {
-        whole.add(&part?);
+        match part {
+            Ok(part) => whole.add(&part),
+            // A planner that was stopped has no plan.
+            Err(_) if whole.is_interrupted => {}
+            Err(error) => return Err(error),
+        }
     }
     Ok(whole)
 }

@@ -2,6 +2,7 @@
 
 mod conflict;
 mod control;
+mod spoiler;
 mod timed;
 
 use elbowroom_envelope::obligations::Requirement;
@@ -38,6 +39,9 @@ pub struct Explanation {
     pub schedule: Option<Schedule>,
     /// What the judge says about that schedule.
     pub verdict: Option<String>,
+    /// Where there is a schedule for all values, but none that can be found in time: how the world
+    /// beats an executor that starts everything early, and one that starts everything late.
+    pub plays: Vec<String>,
 }
 
 /// By how much something fails.
@@ -87,9 +91,10 @@ impl<'a> Explainer<'a> {
                     .or_else(|| oracle.counterexample(refused, broken));
                 self.broken(broken, example)
             }
-            Objection::Uncontrollable(conflict) => {
-                self.without_example(self.uncontrollable_in(conflict, refused))
-            }
+            Objection::Uncontrollable(conflict) => Explanation {
+                plays: self.spoiled(refused),
+                ..self.without_example(self.uncontrollable_in(conflict, refused))
+            },
             other => self.without_example(other.to_string()),
         }
     }
@@ -105,6 +110,7 @@ impl<'a> Explainer<'a> {
             valuation: valuation.to_vec(),
             schedule: None,
             verdict: None,
+            plays: Vec::new(),
         }
     }
 
@@ -113,6 +119,7 @@ impl<'a> Explainer<'a> {
         match limit {
             Limit::Unbounded => None,
             Limit::Range => Some(self.range(id, side)),
+            Limit::Undecided => Some("there are too many cases to tell apart".to_owned()),
             Limit::Objection { objection, .. } => Some(match objection {
                 Objection::NoSchedule(valuation) => self.no_schedule(valuation).reason,
                 Objection::Broken(broken) => self.requirement(&broken.requirement),
@@ -145,6 +152,7 @@ impl<'a> Explainer<'a> {
             verdict: self.verdict(&example),
             valuation: example.valuation,
             schedule: Some(example.schedule),
+            plays: Vec::new(),
         }
     }
 
@@ -155,6 +163,7 @@ impl<'a> Explainer<'a> {
             valuation: self.plan.nominal(),
             schedule: None,
             verdict: None,
+            plays: Vec::new(),
         }
     }
 

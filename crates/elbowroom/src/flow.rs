@@ -1,20 +1,21 @@
 //! From a plan with fixed times to the deviations it survives: the figure in ARCHITECTURE.md,
 //! left to right.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_envelope::linear::Factor;
-use elbowroom_envelope::obligations::{Refusal, Requirement};
-use elbowroom_envelope::soundness::{Broken, broken_in};
-use elbowroom_envelope::{Guarantee, IrrRun, Oracle, irr};
+use elbowroom_envelope::Guarantee;
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder, pin_until_sound};
+use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
-use elbowroom_plan::{DecoupledEnvelope, NodeId, ParametrizedPlan, StnPlan};
+use elbowroom_plan::{NodeId, ParametrizedPlan};
 use elbowroom_stn::ConsistentNetwork;
+
+use crate::answers::envelope::envelope;
+use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, Unwatched};
+use crate::room;
 
 /// What to leave open, and how to search.
 #[derive(Clone, Debug)]
@@ -30,7 +31,7 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// ε = 0.001, all durations, the weak guarantee, precision 1.
+    /// ε = 0.001, all durations, the dynamic guarantee, precision 1.
     fn default() -> Self {
         Self {
             epsilon: Rational::new(1, 1000),
@@ -39,15 +40,6 @@ impl Default for Settings {
             search: elbowroom_envelope::Settings::default(),
         }
     }
-}
-
-/// A plan with its envelope, and how it was found.
-#[derive(Clone, Debug)]
-pub struct RobustPlan {
-    /// The plan, with what is left open.
-    pub plan: Arc<ParametrizedPlan>,
-    /// The envelope.
-    pub run: IrrRun,
 }
 
 /// A plan that leaves no room to compute with.
@@ -69,21 +61,20 @@ pub enum FlowError {
 
 /// From a plan with fixed times to the deviations it survives.
 ///
+/// The same as [`answers::envelope::envelope`](crate::answers::envelope::envelope) with nobody
+/// watching.
+///
 /// # Errors
-/// When the plan is not valid, when `settings.vary` names what the plan does not have, and when
-/// the plan is beyond exact analysis.
+/// When `settings.vary` names what the plan does not have, and when the plan is beyond exact
+/// analysis. That the plan does not work is an answer.
 pub fn robust_plan(
     task: &Arc<Task>,
     time_triggered: &TimeTriggeredPlan,
     settings: &Settings,
-) -> Result<RobustPlan, FlowError> {
-    let stn_plan = free(task, time_triggered, &settings.epsilon)?;
-    let plan = Arc::new(open(task, stn_plan, &settings.vary, &settings.epsilon)?);
-    let mut oracle = Oracle::new(task, &plan, &settings.epsilon, settings.guarantee)?;
-    let run = irr(&mut oracle, &settings.search, &mut |_| {
-        ControlFlow::Continue(())
-    })?;
-    Ok(RobustPlan { plan, run })
+) -> Result<EnvelopeOutcome, RequestError> {
+    let plan = time_triggered.clone();
+    let request = EnvelopeRequest::new(task, plan).with_settings(settings);
+    envelope(&request, &mut Unwatched)
 }
 
 /// A plan with only the orderings and bounds that it needs.
@@ -111,21 +102,35 @@ pub fn free(
     let settings = deorder::Settings {
         epsilon: epsilon.clone(),
     };
-    let Verdict::Invalid(violation) = judge(task, time_triggered, epsilon) else {
+    let time_triggered = in_order(time_triggered);
+    let Verdict::Invalid(violation) = judge(task, &time_triggered, epsilon) else {
         return Ok(Freed {
-            deordered: deorder(task, time_triggered, &settings)?,
+            deordered: deorder(task, &time_triggered, &settings)?,
             repaired: None,
         });
     };
     let violation = Box::new(violation);
     let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal), epsilon).is_valid();
-    match deorder(task, time_triggered, &settings) {
+    match deorder(task, &time_triggered, &settings) {
         Ok(deordered) if works(&deordered) => Ok(Freed {
             deordered,
             repaired: Some(violation),
         }),
         _ => Err(FlowError::Invalid(violation)),
     }
+}
+
+/// The plan in order of start, by name where actions start together: in which order a file lists
+/// these says nothing, and must not matter.
+fn in_order(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+    let mut plan = plan.clone();
+    plan.steps.sort_by(|a, b| {
+        let by_name = || a.action.name.cmp(&b.action.name);
+        let by_duration = || a.duration.cmp(&b.duration);
+        let by_start = a.start.cmp(&b.start);
+        by_start.then_with(by_name).then_with(by_duration)
+    });
+    plan
 }
 
 /// A plan like the one given, with other times, if the judge rejects it but accepts those: what
@@ -141,8 +146,8 @@ pub fn repaired(
 }
 
 /// The plan with quantities left open; all durations, if nothing is specified. Where needed,
-/// differences of times are fixed so that every schedule works as long as these quantities keep
-/// their nominal values.
+/// differences of times are kept near the plan's own so that every schedule works as long as these
+/// quantities keep their nominal values.
 ///
 /// # Errors
 /// When `specs` names what the plan does not have.
@@ -154,15 +159,15 @@ pub fn open(
 ) -> Result<ParametrizedPlan, FlowError> {
     let Deordered { plan, nominal } = freed.deordered;
     let plan = parametrize(task, plan, &nominal, specs)?;
-    Ok(pinned(task, plan, &nominal, epsilon))
+    Ok(room::sound(task, plan, &nominal, epsilon))
 }
 
-/// The plan with nothing left open. Where needed, differences of times are fixed so that every
-/// schedule works.
+/// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
+/// so that every schedule works.
 pub fn closed(task: &Task, freed: Freed, epsilon: &Rational) -> ParametrizedPlan {
     let Deordered { plan, nominal } = freed.deordered;
     let plan = ParametrizedPlan::closed(task, plan);
-    pinned(task, plan, &nominal, epsilon)
+    room::sound(task, plan, &nominal, epsilon)
 }
 
 /// An STN plan, which may have parameters already, with more left open.
@@ -184,67 +189,6 @@ pub fn open_more(
     };
     let schedule = network.earliest_schedule(elbowroom_plan::network_node(NodeId::ZERO));
     vary(task, plan, schedule.times(), specs)
-}
-
-/// The plan with as few differences fixed as it takes for every nominal schedule to work. If even
-/// that does not help, the plan as it is: the box check will say what is wrong with it.
-fn pinned(
-    task: &Task,
-    plan: ParametrizedPlan,
-    nominal: &[Rational],
-    epsilon: &Rational,
-) -> ParametrizedPlan {
-    let given = plan.plan.constraints.len();
-    let with_pins = |fixed: &StnPlan| {
-        let mut candidate = plan.clone();
-        let pins = fixed.constraints[given..].iter().cloned();
-        candidate.plan.constraints.extend(pins);
-        candidate
-    };
-    let point = DecoupledEnvelope::point(&plan.nominal());
-    let mut is_refused = false;
-    let mut oracle = |fixed: &StnPlan| {
-        let candidate = with_pins(fixed);
-        let broken = broken_in(task, &candidate, epsilon, &point);
-        is_refused |= broken.is_err();
-        let broken = broken.ok().flatten()?;
-        Some(nodes_of(&broken, candidate.plan.nodes.len()))
-    };
-    let fixed = pin_until_sound(plan.plan.at(&plan.nominal()), nominal, &mut oracle);
-    match fixed {
-        Some(fixed) if !is_refused => with_pins(&fixed),
-        _ => plan,
-    }
-}
-
-/// The time points that a broken obligation is about.
-fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
-    let differences = broken.case.differences.iter();
-    let mut nodes: Vec<NodeId> = differences
-        .flat_map(|difference| [difference.from, difference.to])
-        .collect();
-    for inequality in &broken.case.inequalities {
-        let expression = &inequality.expression;
-        nodes.extend(expression.times.keys());
-        nodes.extend(
-            expression
-                .products
-                .keys()
-                .filter_map(|(_, factor)| match factor {
-                    Factor::Time(node) => Some(*node),
-                    Factor::Parameter(_) => None,
-                }),
-        );
-    }
-    // The moment inside an over-all condition is no node of the plan.
-    nodes.retain(|node| node.index() < count);
-    if let Requirement::Condition { node, .. }
-    | Requirement::Defined { node, .. }
-    | Requirement::OneUpdate { node, .. } = broken.requirement
-    {
-        nodes.push(node);
-    }
-    nodes
 }
 
 /// What the judge says of a plan.

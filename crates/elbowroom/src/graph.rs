@@ -33,7 +33,7 @@ pub fn to_dot(task: &Task, plan: &ParametrizedPlan) -> String {
     for constraint in &network.constraints {
         let style = match constraint.reason {
             Reason::Duration(_) => "bold",
-            Reason::Interference | Reason::OverAll => "dashed",
+            Reason::Interference | Reason::OverAll | Reason::Side => "dashed",
             Reason::Given | Reason::Timed(_) | Reason::Pinned => "solid",
         };
         let label = label(plan, constraint);
@@ -56,7 +56,7 @@ pub fn reason(reason: &Reason) -> &'static str {
         Reason::Duration(_) => "duration",
         Reason::Timed(_) => "timed",
         Reason::Interference => "interference",
-        Reason::OverAll => "over all",
+        Reason::OverAll | Reason::Side => "over all",
         Reason::Pinned => "pinned",
     }
 }

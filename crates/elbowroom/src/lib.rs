@@ -29,7 +29,7 @@
 //! let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &mut task)?;
 //!
 //! let robust = robust_plan(&Arc::new(task), &plan, &Settings::default())?;
-//! let envelope = robust.run.envelope.expect("the plan works as it is");
+//! let envelope = robust.envelope.expect("the plan works as it is");
 //! // The office closes at 30, and delivering may not take longer than that.
 //! assert!(envelope.intervals[0].contains(&28.into()));
 //! assert!(!envelope.intervals[0].contains(&30.into()));
@@ -45,11 +45,14 @@
 //! - [`stn`]: temporal networks.
 //! - [`plan`]: plans that leave room, and their parameters.
 //! - [`envelope`]: the box check, and the search for a box.
+//! - [`network`]: temporal networks in the formats of the field, and what can be promised about
+//!   them.
 //!
 //! What stands here adds words to what these find out ([`Explainer`]), reads and writes boxes
 //! ([`parse_box`]), and draws pictures ([`graph`]). It does not look at clocks or files, and it
 //! does not print.
 
+pub mod answers;
 mod box_text;
 pub mod compare;
 pub mod execute;
@@ -57,8 +60,10 @@ mod explain;
 pub mod flow;
 pub mod graph;
 mod makespan;
+pub mod network;
 pub mod perturbed;
 mod plan_file;
+mod room;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
@@ -74,7 +79,7 @@ pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;
-pub use plan_file::PlanKind;
+pub use plan_file::{AnyPlan, PlanKind};
 
 /// Longer reading. Its code is compiled and run with the tests.
 pub mod tutorial {

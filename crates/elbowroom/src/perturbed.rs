@@ -47,8 +47,9 @@ struct Setting<'e> {
     foresight: OnceLock<Result<Foresighted, PerturbedError>>,
 }
 
-/// Makes the trials of each case, in each world, with each executor. `observe` is asked after each
-/// row whether to go on.
+/// Makes the trials of each case, in each world, with each executor. `observe` is asked before each
+/// trial whether to go on. If not, what has been made until then is kept
+/// ([`PerturbedResults::is_interrupted`]).
 ///
 /// # Errors
 /// When the problem or likelihoods cannot be read, or are of a kind that there is no world for.
@@ -80,7 +81,13 @@ pub fn run(
             .map(|(setting, world, executor)| setting.row(*world, *executor, part, observe))
             .collect()
     });
-    Ok(PerturbedResults::new(experiment, part, rows?))
+    let rows = rows?;
+    let is_whole = rows
+        .iter()
+        .all(|row| row.success.count == part.numbers().count() as u64);
+    let mut results = PerturbedResults::new(experiment, part, rows);
+    results.is_interrupted = !is_whole;
+    Ok(results)
 }
 
 impl<'e> Setting<'e> {
@@ -169,6 +176,9 @@ impl<'e> Setting<'e> {
         part: Part,
         observe: &(dyn Fn() -> bool + Sync),
     ) -> Result<Row, PerturbedError> {
+        if !observe() {
+            return Ok(Row::new(self.case, world, kind, None));
+        }
         let mut executor = self.executor(kind)?;
         // The table is of the sound world; elsewhere it promises nothing.
         let foresight = match world {
@@ -192,6 +202,9 @@ impl<'e> Setting<'e> {
         let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
             .wrapping_add(self.number.wrapping_mul(1_000_000_007));
         for number in part.numbers() {
+            if !observe() {
+                break;
+            }
             let seed = first_seed.wrapping_add(number);
             let mut sound;
             let mut published;
@@ -205,10 +218,6 @@ impl<'e> Setting<'e> {
                 };
             row.add(trial(&mut game, world, &mut *executor));
         }
-        if observe() {
-            Ok(row)
-        } else {
-            Err(PerturbedError::other("interrupted"))
-        }
+        Ok(row)
     }
 }

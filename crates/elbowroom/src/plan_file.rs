@@ -1,4 +1,28 @@
-//! Which kind of plan a text is.
+//! The two kinds of plan, and which of them a text is.
+
+use elbowroom_model::TimeTriggeredPlan;
+use elbowroom_plan::ParametrizedPlan;
+
+/// A plan of either kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnyPlan {
+    /// Actions with fixed times.
+    TimeTriggered(TimeTriggeredPlan),
+    /// Action instances and constraints.
+    Stn(ParametrizedPlan),
+}
+
+impl From<TimeTriggeredPlan> for AnyPlan {
+    fn from(plan: TimeTriggeredPlan) -> Self {
+        Self::TimeTriggered(plan)
+    }
+}
+
+impl From<ParametrizedPlan> for AnyPlan {
+    fn from(plan: ParametrizedPlan) -> Self {
+        Self::Stn(plan)
+    }
+}
 
 /// The two kinds of plan that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -204,6 +204,63 @@ fn the_tank_is_as_worked_by_hand() {
 }
 
 #[test]
+fn the_hatchery_and_the_lamp_are_as_worked_by_hand() {
+    for case in ["hatchery", "lamp"] {
+        agrees(case, &["[0, inf)", "[1/500, inf)"], |point| {
+            let [first, second] = point else {
+                panic!("two durations")
+            };
+            *second >= number("0.002") && !first.is_negative()
+        });
+    }
+}
+
+#[test]
+fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
+    for case in ["hatchery", "lamp"] {
+        let (task, plan) = read(case);
+        let (task, plan) = (Arc::new(task.clone()), opened(&task, &plan, &[]));
+        let mut oracle = Oracle::new(&task, &Arc::new(plan), &epsilon(), Guarantee::Dynamic)
+            .expect("within exact reasoning");
+        for (lower, width, least, expected) in [
+            ("7.501", "4.998", "5", true),
+            ("7.501", "4.999", "5", false),
+            ("0", "5", "5.002", true),
+            ("0", "5", "5.001", false),
+            ("20", "0", "0.002", true),
+        ] {
+            let (lower, width) = (number(lower), number(width));
+            let envelope = DecoupledEnvelope {
+                intervals: vec![
+                    Interval::closed(lower.clone(), lower + width),
+                    Interval::at_least(number(least)),
+                ],
+            };
+            let objection = oracle.objection(&envelope).expect("few cases");
+            assert_eq!(objection.is_none(), expected, "{case}: {envelope:?}");
+        }
+    }
+}
+
+#[test]
+fn the_paintshop_is_as_worked_by_hand() {
+    let (task, plan) = read("paintshop");
+    let task = Arc::new(task);
+    for instance in 0..3 {
+        assert_eq!(alone(&task, &plan, instance).to_string(), "[0, inf)");
+    }
+    let opened = Arc::new(opened(&task, &plan, &[]));
+    let everything = DecoupledEnvelope {
+        intervals: vec![Interval::at_least(Rational::ZERO); 3],
+    };
+    for guarantee in [Guarantee::Weak, Guarantee::Dynamic] {
+        let mut oracle =
+            Oracle::new(&task, &opened, &epsilon(), guarantee).expect("within exact reasoning");
+        assert_eq!(oracle.objection(&everything), Ok(None), "{guarantee:?}");
+    }
+}
+
+#[test]
 fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
     let (mut task, plan) = read("delivery");
     let text = fs::read(folder("delivery").join("plan.stn")).unwrap();

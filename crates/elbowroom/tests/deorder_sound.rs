@@ -9,19 +9,17 @@
 
 mod shared;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use elbowroom_envelope::obligations::Requirement;
+use elbowroom::flow;
 use elbowroom_envelope::soundness::broken_in;
 use elbowroom_model::validate::Settings;
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
 use elbowroom_pddl::read_plan;
-use elbowroom_plan::deorder::{self, Deordered, deorder, pin_until_sound, pinned_to};
+use elbowroom_plan::deorder::{Deordered, pinned_to};
 use elbowroom_plan::parametrize::parametrize;
-use elbowroom_plan::{
-    DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
-};
+use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
@@ -75,44 +73,6 @@ fn objection(task: &Task, plan: &StnPlan, schedule: &[Rational]) -> Option<Strin
     }
 }
 
-/// The plan with as many differences fixed as needed, or why that cannot be told.
-fn pinned(task: &Task, deordered: &Deordered, epsilon: &Rational) -> Result<StnPlan, String> {
-    let mut refusal = None;
-    let mut oracle = |plan: &StnPlan| {
-        let closed = ParametrizedPlan::closed(task, plan.clone());
-        let point = DecoupledEnvelope::point(&[]);
-        match broken_in(task, &closed, epsilon, &point) {
-            Ok(broken) => broken.map(|broken| {
-                let differences = broken.case.differences.iter();
-                let mut nodes: Vec<NodeId> = differences
-                    .flat_map(|difference| [difference.from, difference.to])
-                    .collect();
-                for inequality in &broken.case.inequalities {
-                    nodes.extend(inequality.expression.times.keys());
-                }
-                nodes.retain(|node| node.index() < plan.nodes.len());
-                if let Requirement::Condition { node, .. }
-                | Requirement::Defined { node, .. }
-                | Requirement::OneUpdate { node, .. } = broken.requirement
-                {
-                    nodes.push(node);
-                }
-                nodes
-            }),
-            Err(error) => {
-                refusal = Some(error.to_string());
-                None
-            }
-        }
-    };
-    let plan = pin_until_sound(deordered.plan.clone(), &deordered.nominal, &mut oracle);
-    match (refusal, plan) {
-        (Some(refusal), _) => Err(refusal),
-        (None, Some(plan)) => Ok(plan),
-        (None, None) => Err("even the nominal schedule is not sound".to_owned()),
-    }
-}
-
 /// With all durations left open, the nominal schedule is one at the nominal values.
 fn assert_parametrized(task: &Task, deordered: &Deordered) {
     let Deordered { plan, nominal } = deordered.clone();
@@ -121,68 +81,144 @@ fn assert_parametrized(task: &Task, deordered: &Deordered) {
     assert!(elbowroom_stn::Schedule::new(nominal).holds_in(&network));
 }
 
-/// A line of `plans.csv` whose plan is valid when VAL is called with a tolerance of a thousandth.
-fn valid_plans(data: &Path) -> Vec<[String; 3]> {
+/// Domain, problem and plan of each line of `plans.csv` whose plan is valid when VAL is called with
+/// a tolerance of a thousandth.
+fn valid_plans(data: &Path) -> Vec<[PathBuf; 3]> {
+    let data = data.join("pddl");
     let table = std::fs::read_to_string(data.join("plans.csv")).unwrap();
     table
         .lines()
         .map(|line| line.split(',').collect::<Vec<_>>())
         .filter(|cells| cells[10] == "valid")
-        .map(|cells| {
-            [
-                cells[3].to_owned(),
-                cells[4].to_owned(),
-                cells[5].to_owned(),
-            ]
-        })
+        .map(|cells| [3, 4, 5].map(|index| data.join(cells[index])))
         .collect()
 }
 
-/// How many schedules are drawn of each plan.
-const DRAWS: usize = 20;
-
-#[test]
-fn random_schedules_of_deordered_plans_are_valid() {
-    let Some(data) = shared::data().map(|data| data.join("pddl")) else {
-        return;
-    };
-    let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let settings = deorder::Settings::default();
-    let (mut plans, mut schedules, mut pins, mut unreadable) = (0, 0, 0, 0);
-    let mut failures = Vec::new();
-    for [domain, problem, plan_file] in valid_plans(&data) {
-        let Ok(mut task) = shared::task(&data.join(domain), &data.join(problem)) else {
-            println!("{plan_file}: its problem is not supported");
-            unreadable += 1;
+/// Domain, problem and plan of what stands beside the authors' STN plan files.
+fn plans_of_the_authors(data: &Path) -> Vec<[PathBuf; 3]> {
+    let auv = data.join("envelopes/auv");
+    let generators = data.join("envelopes/generator_linear");
+    let mut plans = Vec::new();
+    for plan in files(&auv.join("plans")) {
+        let name = plan.file_name().unwrap().to_string_lossy().into_owned();
+        let mission = name.trim_start_matches("plan_");
+        let domain = auv.join("domains/pandora_domain_strategic_for_validation.pddl");
+        plans.push([domain, auv.join(format!("problems/{mission}.pddl")), plan]);
+    }
+    for plan in files(&generators.join("plans_and_stns")) {
+        let name = plan.file_name().unwrap().to_string_lossy().into_owned();
+        let Some(number) = name.strip_prefix("output").filter(|rest| rest.len() == 2) else {
             continue;
         };
-        let (plan, _) = read_plan(&shared::source(&data.join(&plan_file)), &mut task)
-            .unwrap_or_else(|error| panic!("{}", error.render(false)));
-        let deordered = match deorder(&task, &plan, &settings) {
-            Ok(deordered) => deordered,
-            Err(error) => {
-                failures.push(format!("{plan_file}: {error}"));
-                continue;
-            }
-        };
-        plans += 1;
-        assert_parametrized(&task, &deordered);
-        let sound = pinned(&task, &deordered, &settings.epsilon).unwrap_or_else(|reason| {
-            println!("{plan_file}: fixed, as nothing can be told: {reason}");
-            pinned_to(deordered.plan.clone(), &deordered.nominal)
-        });
-        pins += usize::from(sound != deordered.plan);
-        for _ in 0..DRAWS {
-            schedules += 1;
-            if let Some(objection) = objection(&task, &sound, &draw(&sound, &mut rng)) {
-                failures.push(format!("{plan_file}: {objection}"));
-                break;
-            }
+        let problem = generators.join(format!("gen_linear_prob{number}.pddl"));
+        plans.push([
+            generators.join("gen_linear_domain_validation.pddl"),
+            problem,
+            plan,
+        ]);
+    }
+    plans
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+/// How many schedules are drawn of each plan.
+const DRAWS: usize = 50;
+
+#[derive(Default)]
+struct Count {
+    plans: usize,
+    told: usize,
+    unsupported: usize,
+    invalid: usize,
+    schedules: usize,
+    failures: Vec<String>,
+}
+
+/// The deordered plan is sound at the nominal point, its nominal schedule is one of it, and the
+/// judge accepts that one and others drawn at random.
+fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, count: &mut Count) {
+    let epsilon = Rational::new(1, 1000);
+    let name = plan_file.display();
+    let Ok(mut task) = shared::task(domain, problem) else {
+        println!("{name}: its problem is not supported");
+        count.unsupported += 1;
+        return;
+    };
+    let (plan, _) = read_plan(&shared::source(plan_file), &mut task)
+        .unwrap_or_else(|error| panic!("{}", error.render(false)));
+    let freed = match flow::free(&task, &plan, &epsilon) {
+        Ok(freed) => freed,
+        Err(error) => {
+            println!("{name}: {error}");
+            count.invalid += 1;
+            return;
+        }
+    };
+    count.plans += 1;
+    assert_parametrized(&task, &freed.deordered);
+    let nominal = freed.deordered.nominal.clone();
+    let closed = flow::closed(&task, freed, &epsilon);
+    let network = closed.plan.network(&[]);
+    assert!(
+        elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&network),
+        "{name}"
+    );
+    let sound = match broken_in(&task, &closed, &epsilon, &DecoupledEnvelope::point(&[])) {
+        Ok(None) => {
+            count.told += 1;
+            closed.plan
+        }
+        Ok(Some(broken)) => {
+            let words = broken.requirement.describe(&task, &closed.plan);
+            count.failures.push(format!("{name}: {words}"));
+            return;
+        }
+        Err(refusal) => {
+            println!("{name}: fixed, as nothing can be told: {refusal}");
+            pinned_to(closed.plan, &nominal)
+        }
+    };
+    let drawn: Vec<Schedule> = (0..DRAWS).map(|_| draw(&sound, rng)).collect();
+    for schedule in std::iter::once(&nominal).chain(&drawn) {
+        count.schedules += 1;
+        if let Some(objection) = objection(&task, &sound, schedule) {
+            count.failures.push(format!("{name}: {objection}"));
+            break;
         }
     }
+}
+
+fn examine_all(plans: &[[PathBuf; 3]]) -> Count {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut count = Count::default();
+    for plan in plans {
+        examine(plan, &mut rng, &mut count);
+    }
     println!(
-        "{plans} plans deordered ({unreadable} not supported), {pins} with pins, \
-         {schedules} schedules judged"
+        "{} plans deordered ({} problems not supported, {} plans not valid), {} of them found \
+         sound, {} schedules judged",
+        count.plans, count.unsupported, count.invalid, count.told, count.schedules
     );
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    assert!(count.failures.is_empty(), "{}", count.failures.join("\n"));
+    count
+}
+
+#[test]
+fn valid_plans_of_the_benchmarks_are_sound_when_deordered_and_so_are_their_schedules() {
+    let Some(data) = shared::data() else { return };
+    let count = examine_all(&valid_plans(&data));
+    assert!(count.plans >= 110, "{}", count.plans);
+}
+
+#[test]
+fn valid_plans_of_the_authors_are_sound_when_deordered_and_so_are_their_schedules() {
+    let Some(data) = shared::data() else { return };
+    let count = examine_all(&plans_of_the_authors(&data));
+    assert!(count.plans >= 20, "{}", count.plans);
 }

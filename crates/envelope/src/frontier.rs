@@ -2,9 +2,11 @@
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, ParametrizedPlan, Side};
+use serde::{Deserialize, Serialize};
 
 /// How steps change after a success.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Growth {
     /// They double until both directions of the parameter have been refused for the first time,
     /// as in the authors' code.

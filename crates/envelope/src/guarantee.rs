@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
+use serde::{Deserialize, Serialize};
+
 use crate::branching::{MOST_BRANCHES, TooManyBranches};
 use crate::control::{ControlConflict, dynamic_conflict, strong_conflict};
 use crate::feasibility::{Feasibility, Infeasible};
@@ -16,7 +18,10 @@ use crate::reduction::Reduction;
 ///
 /// Whichever it is, every schedule that the plan's network allows is valid. They differ in what
 /// whoever executes the plan has to know to have such a schedule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Guarantee {
     /// For all values there is a schedule, for an executor that knows them in advance (weak

@@ -53,7 +53,13 @@ pub enum StopReason {
     CheckLimit,
     /// The caller wanted no more.
     Cancelled,
+    /// Of some wider boxes it cannot be told whether they are inside: there are too many cases to
+    /// tell apart. The ends in question stay where they were.
+    Undecided,
 }
+
+/// How many boxes may be undecided before a search ends: each took long.
+const MOST_UNDECIDED: usize = 4;
 
 /// What keeps one end of the final box where it is.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +75,8 @@ pub enum Limit {
         /// Why.
         objection: Objection,
     },
+    /// Whether the box with this end moved out is inside the envelope cannot be told.
+    Undecided,
 }
 
 /// The result of [`irr`].
@@ -89,9 +97,10 @@ pub struct IrrRun {
 /// Invariant: the box lies inside the robustness envelope at every iteration, the first included:
 /// the start point is checked like any other box. `on_step` is called each time the box has
 /// grown, and once more at every refusal with `None`, so that it can end the search at any moment.
+/// What was found stays found: a wider box of which nothing can be told is treated as refused.
 ///
 /// # Errors
-/// When there are too many cases to tell apart.
+/// When nothing can be told of the start point.
 #[doc(alias = "Incremental Rectangular-Robustification")]
 pub fn irr(
     oracle: &mut Oracle,
@@ -111,18 +120,29 @@ pub fn irr(
     }
     let mut frontier = Frontier::new(&plan, &settings.precision, settings.growth);
     let mut widenings = 0;
+    let mut undecided = 0;
     let stop = loop {
+        if undecided >= MOST_UNDECIDED {
+            break StopReason::Undecided;
+        }
         let Some((end, step)) = frontier.next_end() else {
-            break StopReason::Converged;
+            break match undecided {
+                0 => StopReason::Converged,
+                _ => StopReason::Undecided,
+            };
         };
         let checks = oracle.checks() - already;
         if settings.most_checks.is_some_and(|most| checks >= most) {
             break StopReason::CheckLimit;
         }
         let range = &plan.parameter(end.parameter).range;
-        let flow = if widen(oracle, &envelope, range, end, &step)? {
+        let mut told = |answer: Result<bool, Refusal>| {
+            undecided += usize::from(answer.is_err());
+            answer.unwrap_or(false)
+        };
+        let flow = if told(widen(oracle, &envelope, range, end, &step)) {
             frontier.accept(end);
-            if matches!(end.side.of(range), End::Infinite) && oracle.try_reach(end, None)? {
+            if matches!(end.side.of(range), End::Infinite) && told(oracle.try_reach(end, None)) {
                 frontier.finish(end);
             }
             if let Some(accepted) = oracle.accepted() {
@@ -172,14 +192,11 @@ fn widen(
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
 /// can still move by less than `step` is asked what would stop it at `step`.
-///
-/// # Errors
-/// When there are too many cases to tell apart.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     step: &Rational,
-) -> Result<Vec<[Option<Limit>; 2]>, Refusal> {
+) -> Vec<[Option<Limit>; 2]> {
     let plan = Arc::clone(oracle.plan());
     let mut limits = Vec::with_capacity(plan.parameters.len());
     for (index, parameter) in plan.parameters.iter().enumerate() {
@@ -189,11 +206,11 @@ pub fn limits(
                 parameter: ParameterId::from(index),
                 side,
             };
-            pair[side.index()] = limit(oracle, envelope, parameter, end, step)?;
+            pair[side.index()] = limit(oracle, envelope, parameter, end, step);
         }
         limits.push(pair);
     }
-    Ok(limits)
+    limits
 }
 
 fn limit(
@@ -202,18 +219,20 @@ fn limit(
     parameter: &Parameter,
     end: BoxEnd,
     step: &Rational,
-) -> Result<Option<Limit>, Refusal> {
+) -> Option<Limit> {
     let Some(reach) = end.reach(envelope) else {
-        return Ok(Some(Limit::Unbounded));
+        return Some(Limit::Unbounded);
     };
     let border = end.side.reach(&parameter.range);
     if border.as_ref().is_some_and(|border| reach >= *border) {
-        return Ok(Some(Limit::Range));
+        return Some(Limit::Range);
     }
     let target = &reach + step;
     let target = border.map_or(target.clone(), |border| border.min(target));
     let refused = end.with_reach(envelope, Some(target));
-    Ok(oracle
-        .objection(&refused)?
-        .map(|objection| Limit::Objection { refused, objection }))
+    match oracle.objection(&refused) {
+        Ok(None) => None,
+        Ok(Some(objection)) => Some(Limit::Objection { refused, objection }),
+        Err(_) => Some(Limit::Undecided),
+    }
 }

@@ -16,6 +16,7 @@
 mod branching;
 mod control;
 mod cycles;
+mod enforce;
 mod feasibility;
 mod frontier;
 mod guarantee;
@@ -29,6 +30,7 @@ mod sharpen;
 pub mod soundness;
 
 pub use control::{ControlConflict, ControlGround};
+pub use enforce::enforced;
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};

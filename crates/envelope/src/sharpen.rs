@@ -36,7 +36,7 @@ pub fn sharpen(
     let ends = parameters
         .flat_map(|parameter| [Side::Upper, Side::Lower].map(|side| BoxEnd { parameter, side }));
     for end in ends {
-        if push(oracle, end, on_step)?.is_break() {
+        if push(oracle, end, on_step).is_break() {
             break;
         }
     }
@@ -48,18 +48,20 @@ fn push(
     oracle: &mut Oracle,
     end: BoxEnd,
     on_step: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Result<ControlFlow<()>, Refusal> {
+) -> ControlFlow<()> {
     let Some(mut inside) = oracle.accepted().and_then(|accepted| end.reach(accepted)) else {
-        return Ok(ControlFlow::Continue(()));
+        return ControlFlow::Continue(());
     };
     let border = end
         .side
         .reach(&oracle.plan().parameter(end.parameter).range);
     if border.as_ref() == Some(&inside) {
-        return Ok(ControlFlow::Continue(()));
+        return ControlFlow::Continue(());
     }
-    if oracle.try_reach(end, border.clone())? {
-        return Ok(on_step());
+    // Of where nothing can be told, the end stays away.
+    let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
+    if accepts(border.clone()) {
+        return on_step();
     }
     let mut outside = if let Some(border) = border {
         border
@@ -68,13 +70,13 @@ fn push(
         let mut step = Rational::ONE;
         loop {
             let farther = &inside + &step;
-            if !oracle.try_reach(end, Some(farther.clone()))? {
+            if !accepts(Some(farther.clone())) {
                 break farther;
             }
             inside = farther;
             step = &step + &step;
             if on_step().is_break() {
-                return Ok(ControlFlow::Break(()));
+                return ControlFlow::Break(());
             }
         }
     };
@@ -87,16 +89,16 @@ fn push(
             Some(2) => shortest_decimal_between(&inside, &outside),
             _ => &(&inside + &outside) * &half,
         };
-        if oracle.try_reach(end, Some(candidate.clone()))? {
+        if accepts(Some(candidate.clone())) {
             inside = candidate;
         } else {
             outside = candidate;
         }
         if on_step().is_break() {
-            return Ok(ControlFlow::Break(()));
+            return ControlFlow::Break(());
         }
     }
-    Ok(ControlFlow::Continue(()))
+    ControlFlow::Continue(())
 }
 
 /// The fraction with the smallest denominator strictly between two numbers, `low < high`.

@@ -15,6 +15,7 @@ mod lazy;
 mod linear_program;
 mod proof;
 mod scale;
+mod sound_box;
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -29,6 +30,8 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Valuat
 use lazy::{Lazy, numbers};
 use proof::Proof;
 use scale::Numbers;
+
+pub use sound_box::SoundBox;
 
 /// Decides, box by box, whether every schedule of a plan is valid.
 ///
@@ -295,7 +298,10 @@ impl DirectCase {
 }
 
 /// The earliest schedule at these values, by node.
-fn earliest_schedule(reduction: &Reduction, valuation: &[Rational]) -> Option<Vec<Rational>> {
+pub(crate) fn earliest_schedule(
+    reduction: &Reduction,
+    valuation: &[Rational],
+) -> Option<Vec<Rational>> {
     let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;

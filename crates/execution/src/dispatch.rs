@@ -86,6 +86,8 @@ pub(crate) struct Dispatch {
     /// For each instance, the bounds on its duration.
     durations: Vec<Bounds>,
     progress: Progress,
+    /// When instances that have not been seen to start were told to, on the plan's clock.
+    told: BTreeMap<InstanceId, Rational>,
     /// Timed initials that have not happened, the last one first, with their times.
     timed: Vec<(Rational, NodeId)>,
     /// Instances that were under way before the plan began: of these it knows the rest.
@@ -275,6 +277,7 @@ impl Dispatch {
             ends,
             durations,
             progress,
+            told: BTreeMap::new(),
             timed,
             resumed: mission
                 .running

@@ -80,6 +80,13 @@ pub enum Event {
         /// Its value.
         value: Rational,
     },
+    /// The world has said something that cannot be understood.
+    Unintelligible {
+        /// What it said, or how that begins.
+        said: String,
+        /// What is wrong with it.
+        why: String,
+    },
 }
 
 /// How an action ended.

@@ -81,6 +81,14 @@ impl Horizon {
         }
     }
 
+    /// Whether the world decides when a time point happens.
+    pub(crate) fn is_contingent(&self, node: NodeId) -> bool {
+        match self {
+            Self::Whole(_) | Self::OneHop(_) => true,
+            Self::Dispatchable(dispatcher) => dispatcher.form().network().is_contingent(node),
+        }
+    }
+
     /// When a time point that is ready may happen if nothing happens before. `Err` if it has to
     /// wait for the end of that link, however late it comes.
     pub(crate) fn earliest(&self, node: NodeId) -> Result<Option<Rational>, LinkId> {

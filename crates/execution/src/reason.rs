@@ -95,6 +95,10 @@ pub enum Cause {
     GoalReached,
     /// A plan has been made.
     NewPlan,
+    /// Part of the goal can never become true again.
+    NeverAgain,
+    /// Each part of the goal could still become true, but not all of them.
+    NotTogether,
 }
 
 impl Cause {
@@ -117,6 +121,8 @@ impl Cause {
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
         (Self::NewPlan, "new-plan"),
+        (Self::NeverAgain, "never-again"),
+        (Self::NotTogether, "not-together"),
     ];
 
     /// The word by which traces name it.
@@ -219,6 +225,15 @@ impl Reason {
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),
             Cause::NewPlan => "there is a new plan".to_owned(),
+            Cause::NeverAgain => match self.since {
+                Some(_) => format!("{about} can never become true again"),
+                None => format!("{about} could never become true"),
+            },
+            Cause::NotTogether => {
+                "each part of the goal could still become true if nothing were undone and there \
+                 were time, but no plan makes all of it true"
+                    .to_owned()
+            }
         }
     }
 }

@@ -98,6 +98,11 @@ pub enum Entry<'a> {
         /// Whether it is certain that there is none.
         is_unsolvable: bool,
     },
+    /// Somebody asked the run to end.
+    Interrupted {
+        /// When.
+        now: &'a Rational,
+    },
     /// The run is over.
     Over(&'a Report),
 }

@@ -13,14 +13,20 @@
 //! | a success after a cancel | the success counts: the action was faster |
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
+//! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
 //! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
 //! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
+//!
+//! However a run ends, nothing is left running: what has not ended is cancelled, and has
+//! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
 //!
 //! The goal is not taken as reached while anything is under way or in doubt, and not before the
 //! world has had a chance to look ([`World::look`]).
 
 mod account;
+mod dead_end;
+mod farewell;
 mod handover;
 mod intake;
 mod progress;
@@ -32,6 +38,7 @@ use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 pub use account::{Account, ExecutedStep};
+pub use farewell::FAREWELL;
 pub use settings::{Patience, PlanningTime, Report, RunSettings, RunningRule, Verdict};
 
 use crate::event::{Command, Ticket};
@@ -41,7 +48,8 @@ use crate::preparation::{Need, Preparer};
 use crate::progression::Progression;
 use crate::reason::{Cause, Reason};
 use crate::record::{Entry, Recorder};
-use crate::world::{World, WorldError};
+use crate::world::{Passage, World, WorldError};
+use dead_end::Happened;
 use progress::Progress;
 
 /// What a run needs.
@@ -77,6 +85,11 @@ pub struct Run<'a> {
     reasons: Vec<Reason>,
     /// How long making a plan is expected to take.
     allowance: Rational,
+    /// What was observed and believed, in order.
+    history: Vec<Happened>,
+    /// Asked whether to end.
+    is_to_end: Option<&'a dyn Fn() -> bool>,
+    is_explaining: bool,
 }
 
 /// Why the loop is left.
@@ -124,7 +137,28 @@ impl<'a> Run<'a> {
             replans: 0,
             reasons: Vec::new(),
             allowance,
+            history: Vec::new(),
+            is_to_end: None,
+            is_explaining: false,
         }
+    }
+
+    /// The same run, which ends in order as soon as `is_to_end` says so: what runs is cancelled, and
+    /// there is a whole report. It is asked before each decision, and after each answer of the world
+    /// and of the planner.
+    #[must_use]
+    pub fn ending_when(mut self, is_to_end: &'a dyn Fn() -> bool) -> Self {
+        self.is_to_end = Some(is_to_end);
+        self
+    }
+
+    /// The same run, which says, where no plan reaches the goal any more, what can never become true
+    /// again and since when ([`Report::dead_end`]). That takes some grounding by reachability, each
+    /// about as long as the embedded planner's.
+    #[must_use]
+    pub fn explaining(mut self) -> Self {
+        self.is_explaining = true;
+        self
     }
 
     /// The whole loop: take up a plan, decide, wait, take in what was observed; replan when the
@@ -143,11 +177,19 @@ impl<'a> Run<'a> {
             Err(Stop::World(error)) => Verdict::WorldFailed { why: error.message },
             Ok(()) => unreachable!("the loop ends with an error"),
         };
+        let dead_end = match verdict {
+            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
+            _ => Vec::new(),
+        };
+        if !matches!(verdict, Verdict::WorldFailed { .. }) {
+            self.leave_nothing_running();
+        }
         let report = Report {
             verdict,
             time: self.now.clone(),
             replans: self.replans,
             reasons: std::mem::take(&mut self.reasons),
+            dead_end,
             starts: self.account.started(),
             executed: self.account.executed(&self.now),
         };
@@ -157,6 +199,7 @@ impl<'a> Run<'a> {
 
     /// One decision, and what follows from it.
     fn step(&mut self) -> Result<(), Stop> {
+        self.heed()?;
         let decided = self.decide();
         match decided.decision {
             Decision::Start(orders) => self.start(orders),
@@ -239,7 +282,19 @@ impl<'a> Run<'a> {
     /// Lets time pass and takes in what is observed.
     fn pass(&mut self, until: &Rational) -> Result<(), Stop> {
         let until = until.min(&self.settings.time_limit);
-        let passage = self.ports.world.wait(until)?;
+        let until = until.clone();
+        let passage = self.ports.world.wait(&until)?;
+        self.take_up_passage(&until, passage);
+        self.heed()?;
+        if self.now >= self.settings.time_limit {
+            return Err(Stop::Over(Verdict::TimeLimit));
+        }
+        let moves_on = self.progress.note(&self.now, self.steps);
+        moves_on.map_err(|why| Stop::World(WorldError::new(why)))
+    }
+
+    /// Takes in an answer of the world.
+    fn take_up_passage(&mut self, until: &Rational, passage: Passage) {
         self.know_what_the_world_mentions();
         self.ports.recorder.record(&Entry::Passed {
             until,
@@ -248,11 +303,6 @@ impl<'a> Run<'a> {
         });
         self.now = passage.now.max(self.now.clone());
         self.take_in(passage.observations);
-        if self.now >= self.settings.time_limit {
-            return Err(Stop::Over(Verdict::TimeLimit));
-        }
-        let moves_on = self.progress.note(&self.now, self.steps);
-        moves_on.map_err(|why| Stop::World(WorldError::new(why)))
     }
 
     /// A fact that no plan has mentioned may still matter to the next one.
@@ -282,6 +332,7 @@ impl<'a> Run<'a> {
             observations: &observations,
         });
         self.take_in(observations);
+        self.heed()?;
         if self.is_goal_certain() {
             return Err(Stop::Over(Verdict::GoalReached));
         }

@@ -168,7 +168,7 @@ fn continuous_change_is_any_form_that_is_linear_in_time() {
     assert_snapshot!(rate("(+ (* #t 2) (* #t (speed)))"), @"rate of (level): (+ 2 (speed))");
     assert_snapshot!(rate("(- (* #t 2) #t)"), @"rate of (level): (+ 2 (- 1))");
     assert_snapshot!(rate("(* #T ?duration)"), @"rate of (level): ?duration");
-    assert_snapshot!(effect("(decrease (level) (* #t 2))"), @"rate of (level): -2");
+    assert_snapshot!(effect("(decrease (level) (* #t 2))"), @"rate of (level): (- 2)");
     assert_snapshot!(effect("(decrease (level) (* #t (speed)))"), @"rate of (level): (- (speed))");
     assert_snapshot!(
         effect("(when (at start (lit)) (increase (level) (* #t 1)))"),

@@ -29,6 +29,21 @@ fn facts_numbers_and_what_comes_later_are_told_apart() {
 }
 
 #[test]
+fn timed_initials_that_contradict_each_other_at_one_time_are_refused() {
+    let is_read = |init: &str| read_sections(&format!("(:init {init}) (:goal (and))")).is_ok();
+    assert!(!is_read("(at 10 (lit)) (at 10 (not (lit)))"));
+    assert!(!is_read(
+        "(at 10 (not (lit))) (at 20 (= (level) 1)) (at 10.0 (lit))"
+    ));
+    assert!(!is_read("(at 10 (= (level) 1)) (at 10 (= (level) 2))"));
+    // Saying the same twice is no contradiction, nor is another time.
+    assert!(is_read(
+        "(at 10 (lit)) (at 10 (lit)) (at 10.001 (not (lit)))"
+    ));
+    assert!(is_read("(at 10 (= (level) 1)) (at 10 (= (level) 1))"));
+}
+
+#[test]
 fn what_happens_at_time_zero_is_initial() {
     let (problem, warnings) =
         read_sections("(:init (lit) (at 0 (not (lit))) (at 0 (= (level) 1))) (:goal (and))")

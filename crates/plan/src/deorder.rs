@@ -8,10 +8,10 @@
 //! - Interfering happenings keep their order, at least ε apart. Timed initials take part, so
 //!   deadlines become constraints.
 //! - A happening that writes what an over-all condition reads stays on its side of the action's
-//!   start and of its end. What an over-all condition sees is the open interval between them, so
-//!   falling together with start or end does no harm: at the start, the write comes first, as a
-//!   condition over the interval sees only what is true after the start; at the end it comes
-//!   last.
+//!   start and of its end, unless all it does is to make a fact as the condition needs it. What an
+//!   over-all condition sees is the open interval between them, so falling together with start or
+//!   end does no harm: at the start, the write comes first, as a condition over the interval sees
+//!   only what is true after the start; at the end it comes last.
 //! - Rates of continuous effects are treated like over-all conditions. So are over-all conditions
 //!   of conditional effects, but what came between start and end stays strictly between, as such
 //!   a condition must not become true either.
@@ -20,7 +20,10 @@
 //!   depend on values that depend on the schedule, it stays as it was.
 //!
 //! Conditions on numbers that change continuously, or by amounts that depend on durations, can
-//! still fail in some schedules. [`pin_until_sound`] is for those.
+//! still fail in some schedules. [`pin_until_sound`] is for those. On the other hand, whether what
+//! increases or decreases a number must stay on its side of an action depends on the numbers: such
+//! constraints have a reason of their own ([`Reason::Side`](crate::Reason::Side)), and are given
+//! up there as far as nothing needs them.
 
 pub(crate) mod durations;
 mod goal;
@@ -34,7 +37,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 pub use implied::without_implied;
-pub use pin::{pin_until_sound, pinned_to};
+pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};
 use crate::stn_plan::{Instance, Node, NodeId, StnPlan};
@@ -116,15 +119,26 @@ pub fn deorder(
             second: stn_plan.node_words(task, second),
             time: times[first.index()].to_decimal(6),
         })?;
-    over_all::order(task, &stn_plan, &timeline, &settings.epsilon, &mut order);
+    let mut sides = Order::default();
+    over_all::order(
+        task,
+        &stn_plan,
+        &timeline,
+        &settings.epsilon,
+        &mut order,
+        &mut sides,
+    );
     goal::order(task, &stn_plan, &times, &settings.epsilon, &mut order);
     stn_plan
         .constraints
         .extend(durations::constraints(task, &stn_plan, &times));
     stn_plan.constraints.extend(order.into_constraints());
-    let nominal = nominal(task, &stn_plan, times, settings)?;
+    let sides: Vec<_> = sides.into_constraints().collect();
+    let mut kept = stn_plan.clone();
+    kept.constraints.extend(sides.iter().cloned());
+    let nominal = nominal(task, &kept, times, settings)?;
     Ok(Deordered {
-        plan: without_implied(stn_plan),
+        plan: implied::with_sides(without_implied(stn_plan), sides),
         nominal,
     })
 }

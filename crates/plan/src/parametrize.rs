@@ -63,7 +63,12 @@ pub fn parametrize(
 ) -> Result<ParametrizedPlan, ParametrizeError> {
     let plan = ParametrizedPlan::closed(task, plan);
     let durations: VarySpec = "durations".parse()?;
-    let names_a_quantity = |spec: &VarySpec| !matches!(spec.target, Target::Unknown { .. });
+    let names_a_quantity = |spec: &VarySpec| {
+        !matches!(
+            spec.target,
+            Target::Unknown { .. } | Target::Controllable(_)
+        )
+    };
     if specs.iter().any(names_a_quantity) {
         vary(task, plan, nominal, specs)
     } else {
@@ -86,7 +91,11 @@ pub fn vary(
     specs: &[VarySpec],
 ) -> Result<ParametrizedPlan, ParametrizeError> {
     let mut opening = Opening::new(task, plan, nominal)?;
-    for spec in specs {
+    // What the executor chooses is not opened, wherever in the list that stands.
+    let (controllable, open): (Vec<_>, Vec<_>) = specs
+        .iter()
+        .partition(|spec| matches!(spec.target, Target::Controllable(_)));
+    for spec in controllable.into_iter().chain(open) {
         opening.apply(spec)?;
     }
     opening.finish()

@@ -112,7 +112,10 @@ pub enum Reason {
     Interference,
     /// One of the happenings writes what an over-all condition of the other's action reads.
     OverAll,
-    /// Fixed as in the original plan, because numeric conditions leave no other choice.
+    /// The same, where the condition compares numbers and the happening increases or decreases
+    /// one: whether anything needs this depends on the numbers.
+    Side,
+    /// Kept at, or near, what it is in the original plan, because of numeric conditions.
     Pinned,
 }
 

@@ -125,6 +125,11 @@ pub fn observation(task: &Task, observation: &Observation) -> Value {
             "fluent": task.fluent_name(*fluent),
             "value": number(value),
         }),
+        Event::Unintelligible { said, why } => json!({
+            "type": "unintelligible",
+            "said": said,
+            "why": why,
+        }),
     };
     message["time"] = number(&observation.time);
     message
@@ -195,6 +200,11 @@ pub fn read_observation(message: &Value, names: &Names) -> Result<Observation, W
                 value: field_number(message, "value")?,
             }
         }
+        // What was written down of something that could not be read.
+        "unintelligible" => Event::Unintelligible {
+            said: field_text(message, "said")?.to_owned(),
+            why: field_text(message, "why")?.to_owned(),
+        },
         other => {
             return Err(wrong(format!(
                 "`{other}` is no type of observation: started, ended, fact, value"

@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution as _, LogNormal, Normal, Triangular};
+use rand_distr::{Distribution as _, Exp1, Gamma, LogNormal, Normal, Triangular};
 
 /// What a random number is for.
 ///
@@ -84,6 +84,22 @@ pub enum Distribution {
         /// To here.
         to: f64,
     },
+    /// `from`, and what an exponential distribution adds.
+    Exponential {
+        /// The least value.
+        from: f64,
+        /// The mean of what is added.
+        mean: f64,
+    },
+    /// `from`, and what a gamma distribution adds.
+    Gamma {
+        /// The least value.
+        from: f64,
+        /// The shape.
+        shape: f64,
+        /// The scale.
+        scale: f64,
+    },
     /// One of these, all alike: values that were measured.
     Empirical(Vec<f64>),
 }
@@ -113,6 +129,14 @@ impl Distribution {
             {
                 "it must be that from <= mode <= to"
             }
+            Self::Exponential { from, mean } if !finite(&[*from, *mean]) || *mean < 0.0 => {
+                "the mean of what is added must not be negative"
+            }
+            Self::Gamma { from, shape, scale }
+                if !finite(&[*from, *shape, *scale]) || *shape <= 0.0 || *scale <= 0.0 =>
+            {
+                "shape and scale must be greater than 0"
+            }
             Self::Empirical(values) if values.is_empty() || !finite(values) => {
                 "the list must have at least one value, and finite ones only"
             }
@@ -136,6 +160,13 @@ impl Distribution {
             Self::Uniform { from, to } => from + (to - from) * rng.random::<f64>(),
             Self::Triangular { from, mode, to } => {
                 Triangular::new(*from, *to, *mode).map_or(*mode, |it| it.sample(rng))
+            }
+            Self::Exponential { from, mean } => {
+                let added: f64 = Exp1.sample(rng);
+                from + mean * added
+            }
+            Self::Gamma { from, shape, scale } => {
+                Gamma::new(*shape, *scale).map_or(*from, |gamma| from + gamma.sample(rng))
             }
             Self::Empirical(values) => values[rng.random_range(0..values.len())],
         }
@@ -218,6 +249,23 @@ mod tests {
                 },
                 3.0,
                 1.5_f64.sqrt(),
+            ),
+            (
+                Distribution::Exponential {
+                    from: 2.0,
+                    mean: 3.0,
+                },
+                5.0,
+                3.0,
+            ),
+            (
+                Distribution::Gamma {
+                    from: 1.0,
+                    shape: 4.0,
+                    scale: 0.5,
+                },
+                3.0,
+                1.0,
             ),
             (Distribution::Empirical(vec![1.0, 3.0]), 2.0, 1.0),
             (Distribution::Constant(4.0), 4.0, 0.0),

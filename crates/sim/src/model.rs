@@ -213,9 +213,10 @@ impl Rule {
             Distribution::Uniform { to, .. } | Distribution::Triangular { to, .. } => {
                 cut(*to) < 0.0
             }
-            Distribution::Normal { .. } | Distribution::LogNormal { .. } => {
-                self.maximum.is_some_and(|maximum| maximum < 0.0)
-            }
+            Distribution::Normal { .. }
+            | Distribution::LogNormal { .. }
+            | Distribution::Exponential { .. }
+            | Distribution::Gamma { .. } => self.maximum.is_some_and(|maximum| maximum < 0.0),
         }
     }
 }

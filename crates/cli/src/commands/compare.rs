@@ -54,7 +54,16 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     } else {
         output::print(&results.table(&experiment).within(width))?;
     }
-    written.map(|()| Exit::Yes)
+    written.map(|()| ended(results.is_interrupted))
+}
+
+/// What was made is shown and kept, but is not what was asked for.
+fn ended(is_interrupted: bool) -> Exit {
+    if is_interrupted {
+        Exit::Interrupted
+    } else {
+        Exit::Yes
+    }
 }
 
 /// An experiment in worlds without time.
@@ -89,7 +98,7 @@ fn perturbed(
     } else {
         output::print(&table.within(Look::of_stdout().width))?;
     }
-    written.map(|()| Exit::Yes)
+    written.map(|()| ended(results.is_interrupted))
 }
 
 fn write_perturbed(
@@ -157,12 +166,6 @@ fn make(arguments: &CompareArgs, experiment: &Experiment) -> Result<Results, Fai
     };
     let results = compare::run(experiment, part, &observe);
     bar.finish_and_clear();
-    if interrupt.is_requested() {
-        return Err(Failure::new(
-            "interrupted; a table of some of the trials would favour easy problems",
-            "take fewer trials with --trials, or split them with --shard",
-        ));
-    }
     results.map_err(|error| Failure::new(error, ""))
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use elbowroom::execute::{Analyst, WholeRegion, check_vary};
 use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
-    self, PlanningTime, Ports, Report, RunSettings, RunningRule, Verdict,
+    PlanningTime, Ports, Report, Run, RunSettings, RunningRule, Verdict,
 };
 use elbowroom::execution::{Odds, Planner, Recorder, World};
 use elbowroom::flow;
@@ -27,6 +27,7 @@ use serde_json::{Value, json};
 use crate::args::{RunArgs, RunningChoice};
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::{self, AnyPlan};
+use crate::interrupt::Interrupt;
 use crate::output::{self, tame};
 use planner::Who;
 use realtime::{Pace, PacedPlanner, Realtime};
@@ -59,6 +60,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     who.suits(&choices.executor, arguments)?;
     let world = world_text(arguments)?;
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
+    let interrupt = Interrupt::listen();
     let header = header(arguments, &texts, world.as_deref(), likelihoods.as_ref());
     let job = Job {
         arguments,
@@ -67,6 +69,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         who,
         task: Arc::new(task),
         first,
+        interrupt: interrupt.clone(),
     };
     let report = {
         let mut sink = |line: &str| file.write(line);
@@ -74,8 +77,12 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
         writer.header(header);
         match &arguments.world_process {
             Some(command) => {
-                let within = &arguments.answer_within;
-                let mut world = process::ProcessWorld::start(command, &job.task, within)?;
+                let manners = process::Manners {
+                    patience: arguments.answer_within.clone(),
+                    is_strict: arguments.strict_world,
+                };
+                let mut world =
+                    process::ProcessWorld::start(command, &job.task, &manners, interrupt)?;
                 let report = job.run(&mut world, None, None, &mut writer);
                 world.stop();
                 report
@@ -83,12 +90,17 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
             None => job.simulated(world.as_deref(), &mut writer)?,
         }
     };
-    file.close()?;
-    if arguments.json {
-        output::print_json(&text::document(&report))?;
+    let trouble = file.close();
+    let shown = if arguments.json {
+        output::print_json(&text::document(&report))
     } else {
-        output::print(&text::human(&report))?;
+        output::print(&text::human(&report))
+    };
+    // The run has been what it was, whatever became of its record.
+    if let Some(trouble) = trouble {
+        output::warn(&trouble);
     }
+    shown?;
     exit(&report.verdict)
 }
 
@@ -100,6 +112,7 @@ struct Job<'a> {
     who: Who,
     task: Arc<Task>,
     first: Option<TimeTriggeredPlan>,
+    interrupt: Interrupt,
 }
 
 impl Job<'_> {
@@ -112,9 +125,13 @@ impl Job<'_> {
         recorder: &mut dyn Recorder,
     ) -> Report {
         let (choices, first) = (&self.choices, self.first.as_ref());
+        let is_to_end = || self.interrupt.is_requested();
+        let asked = |planning: Planning<'_>, world: &mut dyn World, recorder: &mut dyn Recorder| {
+            choices.run_with(&self.task, first, world, planning, recorder, &is_to_end)
+        };
         let run = |planning: Planning<'_>| {
             let Some(pace) = pace else {
-                return choices.run_with(&self.task, first, world, planning, recorder);
+                return asked(planning, world, recorder);
             };
             let mut paced = PacedPlanner {
                 inner: planning.planner,
@@ -125,10 +142,11 @@ impl Job<'_> {
                 planner: &mut paced,
                 odds: planning.odds,
             };
-            choices.run_with(&self.task, first, world, planning, recorder)
+            asked(planning, world, recorder)
         };
+        let interrupt = &self.interrupt;
         self.who
-            .with(self.arguments, &self.texts, choices, model, run)
+            .with(self.arguments, &self.texts, choices, model, interrupt, run)
     }
 
     fn simulated(
@@ -168,6 +186,7 @@ impl Job<'_> {
         let mut world = Realtime {
             inner: world,
             pace: &pace,
+            interrupt: &self.interrupt,
         };
         Ok(self.run(&mut world, Some(&model), Some(&pace), recorder))
     }
@@ -275,6 +294,7 @@ impl Choices {
         world: &mut dyn World,
         planning: Planning<'_>,
         recorder: &mut dyn Recorder,
+        is_to_end: &dyn Fn() -> bool,
     ) -> Report {
         let mut analyst = Analyst::new(self.flow.clone());
         let mut executor = self.executor.build(Means {
@@ -293,7 +313,8 @@ impl Choices {
             need: self.executor.registered.need,
             recorder,
         };
-        run::run(Arc::clone(task), first, &self.settings, ports)
+        let run = Run::new(Arc::clone(task), &self.settings, ports);
+        run.ending_when(is_to_end).explaining().go(first)
     }
 }
 
@@ -379,6 +400,7 @@ pub(super) fn exit(verdict: &Verdict) -> Answer {
         Verdict::GoalReached => Exit::Yes,
         Verdict::Unsolvable | Verdict::NoPlan { .. } => Exit::No,
         Verdict::ReplanLimit | Verdict::TimeLimit => Exit::Limit,
+        Verdict::Interrupted => Exit::Interrupted,
         Verdict::WorldFailed { why } => {
             return Err(Failure::new(
                 format!("the world failed: {}", tame(why)),

@@ -69,6 +69,12 @@ pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> Strin
     )
 }
 
+/// For what is written down only where it is true.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "what serde asks for")]
+pub(crate) fn is_false(value: &bool) -> bool {
+    !value
+}
+
 /// A number that is different for different experiments: FNV-1a over all that they depend on.
 pub(crate) fn fingerprint(experiment: &impl Debug, trials: u64) -> String {
     let everything = format!("{trials} {experiment:?}");

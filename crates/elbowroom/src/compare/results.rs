@@ -29,6 +29,9 @@ pub struct Results {
     pub shards: u64,
     /// Which parts are in here.
     pub parts: Vec<u64>,
+    /// Whether somebody ended it before all trials of these parts were made.
+    #[serde(default, skip_serializing_if = "parts::is_false")]
+    pub is_interrupted: bool,
     /// The rows: executors.
     pub rows: Vec<String>,
     /// The columns.
@@ -89,6 +92,7 @@ impl Results {
             trials: part.trials,
             shards: part.shards,
             parts: vec![part.shard],
+            is_interrupted: false,
             cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
             pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
             rows,
@@ -164,12 +168,20 @@ impl Results {
             }
             cells
         });
+        let mut made = parts::made(self.trials, "each problem", self.shards, &self.parts);
+        if self.is_interrupted {
+            // All rows have the same trials.
+            let made_here = self.cells.first().map_or(0, |row| {
+                let runs = row.iter().map(|cell| cell.runs);
+                runs.sum::<u64>()
+            });
+            made = format!(
+                "interrupted after {made_here} trials of {made}; problems are taken one after the \
+                 other, and those that are missing may be harder or easier"
+            );
+        }
         Table {
-            caption: format!(
-                "{} ({})",
-                self.title,
-                parts::made(self.trials, "each problem", self.shards, &self.parts)
-            ),
+            caption: format!("{} ({made})", self.title),
             rows: rows.collect(),
             headings,
             notes: notes(&self.rows),
@@ -207,6 +219,7 @@ impl Partial for Results {
     }
 
     fn add(&mut self, other: &Self) {
+        self.is_interrupted |= other.is_interrupted;
         for (mine, theirs) in self
             .cells
             .iter_mut()

@@ -65,6 +65,9 @@ impl Setting<'_> {
     ) -> Result<Results, ExperimentError> {
         let experiment = self.experiment;
         let mut results = Results::empty(experiment, part);
+        if !goes_on() {
+            return Ok(results);
+        }
         let mut common = self.common(goes_on)?;
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
@@ -265,6 +268,7 @@ impl Setting<'_> {
             most_states: self.experiment.planner_states,
             improve_states: self.experiment.improve_states,
             clock: None,
+            goes_on: None,
         }
     }
 

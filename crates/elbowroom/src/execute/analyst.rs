@@ -35,7 +35,8 @@ impl Analyst {
             let plan = freed.deordered.plan.clone();
             let one = std::slice::from_ref(spec);
             match parametrize(task, plan, &freed.deordered.nominal, one) {
-                Ok(_) => fitting.push(spec.clone()),
+                // Numbers that the domain leaves open may be given by another specification.
+                Ok(_) | Err(ParametrizeError::NoNominal { .. }) => fitting.push(spec.clone()),
                 Err(ParametrizeError::NothingMatches { .. }) => {}
                 Err(error) if is_about_an_absent_action(task, spec, &error) => {}
                 Err(error) => return Err(error.to_string()),

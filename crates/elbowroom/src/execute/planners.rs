@@ -30,6 +30,8 @@ pub struct Embedded<'a> {
     pub improve_states: u64,
     /// What time it is, in seconds since whenever: where planning time is measured.
     pub clock: Option<&'a dyn Fn() -> Rational>,
+    /// Asked now and then whether to go on; without it, always.
+    pub goes_on: Option<&'a dyn Fn() -> bool>,
 }
 
 impl Planner for Embedded<'_> {
@@ -48,7 +50,8 @@ impl Embedded<'_> {
                 Some(_) => self.improve_states.min(self.most_states),
                 None => self.most_states,
             };
-            if progress.counts.evaluated >= limit {
+            let is_wanted = self.goes_on.is_none_or(|goes_on| goes_on());
+            if progress.counts.evaluated >= limit || !is_wanted {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -57,6 +60,9 @@ impl Embedded<'_> {
         match answer {
             embedded::Answer::Plan { found, .. } => PlanAnswer::Plan(found.plan),
             embedded::Answer::Unsolvable { .. } => PlanAnswer::Unsolvable,
+            _ if !self.goes_on.is_none_or(|goes_on| goes_on()) => PlanAnswer::NotFound {
+                why: "planning was interrupted".to_owned(),
+            },
             embedded::Answer::NoneFound { .. } => PlanAnswer::NotFound {
                 why: format!("no plan was found among {} states", self.most_states),
             },

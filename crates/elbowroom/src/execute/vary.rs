@@ -17,13 +17,12 @@ pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeErro
     let timed = task.timed().iter().map(|timed| timed.time.clone());
     let nominal: Vec<Rational> = [Rational::ZERO].into_iter().chain(timed).collect();
     for spec in specs {
-        if matches!(spec.target, Target::Unknown { .. }) {
-            continue;
-        }
         let is_about_the_problem = matches!(spec.target, Target::Initial(_) | Target::Timed { .. });
         match parametrize(task, plan.clone(), &nominal, std::slice::from_ref(spec)) {
             Ok(_) => {}
             Err(ParametrizeError::NothingMatches { .. }) if !is_about_the_problem => {}
+            // Another specification may have it; if not, that is said when there is a plan.
+            Err(ParametrizeError::NoNominal { .. }) => {}
             Err(error) if is_about_an_absent_action(task, spec, &error) => {}
             Err(ParametrizeError::UnknownName { name, .. }) if is_label(&name) => {}
             Err(error) => return Err(error),
@@ -32,14 +31,22 @@ pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeErro
     Ok(())
 }
 
-/// Whether a specification that fits nothing names an action of the domain, which the plan just
-/// does not use.
+/// Whether a specification that fits nothing names an action of the domain, or a number that one
+/// leaves open, and the plan just does not use it.
 pub(super) fn is_about_an_absent_action(
     task: &Task,
     spec: &VarySpec,
     error: &ParametrizeError,
 ) -> bool {
     let schemas = &task.problem().schemas;
+    if let Target::Unknown { name, .. } = &spec.target {
+        let short = name
+            .rsplit_once('.')
+            .map_or(name.as_str(), |(_, short)| short);
+        let mut numbers = schemas.iter().flat_map(|schema| &schema.unknowns);
+        return matches!(error, ParametrizeError::UnknownName { .. })
+            && numbers.any(|number| number.eq_ignore_ascii_case(short));
+    }
     let is_action = |word: &str| {
         let mut names = schemas.iter().map(|schema| schema.name.as_str());
         names.any(|name| name.eq_ignore_ascii_case(word))

@@ -67,7 +67,8 @@ impl Explainer<'_> {
         }
     }
 
-    fn constraint(&self, index: usize) -> String {
+    /// A constraint of the plan in words.
+    pub(super) fn constraint(&self, index: usize) -> String {
         let plan = &self.plan.plan;
         let constraint = &plan.constraints[index];
         let node = |id: NodeId| plan.node_words(self.task, id);

@@ -38,6 +38,7 @@ impl EmbeddedPlans {
             most_states: MOST_STATES,
             improve_states: 0,
             clock: None,
+            goes_on: None,
         };
         let mut task = (*self.task).clone();
         let situation = Situation {

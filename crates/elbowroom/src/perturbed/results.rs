@@ -24,6 +24,9 @@ pub struct PerturbedResults {
     pub shards: u64,
     /// Which parts are in here.
     pub parts: Vec<u64>,
+    /// Whether somebody ended it before all trials of these parts were made.
+    #[serde(default, skip_serializing_if = "parts::is_false")]
+    pub is_interrupted: bool,
     /// The rows: case by case, world by world.
     pub rows: Vec<Row>,
 }
@@ -40,6 +43,7 @@ impl PerturbedResults {
             trials: part.trials,
             shards: part.shards,
             parts: vec![part.shard],
+            is_interrupted: false,
             rows,
         }
     }
@@ -98,6 +102,7 @@ impl Partial for PerturbedResults {
     }
 
     fn add(&mut self, other: &Self) {
+        self.is_interrupted |= other.is_interrupted;
         for (mine, theirs) in self.rows.iter_mut().zip(&other.rows) {
             mine.merge(theirs);
         }

@@ -56,7 +56,9 @@ pub fn table(results: &PerturbedResults) -> Table {
     };
     let mut title = results.title.clone();
     let made = parts::made(results.trials, "each row", results.shards, &results.parts);
-    if made.starts_with("incomplete") {
+    if results.is_interrupted {
+        title = format!("{title} (interrupted; of {made})");
+    } else if made.starts_with("incomplete") {
         title = format!("{title} ({made})");
     }
     let caption = [title].into_iter();

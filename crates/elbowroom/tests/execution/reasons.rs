@@ -158,6 +158,9 @@ fn what_happens_by_itself_changes_the_plan() {
     assert_eq!(report.verdict, Verdict::Unsolvable);
     let irrelevant = "[[event]]\nfact = \"(unlocked shelf)\"\nbecomes = true\nconstant = 5\n";
     assert_eq!(scene.run("guarded", &scene.world(irrelevant), 0).replans, 0);
+    // Who lets what runs go on, waits for it.
+    let mut scene = scene;
+    scene.settings.running = RunningRule::Cancel;
     let helped = "[[event]]\nfact = \"(lies parcel office)\"\nbecomes = true\nconstant = 5\n\
                   [[event]]\nfact = \"(lies parcel shelf)\"\nbecomes = false\nconstant = 5\n";
     let report = scene.run("guarded", &scene.world(helped), 0);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom::execute::Analyst;
-use elbowroom::execution::run::{Report, Verdict};
+use elbowroom::execution::run::{Report, RunningRule, Verdict};
 use elbowroom::execution::{
     Cause, Command, Ending, Event, NoRecord, Observation, Passage, Ticket, World, WorldError,
 };
@@ -98,7 +98,8 @@ fn a_report_that_comes_twice_counts_once() {
 /// faster.
 #[test]
 fn a_success_after_a_cancel_counts() {
-    let scene = Scene::case("delivery");
+    let mut scene = Scene::case("delivery");
+    scene.settings.running = RunningRule::Cancel;
     let model = scene.world("[[duration]]\naction = \"(drive rover depot shelf)\"\nconstant = 5\n");
     let mut was_cancelled = false;
     let report = run(&scene, "fixed:10", &model, &mut |mut it| {

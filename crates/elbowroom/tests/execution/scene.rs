@@ -124,12 +124,13 @@ impl Scene {
         report
     }
 
-    fn planner(&self) -> Embedded<'static> {
+    pub(crate) fn planner(&self) -> Embedded<'static> {
         Embedded {
             settings: embedded::Settings::default(),
             most_states: self.states,
             improve_states: 256,
             clock: None,
+            goes_on: None,
         }
     }
 

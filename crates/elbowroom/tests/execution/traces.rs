@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom::execute::Analyst;
+use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
 use elbowroom::sim::SimWorld;
 use serde_json::json;
@@ -10,10 +11,16 @@ use serde_json::json;
 use crate::scene::{EXECUTORS, Scene};
 
 fn traced(scene: &Scene, executor: &str, seed: u64) -> String {
-    let model = scene.world(
+    traced_on_a_grid(scene, executor, seed, &Rational::new(1, 1000))
+}
+
+/// In a world whose times are multiples of the grid.
+fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -> String {
+    let mut model = scene.world(
         "[[duration]]\naction = \"*\"\nnormal = { mean = 1, deviation = 0.3, minimum = 0.2 }\n\
          relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.1\n",
     );
+    model.resolution = grid.clone();
     let mut text = String::new();
     let mut sink = |line: &str| text.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
@@ -75,4 +82,20 @@ fn a_trace_that_was_cut_off_anywhere_can_be_read_and_played_back() {
     for cut in (first..text.len()).step_by(997) {
         replayed(&scene, "guarded", &text[..cut]);
     }
+}
+
+/// Clocks of real worlds count in floats: each is read as what was written, to the last digit.
+#[test]
+fn times_with_seventeen_digits_are_played_back_without_differences() {
+    let scene = Scene::case("delivery");
+    let mut longest = 0;
+    for (seed, grid) in (0..20).zip([7_654_321, 3_000_017, 999_983].into_iter().cycle()) {
+        let text = traced_on_a_grid(&scene, "guarded", seed, &Rational::new(1, grid));
+        let agreed = replayed(&scene, "guarded", &text);
+        assert_eq!(agreed + 1, text.lines().count(), "{seed}");
+        let decimals = text.split("\"decimal\":").skip(1);
+        let digits = decimals.map(|rest| rest.find([',', '}']).unwrap_or(0));
+        longest = longest.max(digits.max().unwrap_or(0));
+    }
+    assert!(longest >= 17, "the floats are awkward: {longest}");
 }

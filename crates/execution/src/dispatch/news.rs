@@ -7,7 +7,7 @@ use elbowroom_stn::WindowEnd;
 use super::{Dispatch, explain};
 use crate::event::Ending;
 use crate::executor::{Moment, News};
-use crate::horizon::Missed;
+use crate::horizon::{Horizon, Missed};
 use crate::projection;
 use crate::reason::{Cause, Reason};
 
@@ -63,6 +63,7 @@ impl Dispatch {
         self.progress.happen(&self.plan, start, &local);
         self.progress.ready.remove(&start);
         self.retries.remove(&start);
+        self.told.remove(&id);
         if start == end {
             self.finish(id);
         }
@@ -96,6 +97,13 @@ impl Dispatch {
             }
         }
         let local = self.local(time);
+        if let Some(told) = self.told.remove(&id)
+            && let Horizon::Dispatchable(_) = self.horizon
+        {
+            // Nobody has said when it began, but it was told to.
+            let _ = self.horizon.fix(network_node(start), &told);
+            self.progress.happen(&self.plan, start, &told);
+        }
         let is_own = |end| self.is_limited_by_duration(id, end);
         let (is_own_lower, is_own_upper) = (is_own(WindowEnd::Earliest), is_own(WindowEnd::Latest));
         let fixed = self.horizon.fix(network_node(end), &local);

@@ -63,7 +63,7 @@ impl Dispatch {
             }
         }
         if !orders.is_empty() {
-            return self.order(&orders, moment.belief);
+            return self.order(&orders, &now, moment.belief);
         }
         let mut reason = Reason::new(Cause::NothingDue);
         reason.about = Some(match &wake {
@@ -85,14 +85,14 @@ impl Dispatch {
     }
 
     /// Starts these, unless one of them lacks what it needs.
-    fn order(&mut self, nodes: &[NodeId], belief: &Progression) -> Decided {
+    fn order(&mut self, nodes: &[NodeId], now: &Rational, belief: &Progression) -> Decided {
         let mut orders = Vec::new();
         for &node in nodes {
             let (Node::Start(id) | Node::Instant(id)) = self.plan.nodes[node.index()] else {
                 continue;
             };
             let action = self.action(id);
-            let duration = self.nominal_duration(id);
+            let duration = self.told_duration(id, now);
             if let Some(reason) = unmet(action, &duration, belief) {
                 if orders.is_empty() {
                     return replan(reason);
@@ -111,6 +111,7 @@ impl Dispatch {
             let id = InstanceId(order.step.0);
             self.progress.ready.remove(&self.ends[id.index()][0]);
             self.progress.running.insert(id);
+            self.told.insert(id, now.clone());
         }
         let mut reason = Reason::new(Cause::Due);
         reason.action = orders.first().map(|order| order.action.name.clone());
@@ -119,6 +120,31 @@ impl Dispatch {
             decision: Decision::Start(orders),
             reason,
         }
+    }
+
+    /// How long an action that starts now is told to take: as long as planned, or as near to that
+    /// as what is known allows.
+    fn told_duration(&self, id: InstanceId, now: &Rational) -> Rational {
+        let planned = self.nominal_duration(id);
+        let (least, most) = &self.durations[id.index()];
+        let end = network_node(self.ends[id.index()][1]);
+        if least == most || self.horizon.is_contingent(end) {
+            return planned;
+        }
+        let (earliest, latest) = self.horizon.window(end);
+        let least = earliest
+            .map(|earliest| earliest - now)
+            .into_iter()
+            .chain(least.clone())
+            .max();
+        let most = latest
+            .map(|latest| latest - now)
+            .into_iter()
+            .chain(most.clone())
+            .min();
+        let planned = least.map_or(planned.clone(), |least| planned.max(least));
+        most.map_or(planned.clone(), |most| planned.min(most))
+            .max(Rational::ZERO)
     }
 
     /// The node of a running instance that is to be observed next: its end, or still its start.

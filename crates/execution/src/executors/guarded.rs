@@ -14,7 +14,7 @@ pub(super) const REGISTERED: Registered = Registered {
     name: "guarded",
     argument: None,
     is_optional: false,
-    summary: "Dispatches within the windows that follow from the plan's envelope, and replans as \
+    summary: "Dispatches so that the plan works whatever happens within its envelope, and replans as \
               soon as an observed quantity leaves its interval, a running action outlives its \
               upper end, or too little time is left.",
     paper: "DREEX, Algorithm 2 in Cashmore et al. (2020)",

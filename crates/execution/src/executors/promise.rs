@@ -93,6 +93,10 @@ pub(super) fn weaken(
     if let Ok(((), promise)) = most(reads_numbers, !reads_numbers, &mut attempt) {
         return Ok(promise);
     }
+    if reason.cause == Cause::Unreachable {
+        // What cannot happen in time any more says more than what stands against each other.
+        return Err(Box::new(reason));
+    }
     let mut lost = Reason {
         cause: Cause::GuaranteeLost,
         ..reason

@@ -35,7 +35,7 @@ pub(super) struct Opened {
     pub(super) started: Option<Rational>,
     pub(super) ended: Option<(Rational, Ending)>,
     cancelled: Option<Rational>,
-    measured: [Vec<Measured>; 2],
+    pub(super) measured: [Vec<Measured>; 2],
 }
 
 /// Something that was done, as a step of a plan that the judge can look at.
@@ -121,6 +121,11 @@ impl Account {
         entry.ended = Some((time.clone(), ending.clone()));
         entry.measured[1] = measured.to_vec();
         self.open.remove(&ticket);
+    }
+
+    pub(super) fn is_cancelled(&self, ticket: Ticket) -> bool {
+        self.get(ticket)
+            .is_some_and(|entry| entry.cancelled.is_some())
     }
 
     pub(super) fn note_cancel(&mut self, ticket: Ticket, time: &Rational) {

@@ -1,6 +1,6 @@
 //! From one plan to the next.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use elbowroom_model::{RunningAction, Situation, Task};
@@ -16,7 +16,7 @@ impl Run<'_> {
     /// Brings what is running to where a new plan can begin: see [`RunningRule`].
     pub(super) fn settle(&mut self) -> Result<(), Stop> {
         match self.settings.running {
-            RunningRule::Keep => return self.cancel_what_has_not_started(),
+            RunningRule::Keep => return self.cancel_what_cannot_go_on(),
             RunningRule::Await => {}
             RunningRule::Cancel => {
                 let running: Vec<Ticket> = self.account.open_tickets().collect();
@@ -33,13 +33,28 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// A plan can only go on with what has started.
-    fn cancel_what_has_not_started(&mut self) -> Result<(), Stop> {
-        let open: Vec<Ticket> = self.account.open_tickets().collect();
-        for ticket in open {
-            if !self.belief.running().contains_key(&ticket) {
-                self.cancel(ticket)?;
-            }
+    /// A plan can only go on with what has started, and with what it may go on doing.
+    fn cancel_what_cannot_go_on(&mut self) -> Result<(), Stop> {
+        let breaking = self.belief.breaking().into_iter();
+        let breaking: BTreeSet<Ticket> = breaking.map(|(ticket, _)| ticket).collect();
+        let is_lost = |ticket: &Ticket| match self.belief.running().get(ticket) {
+            Some(underway) => breaking.contains(ticket) || !underway.broken_parts().is_empty(),
+            None => true,
+        };
+        let lost: Vec<Ticket> = self.account.open_tickets().filter(is_lost).collect();
+        for ticket in &lost {
+            self.cancel(*ticket)?;
+        }
+        // Until it has stopped, it counts as running.
+        let has_begun = |run: &Self| {
+            let mut lost = lost.iter();
+            lost.any(|ticket| run.belief.running().contains_key(ticket))
+        };
+        while has_begun(self)
+            && let Some(until) = self.next_silence()
+        {
+            self.pass(&until.max(self.now.clone()))?;
+            self.give_up_the_silent()?;
         }
         Ok(())
     }
@@ -85,6 +100,7 @@ impl Run<'_> {
             why_not,
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
         });
+        self.heed()?;
         match planned.answer {
             PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
             PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),

@@ -3,6 +3,7 @@
 use elbowroom_model::ground::{Action, Body, Change, Expression};
 use elbowroom_num::Rational;
 
+use super::dead_end::What;
 use super::{Run, Stop};
 use crate::event::{Ending, Event, Measured, Observation, Ticket};
 use crate::executor::{Amount, News, Planned};
@@ -34,7 +35,9 @@ impl Run<'_> {
         let (ticket, is_end) = match event {
             Event::Started { ticket, .. } => (*ticket, false),
             Event::Ended { ticket, .. } => (*ticket, true),
-            Event::Fact { .. } | Event::Value { .. } => return Planned::default(),
+            Event::Fact { .. } | Event::Value { .. } | Event::Unintelligible { .. } => {
+                return Planned::default();
+            }
         };
         let step = self.account.get(ticket).and_then(|entry| entry.step);
         let window = step.and_then(|step| self.ports.executor.window(step, is_end));
@@ -57,6 +60,7 @@ impl Run<'_> {
                     return Some("follows from other facts, and is not believed by itself");
                 }
                 if self.belief.see_fact(*fact, *truth) {
+                    self.note(&time, What::Fact(*fact, *truth));
                     self.news.push(News::Fact(*fact));
                 }
                 None
@@ -64,9 +68,13 @@ impl Run<'_> {
             Event::Value { fluent, value } => {
                 self.believe_until(&time);
                 if self.belief.see_value(*fluent, value) {
+                    self.note(&time, What::Value(*fluent, value.clone()));
                     self.news.push(News::Value(*fluent));
                 }
                 None
+            }
+            Event::Unintelligible { .. } => {
+                return Some("cannot be understood; nothing was made of it");
             }
         };
         remark.or(is_early.then_some("its time is in the future; taken as now"))
@@ -105,6 +113,7 @@ impl Run<'_> {
         let amounts = self.amounts(&action, false, Some(&planned), measured);
         // An effect that cannot be computed leaves its fluent as it was.
         let _ = self.belief.start(ticket, &action, &planned, measured);
+        self.note(time, What::Started(ticket));
         self.account.note_start(ticket, time, measured);
         match step {
             Some(step) => self.news.push(News::Started {
@@ -153,8 +162,10 @@ impl Run<'_> {
                 amounts = self.amounts(&action, true, Some(&took), measured);
             }
             let _ = self.belief.end(ticket, measured);
+            self.note(&time, What::Ended(ticket));
         } else {
             self.belief.stop(ticket);
+            self.note(&time, What::Stopped(ticket));
         }
         // An instantaneous action is over when it has started; what follows says nothing new.
         let is_over = self
@@ -269,6 +280,8 @@ impl Run<'_> {
                 continue;
             };
             self.belief.stop(ticket);
+            let now = self.now.clone();
+            self.note(&now, What::Stopped(ticket));
             // Whether its end took place is not known.
             if let Body::Durative(body) = &action.body {
                 self.belief.doubt(&body.end);

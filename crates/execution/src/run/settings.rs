@@ -23,12 +23,12 @@ pub struct RunSettings {
 }
 
 impl Default for RunSettings {
-    /// ε = 0.001; running actions are cancelled; planning takes as long as it takes; at most 10
+    /// ε = 0.001; running actions go on; planning takes as long as it takes; at most 10
     /// new plans, as in paper 1's experiments; a million seconds.
     fn default() -> Self {
         Self {
             epsilon: Rational::new(1, 1000),
-            running: RunningRule::Cancel,
+            running: RunningRule::Keep,
             planning_time: PlanningTime::Measured,
             most_replans: 10,
             patience: Patience::default(),
@@ -41,12 +41,13 @@ impl Default for RunSettings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunningRule {
     /// They are cancelled, and the plan begins when they have stopped. What `ROSPlan` does.
-    #[default]
     Cancel,
     /// They are awaited, and the plan begins when they have ended.
     Await,
     /// They go on, and the plan goes on with them: it takes them to last as long as they were
-    /// planned to, or, if they are overdue, a quarter longer than so far.
+    /// planned to, or, if they are overdue, a quarter longer than so far. Those whose over-all
+    /// condition has failed are cancelled: no plan can go on with them.
+    #[default]
     Keep,
 }
 
@@ -105,6 +106,8 @@ pub enum Verdict {
     ReplanLimit,
     /// The time was up.
     TimeLimit,
+    /// Somebody asked the run to end.
+    Interrupted,
     /// The outside world failed.
     WorldFailed {
         /// How.
@@ -121,6 +124,7 @@ impl Verdict {
             Self::NoPlan { .. } => "no-plan",
             Self::ReplanLimit => "replan-limit",
             Self::TimeLimit => "time-limit",
+            Self::Interrupted => "interrupted",
             Self::WorldFailed { .. } => "world-failed",
         }
     }
@@ -145,6 +149,9 @@ pub struct Report {
     pub replans: usize,
     /// Why.
     pub reasons: Vec<Reason>,
+    /// Where no plan reaches the goal any more: what can never become true again, and since when,
+    /// as far as that is known ([`Run::explaining`](super::Run::explaining)).
+    pub dead_end: Vec<Reason>,
     /// How many actions were started.
     pub starts: usize,
     /// What was done, with the times and amounts observed: a plan for the judge.

@@ -41,7 +41,7 @@ impl Reader {
         let rate = rate?;
         Some(match (operator, rate) {
             (UpdateOperator::Increase, rate) => rate,
-            (_, Expression::Constant(value)) => Expression::Constant(-value),
+            // Not worked out even if it is a number, so that it stays visible what was written.
             (_, rate) => Expression::Negate(Box::new(rate)),
         })
     }

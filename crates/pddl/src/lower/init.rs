@@ -15,6 +15,22 @@ use crate::syntax::Node;
 /// The place in the list of initial values of each fluent that has one.
 type Valued = BTreeMap<(FunctionId, Vec<ObjectId>), usize>;
 
+/// What a timed change is about.
+#[derive(PartialEq)]
+enum Subject<'a> {
+    Fact(PredicateId, &'a [ObjectId]),
+    Fluent(FunctionId, &'a [ObjectId]),
+}
+
+fn subject(change: &TimedChange) -> Subject<'_> {
+    match change {
+        TimedChange::Add(predicate, arguments) | TimedChange::Delete(predicate, arguments) => {
+            Subject::Fact(*predicate, arguments)
+        }
+        TimedChange::Assign(function, arguments, _) => Subject::Fluent(*function, arguments),
+    }
+}
+
 impl Reader {
     /// Reads the initial state and what happens to it.
     pub(super) fn init(&mut self, section: &Section) {
@@ -89,8 +105,29 @@ impl Reader {
             );
             self.initially(change, content.span, valued);
         } else {
+            self.refuse_contradiction(&time, &change, content);
             self.problem.timed.push(TimedInitial { time, change });
         }
+    }
+
+    /// Two changes of one time have no order (PDDL 2.1's rule of no moving targets), so one fact
+    /// cannot become both true and false, nor one fluent get two values.
+    fn refuse_contradiction(&mut self, time: &Rational, change: &TimedChange, content: &Node) {
+        let contradicts = |other: &TimedInitial| {
+            other.time == *time
+                && other.change != *change
+                && subject(&other.change) == subject(change)
+        };
+        if !self.problem.timed.iter().any(contradicts) {
+            return;
+        }
+        let message = match change {
+            TimedChange::Assign(..) => "a second value for this fluent at the same time",
+            _ => "this fact becomes both true and false at one time",
+        };
+        self.report
+            .error(content.span, message)
+            .help("what happens at one time has no order: leave one out, or give it another time");
     }
 
     /// What becomes so, at time 0 or later. `None`, with a report unless an object fluent is

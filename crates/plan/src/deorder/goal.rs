@@ -1,5 +1,9 @@
-//! Timed initials that change what the goal reads stay on their side of the plan's end.
+//! Timed initials that change what the goal reads stay on their side of the plan's end, unless all
+//! they do to it is to make facts as the goal needs them, and they need not be waited for.
 
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::{Change, Condition, FactId};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
@@ -24,10 +28,14 @@ pub(super) fn order(
     let Some(&last) = finals.iter().max_by_key(|&&node| time(node)) else {
         return;
     };
+    let wanted = wanted(task);
     for (node, what) in plan.nodes() {
         let Node::Timed(index) = what else {
             continue;
         };
+        if time(node) > time(last) && serves(&wanted, &task.timed()[index].changes) {
+            continue;
+        }
         if !Footprint::of_timed(&task.timed()[index]).writes_what_is_read_by(&goal) {
             continue;
         }
@@ -41,4 +49,43 @@ pub(super) fn order(
             order.demand(node, last, Rational::ZERO, Reason::Interference);
         }
     }
+}
+
+/// The facts that the goal reads in no other way than to need them true, or false.
+fn wanted(task: &Task) -> BTreeMap<FactId, Option<bool>> {
+    let mut wanted: BTreeMap<FactId, Option<bool>> = BTreeMap::new();
+    let mut note = |fact: FactId, truth: Option<bool>| {
+        let known = wanted.entry(fact).or_insert(truth);
+        if *known != truth {
+            *known = None;
+        }
+    };
+    for conjunct in task.goal().conjuncts() {
+        let literal = match conjunct {
+            Condition::Fact(fact) => Some((*fact, true)),
+            Condition::Not(part) => match **part {
+                Condition::Fact(fact) => Some((fact, false)),
+                _ => None,
+            },
+            _ => None,
+        };
+        match literal.filter(|(fact, _)| !task.is_derived(*fact)) {
+            Some((fact, truth)) => note(fact, Some(truth)),
+            None => task.visit_facts_of(conjunct, &mut |fact| note(fact, None)),
+        }
+    }
+    wanted
+}
+
+/// Whether the changes do nothing to the facts of the goal but what it wants, and nothing to
+/// numbers. As the goal holds before them, it holds after them.
+fn serves(wanted: &BTreeMap<FactId, Option<bool>>, changes: &[Change]) -> bool {
+    changes.iter().all(|change| {
+        let (fact, truth) = match change {
+            Change::Add(fact) => (fact, true),
+            Change::Delete(fact) => (fact, false),
+            Change::Update { .. } => return false,
+        };
+        wanted.get(fact).is_none_or(|wanted| *wanted == Some(truth))
+    })
 }

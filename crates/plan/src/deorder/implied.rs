@@ -66,6 +66,32 @@ pub fn without_implied(mut plan: StnPlan) -> StnPlan {
     plan
 }
 
+/// The plan with those of the sides that its other constraints do not imply.
+pub(super) fn with_sides(mut plan: StnPlan, mut sides: Vec<Constraint>) -> StnPlan {
+    // As above, but sides are least distances and may be given up: none makes another needless.
+    let mut network = Network::with_nodes(plan.nodes.len());
+    for constraint in &plan.constraints {
+        let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+        let lower = match &constraint.lower {
+            _ if is_set(&plan, constraint) => Rational::ZERO,
+            Bound::Finite(lower) => lower.clone(),
+            Bound::Infinite | Bound::Parameter(_) => continue,
+        };
+        network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
+    }
+    if let Ok(network) = ConsistentNetwork::try_from(network) {
+        sides.retain(|side| {
+            let back = network.distance(network_node(side.to), network_node(side.from));
+            match (&side.lower, back) {
+                (Bound::Finite(lower), Some(back)) => -back < *lower,
+                _ => true,
+            }
+        });
+    }
+    plan.constraints.extend(sides);
+    plan
+}
+
 /// Whether the constraint says how long an action takes or when a timed initial happens.
 fn is_set(plan: &StnPlan, constraint: &Constraint) -> bool {
     match constraint.reason {

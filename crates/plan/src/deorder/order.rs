@@ -138,14 +138,12 @@ impl<'a> Timeline<'a> {
     pub(super) fn writers(&self, quantity: Quantity) -> Vec<Writer> {
         let uses = self.uses.get(&quantity).into_iter().flatten();
         let writers: Vec<_> = uses.copied().filter(|(_, what)| what.writes()).collect();
-        let in_run = |(run, nodes): (usize, Vec<NodeId>)| {
-            nodes.into_iter().map(move |node| Writer { node, run })
+        let chunks = writers.chunk_by(|(_, a), (_, b)| a.commutes_with(*b));
+        let in_run = |(run, uses): (usize, &'_ [(NodeId, Use)])| {
+            let writer = |&(node, what): &(NodeId, Use)| Writer { node, run, what };
+            uses.iter().map(writer).collect::<Vec<_>>()
         };
-        runs(&writers)
-            .into_iter()
-            .enumerate()
-            .flat_map(in_run)
-            .collect()
+        chunks.enumerate().flat_map(in_run).collect()
     }
 }
 
@@ -153,6 +151,19 @@ impl<'a> Timeline<'a> {
 pub(super) struct Writer {
     pub(super) node: NodeId,
     pub(super) run: usize,
+    what: Use,
+}
+
+impl Writer {
+    /// Whether the fact is true after it: what makes it both false and true makes it true.
+    pub(super) fn makes_true(&self) -> bool {
+        self.what.0 & Use::ADD != 0
+    }
+
+    /// Whether it does nothing to the fluent but increase and decrease it.
+    pub(super) fn is_shift(&self) -> bool {
+        self.what.0 == Use::ADD
+    }
 }
 
 /// Cuts a sequence of uses where neighbours do not commute.

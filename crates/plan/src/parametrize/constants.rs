@@ -2,7 +2,7 @@
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
-use elbowroom_model::problem::{FunctionId, Unknown};
+use elbowroom_model::problem::{self, FunctionId, Unknown};
 use elbowroom_num::Rational;
 
 use crate::parameter::ParameterId;
@@ -60,9 +60,10 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
                     rewrite_condition(task, &mut body.over_all, function, replace);
                 }
                 Place::Effects(function) => {
+                    let is_decrease = only_decreases(task, &action.schema, function);
                     for effect in &mut body.continuous {
                         if task.function_of(effect.fluent) == function {
-                            effect.rate = effect.rate.map_leaves(&mut |leaf| replace(leaf));
+                            effect.rate = rewrite_rate(&effect.rate, is_decrease, replace);
                         }
                     }
                 }
@@ -70,6 +71,36 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
         }
     }
     action
+}
+
+/// Whether the action changes the function continuously, and in no other direction than down as far
+/// as the words go: `(decrease (charge) (* #t 2))`.
+fn only_decreases(task: &Task, schema: &problem::SchemaId, function: FunctionId) -> bool {
+    let problem::Body::Durative { continuous, .. } = &task.problem().schemas[schema.index()].body
+    else {
+        return false;
+    };
+    let mut own = continuous
+        .iter()
+        .filter(|effect| effect.fluent.function == function)
+        .peekable();
+    own.peek().is_some() && own.all(|effect| matches!(effect.rate, problem::Expression::Negate(_)))
+}
+
+/// The numbers of a decrease are those that it names, not those of the rate.
+fn rewrite_rate(rate: &Expression, is_decrease: bool, replace: Replace<'_>) -> Expression {
+    if !is_decrease {
+        return rate.map_leaves(&mut |leaf| replace(leaf));
+    }
+    negated(&negated(rate).map_leaves(&mut |leaf| replace(leaf)))
+}
+
+fn negated(expression: &Expression) -> Expression {
+    match expression {
+        Expression::Constant(value) => Expression::Constant(-value),
+        Expression::Negate(part) => (**part).clone(),
+        _ => Expression::Negate(Box::new(expression.clone())),
+    }
 }
 
 fn rewrite_snap(task: &Task, snap: &mut SnapAction, place: Place, replace: Replace<'_>) {

@@ -1,6 +1,6 @@
 //! A plan whose quantities are being opened, one specification after another.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::FluentId;
@@ -30,6 +30,8 @@ pub(super) struct Opening<'a> {
     pub(super) plan: ParametrizedPlan,
     pub(super) opened: BTreeMap<Quantity, ParameterId>,
     open_numbers: BTreeMap<OpenNumber, ParameterId>,
+    /// Instances whose durations the executor chooses.
+    pub(super) controllable: BTreeSet<InstanceId>,
 }
 
 impl<'a> Opening<'a> {
@@ -48,6 +50,7 @@ impl<'a> Opening<'a> {
             plan,
             opened: BTreeMap::new(),
             open_numbers: BTreeMap::new(),
+            controllable: BTreeSet::new(),
         })
     }
 
@@ -63,6 +66,11 @@ impl<'a> Opening<'a> {
             Target::Duration(selection) => {
                 let instances = select::instances(self.task, &self.plan.plan, spec, selection)?;
                 self.open_durations(spec, &instances)
+            }
+            Target::Controllable(selection) => {
+                let instances = select::instances(self.task, &self.plan.plan, spec, selection)?;
+                self.controllable.extend(instances);
+                Ok(())
             }
             Target::Constant(target) => self.open_constants(spec, target, Place::Effects),
             Target::Condition(target) => self.open_constants(spec, target, Place::Conditions),

@@ -17,6 +17,9 @@ impl Opening<'_> {
         instances: &[InstanceId],
     ) -> Result<(), ParametrizeError> {
         for &id in instances {
+            if self.controllable.contains(&id) {
+                continue;
+            }
             let plan = &self.plan.plan;
             let instance = plan.instance(id);
             if instance.action.durative().is_none() {

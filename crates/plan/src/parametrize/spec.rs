@@ -31,6 +31,8 @@ pub enum Target {
     Durations,
     /// The durations of these.
     Duration(Selection),
+    /// Nothing: the executor chooses how long these take, so that their durations are not open.
+    Controllable(Selection),
     /// A constant in the effects of these on a function.
     Constant(ConstantTarget),
     /// A constant that the conditions of these compare a function with.
@@ -132,6 +134,7 @@ impl<'a> Words<'a> {
         match keyword.as_str() {
             "durations" => Ok(Target::Durations),
             "duration" => Ok(Target::Duration(self.selection()?)),
+            "controllable" => Ok(Target::Controllable(self.selection()?)),
             "constant" => Ok(Target::Constant(self.constant()?)),
             "condition" => Ok(Target::Condition(self.constant()?)),
             "initial" => Ok(Target::Initial(self.atom()?)),

@@ -80,6 +80,10 @@ pub fn entry(task: &Task, entry: &Entry<'_>) -> Value {
             "why_not": why_not,
             "unsolvable": is_unsolvable,
         }),
+        Entry::Interrupted { now } => json!({
+            "event": "interrupted",
+            "now": number(now),
+        }),
         Entry::Over(over) => {
             let mut over = report(over);
             over["event"] = "over".into();
@@ -96,6 +100,7 @@ pub fn report(report: &Report) -> Value {
         "time": number(&report.time),
         "replans": report.replans,
         "reasons": report.reasons.iter().map(reason).collect::<Value>(),
+        "dead_end": report.dead_end.iter().map(reason).collect::<Value>(),
         "starts": report.starts,
         "executed": report.executed.iter().map(executed).collect::<Value>(),
     })

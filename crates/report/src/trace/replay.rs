@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
     Command, Entry, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World, WorldError,
@@ -272,6 +273,7 @@ pub struct Replay {
     stored: VecDeque<Value>,
     line: usize,
     difference: Option<Difference>,
+    is_to_end: Arc<AtomicBool>,
 }
 
 impl Replay {
@@ -282,7 +284,25 @@ impl Replay {
             stored: stored.entries.iter().cloned().collect(),
             line: 1,
             difference: None,
+            is_to_end: Arc::default(),
         }
+        .looking_ahead()
+    }
+
+    /// Whether somebody asked the run to end at the point that the replay has reached.
+    pub fn interruption(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.is_to_end)
+    }
+
+    fn looking_ahead(self) -> Self {
+        self.look_ahead();
+        self
+    }
+
+    fn look_ahead(&self) {
+        let next = self.stored.front().and_then(|entry| entry.get("event"));
+        let is_to_end = next.and_then(Value::as_str) == Some("interrupted");
+        self.is_to_end.store(is_to_end, Ordering::SeqCst);
     }
 
     /// How many entries agreed, and the first difference, if there is one.
@@ -300,6 +320,7 @@ impl Recorder for Replay {
         let Some(stored) = self.stored.pop_front() else {
             return;
         };
+        self.look_ahead();
         let replayed = super::entry(&self.task, recorded);
         if stored == replayed {
             self.line += 1;

@@ -1,33 +1,113 @@
-//! An envelope as people read it.
+//! The answer as people read it.
+
+mod example;
 
 use std::fmt::Write as _;
 
-use elbowroom::plan::{ParameterId, ParameterKind, Valuation};
+use elbowroom::answers::envelope::{
+    EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind,
+    Range, Room, Stop,
+};
 
-use super::Subject;
-use super::search::Outcome;
-use super::watch::Stop;
-use crate::limits::{self, Limit, push_paragraph};
-use crate::look::{FAINT, Look, STRONG, styled};
+use elbowroom::num::Rational;
+
+use crate::limits::{self, push_paragraph, push_wrapped};
+use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::table::{self, Row};
 use crate::{number, output};
+use example::{example, what};
+
+/// The answer, whatever it is.
+pub(super) fn text(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+    let file = &request.name;
+    match &outcome.answer.finding {
+        EnvelopeFinding::Envelope { .. } => envelope(request, outcome, look),
+        EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
+            let mut text = no_room(file, FAILS);
+            push_wrapped(&mut text, &violation.message, 2, look.width);
+            text
+        }
+        EnvelopeFinding::Fails(Failing::AsPlanned { .. }) => fails(request, outcome, look),
+        EnvelopeFinding::Inside { .. } => format!(
+            "{}: {file} works everywhere in this box\n",
+            styled(GOOD, "inside"),
+        ),
+        EnvelopeFinding::Outside { .. } => {
+            let mut text = format!(
+                "{}: {file} does not work everywhere in this box\n",
+                styled(BAD, "outside"),
+            );
+            push_reason(&mut text, request, outcome, look);
+            text
+        }
+        EnvelopeFinding::None { .. } => {
+            "nothing is known yet: the search was stopped before it began\n".to_owned()
+        }
+    }
+}
+
+const FAILS: &str = "fails even if everything goes as planned";
+const CAN_FAIL: &str = "can fail even if everything goes as planned";
+
+fn no_room(file: &str, fails: &str) -> String {
+    format!("{}: {file} {fails}\n", styled(BAD, "no elbow room"))
+}
+
+/// The plan fails as planned, or can.
+fn fails(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+    let has_schedule = outcome
+        .why_not
+        .as_ref()
+        .is_some_and(|why| why.schedule.is_some());
+    let fails = if has_schedule { CAN_FAIL } else { FAILS };
+    let mut text = no_room(&request.name, fails);
+    match &outcome.why_not {
+        Some(why_not) if !has_schedule => {
+            push_wrapped(&mut text, &what(why_not), 2, look.width);
+        }
+        _ => push_reason(&mut text, request, outcome, look),
+    }
+    text
+}
+
+/// Why the plan does not work, with an example.
+fn push_reason(
+    text: &mut String,
+    request: &EnvelopeRequest,
+    outcome: &EnvelopeOutcome,
+    look: Look,
+) {
+    if let (Some(why_not), Some(plan)) = (&outcome.why_not, &outcome.plan) {
+        push_wrapped(text, &what(why_not), 2, look.width);
+        if why_not.plays.is_empty() {
+            text.push_str(&example(&request.task, plan, why_not, look));
+            return;
+        }
+        let title = "Whatever an executor does, the world can spoil it";
+        let _ = write!(text, "\n{}\n", styled(STRONG, title));
+        for play in &why_not.plays {
+            push_wrapped(text, play, 2, look.width);
+        }
+    }
+}
 
 /// The table, what it means, what limits it, and how it was found.
-pub(super) fn envelope(subject: &Subject<'_>, outcome: &Outcome, look: Look) -> String {
-    let rows: Vec<Row> = subject
-        .plan
-        .parameters
-        .iter()
-        .enumerate()
-        .map(|(index, parameter)| Row {
-            name: parameter.name.clone(),
-            quantity: quantity(subject, ParameterId::from(index)),
-            nominal: parameter.nominal.clone(),
-            interval: outcome.envelope.intervals[index].clone(),
-        })
-        .collect();
-    let mut text = title(subject);
-    text.push('\n');
+fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+    let EnvelopeFinding::Envelope {
+        parameters,
+        makespans,
+        stop,
+        checks,
+        widenings,
+        foresight,
+        seconds,
+    } = &outcome.answer.finding
+    else {
+        return String::new();
+    };
+    let rows: Vec<Row> = parameters.iter().map(row).collect();
+    let title = format!("Elbow room of {}", request.name);
+    let mut text = format!("{}\n\n", styled(STRONG, &title));
     if rows.is_empty() {
         text.push_str(" Nothing in this plan is left open. It works as it is.\n");
         return text;
@@ -36,33 +116,74 @@ pub(super) fn envelope(subject: &Subject<'_>, outcome: &Outcome, look: Look) -> 
     text.push('\n');
     push_paragraph(&mut text, meaning(&rows), look.width);
     text.push('\n');
-    let limits = limits::render(&limits_of(subject, outcome), look);
+    let limits = limits::render(&outcome.answer.limits(), look);
     if !limits.is_empty() {
         text.push_str(&limits);
         text.push('\n');
     }
-    if let Some(makespan) = makespan(subject, outcome) {
-        push_paragraph(&mut text, &makespan, look.width);
+    if let Some(foresight) = foresight {
+        push_paragraph(&mut text, &worth(foresight), look.width);
     }
+    if let Some(makespans) = makespans {
+        push_paragraph(&mut text, &makespan(makespans), look.width);
+    }
+    let course = format!(
+        "{}. {}, {}, {}.",
+        ended(request, *stop),
+        output::counted(*checks, "check"),
+        output::counted(widenings.len(), "widening"),
+        duration(*seconds)
+    );
     let mut how = String::new();
-    push_paragraph(&mut how, &course(subject, outcome), look.width);
+    push_paragraph(&mut how, &course, look.width);
     text.push_str(&styled(FAINT, how.trim_end()));
     text.push('\n');
     text
 }
 
-fn title(subject: &Subject<'_>) -> String {
-    let title = format!("Elbow room of {}", subject.file());
-    format!("{}\n", styled(STRONG, &title))
+/// What foresight would be worth, in one sentence.
+fn worth(foresight: &Foresight) -> String {
+    /// Of a long list only the first are named.
+    const MOST_NAMED: usize = 4;
+    let more = &foresight.weak_width.0 - &foresight.width.0;
+    let much = if foresight.width.0.is_zero() {
+        format!("{} wider", number::nearest(&more))
+    } else {
+        let share = more / &foresight.width.0 * Rational::from(100);
+        format!("{} % wider", number::nearest(&share.ceil()))
+    };
+    let named: Vec<&str> = foresight
+        .unknown
+        .iter()
+        .take(MOST_NAMED)
+        .map(String::as_str)
+        .collect();
+    let others = foresight.unknown.len() - named.len();
+    let others = match others {
+        0 => String::new(),
+        others => format!(" and {others} more"),
+    };
+    format!(
+        "Who knew {}{others} in advance would have {much} intervals in sum (--guarantee weak).",
+        named.join(", ")
+    )
 }
 
-/// A parameter in plain words; the duration of an action goes without saying.
-fn quantity(subject: &Subject<'_>, id: ParameterId) -> String {
-    match subject.plan.parameter(id).kind {
-        ParameterKind::Duration(instance) => {
-            subject.plan.plan.instance(instance).action.name.clone()
-        }
-        _ => subject.explainer.quantity(id),
+fn row(room: &Room) -> Row {
+    Row {
+        name: room.range.quantity.name.clone(),
+        quantity: quantity(&room.range).to_owned(),
+        nominal: room.range.quantity.nominal.clone(),
+        interval: room.range.interval(),
+    }
+}
+
+/// A quantity in plain words; the duration of an action goes without saying.
+fn quantity(range: &Range) -> &str {
+    let words = &range.quantity.quantity;
+    match range.quantity.kind {
+        QuantityKind::Duration => words.strip_prefix("duration of ").unwrap_or(words),
+        _ => words,
     }
 }
 
@@ -75,72 +196,42 @@ fn meaning(rows: &[Row]) -> &'static str {
     }
 }
 
-fn limits_of(subject: &Subject<'_>, outcome: &Outcome) -> Vec<Limit> {
-    let parameters = subject.plan.parameters.iter().zip(&outcome.limits);
-    parameters
-        .flat_map(|(parameter, [lower, upper])| {
-            [(false, lower), (true, upper)].map(|(is_upper, reason)| {
-                reason.as_ref().map(|reason| Limit {
-                    parameter: parameter.name.clone(),
-                    is_upper,
-                    reason: reason.clone(),
-                })
-            })
-        })
-        .flatten()
-        .collect()
-}
-
 /// When the plan is done, with everything started as early as possible.
-fn makespan(subject: &Subject<'_>, outcome: &Outcome) -> Option<String> {
-    let end = |values: Option<Valuation>| {
-        values.and_then(|values| elbowroom::earliest_end(subject.plan, &values))
-    };
-    let intervals = &outcome.envelope.intervals;
-    let at_least: Option<Valuation> = intervals.iter().map(|i| i.lower.value().cloned()).collect();
-    let at_most: Option<Valuation> = intervals.iter().map(|i| i.upper.value().cloned()).collect();
-    let nominal = end(Some(subject.plan.nominal()))?;
-    let mut line = format!("Done at {} as planned", number::nearest(&nominal));
-    if let Some(shortest) = end(at_least) {
-        let _ = write!(
-            line,
-            ", at {} with all at their lower ends",
-            number::nearest(&shortest)
-        );
-    }
-    if let Some(longest) = end(at_most) {
-        let _ = write!(
-            line,
-            ", at {} with all at their upper ends",
-            number::nearest(&longest)
-        );
+fn makespan(makespans: &Makespans) -> String {
+    let mut line = format!("Done at {} as planned", number::nearest(&makespans.nominal));
+    for (time, which) in [
+        (&makespans.at_lower, "lower"),
+        (&makespans.at_upper, "upper"),
+    ] {
+        if let Some(time) = time {
+            let time = number::nearest(time);
+            let _ = write!(line, ", at {time} with all at their {which} ends");
+        }
     }
     line.push_str(", if started as early as possible.");
-    Some(line)
+    line
 }
 
-/// How the search went, in one line.
-fn course(subject: &Subject<'_>, outcome: &Outcome) -> String {
-    let ended = match outcome.stop {
-        Stop::Converged if subject.arguments.sharpen => "Each end touches its limit".to_owned(),
+/// How the search ended.
+fn ended(request: &EnvelopeRequest, stop: Stop) -> String {
+    match stop {
+        Stop::Converged if request.search.sharpen => "Each end touches its limit".to_owned(),
         Stop::Converged => format!(
             "Steps below {} were not tried (--sharpen moves each end onto its limit)",
-            number::nearest(&subject.arguments.precision)
+            number::nearest(&request.search.precision)
         ),
         Stop::CheckLimit | Stop::TimeLimit => {
             "The time limit came before the search was done; the intervals could be wider"
                 .to_owned()
         }
+        Stop::Undecided => {
+            "Some wider boxes have too many cases to tell apart; the intervals could be wider"
+                .to_owned()
+        }
         Stop::Cancelled => {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
         }
-    };
-    format!(
-        "{ended}. {}, {}, {}.",
-        output::counted(outcome.checks, "check"),
-        output::counted(outcome.widenings.len(), "widening"),
-        duration(outcome.seconds)
-    )
+    }
 }
 
 fn duration(seconds: f64) -> String {

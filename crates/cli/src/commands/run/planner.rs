@@ -86,11 +86,13 @@ impl Who {
         texts: &Texts,
         choices: &Choices,
         model: Option<&WorldModel>,
+        interrupt: &Interrupt,
         run: impl FnOnce(Planning<'_>) -> Report,
     ) -> Report {
         let epsilon = &choices.settings.epsilon;
         let clock = Clock::start();
         let seconds = || clock.seconds();
+        let goes_on = || !interrupt.is_requested();
         let mut embedded = Embedded {
             settings: embedded::Settings {
                 epsilon: epsilon.clone(),
@@ -99,6 +101,7 @@ impl Who {
             most_states: arguments.planner_states,
             improve_states: arguments.improve_states,
             clock: Some(&seconds),
+            goes_on: Some(&goes_on),
         };
         match self {
             Self::Nobody => run(Planning {
@@ -120,8 +123,6 @@ impl Who {
                 }
             },
             Self::Another(planner) => {
-                // The first Ctrl-C ends the planner with all that belongs to it.
-                let interrupt = Interrupt::listen();
                 let given = arguments.planner_time.as_ref();
                 let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
                 let mut planner = External {
@@ -134,7 +135,8 @@ impl Who {
                         ..external::Settings::default()
                     },
                     takes_first: limit.is_none(),
-                    goes_on: &|| !interrupt.is_requested(),
+                    // The first Ctrl-C ends the planner with all that belongs to it.
+                    goes_on: &goes_on,
                 };
                 run(Planning {
                     planner: &mut planner,
@@ -155,6 +157,7 @@ pub(super) fn odds(model: &WorldModel, states: (u64, u64), choices: &Choices) ->
         most_states: states.0,
         improve_states: states.1,
         clock: None,
+        goes_on: None,
     };
     let time = expected_planning_time(choices);
     Box::new(Likeliest::new(model.clone(), planner, time))

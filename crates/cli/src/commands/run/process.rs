@@ -6,7 +6,7 @@ use std::process::{Child, Command as Program, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::execution::{Command, Event, Observation, Passage, World, WorldError};
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
@@ -15,18 +15,44 @@ use serde_json::{Value, json};
 
 use crate::clock::Clock;
 use crate::exit::Failure;
+use crate::interrupt::Interrupt;
 use crate::output::{excerpt, plain};
 use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 
 /// How long a program has to end when the run is over.
 const FAREWELL: Duration = Duration::from_secs(1);
 
+/// How long a program has, when the user has asked to end, to obey before it is told to stop.
+const OBEDIENCE: Duration = Duration::from_secs(5);
+
+/// How often it is looked whether the user has asked to end.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// How the program is treated.
+pub(super) struct Manners {
+    /// How long it may take over one answer, in seconds.
+    pub(super) patience: Rational,
+    /// Whether what cannot be understood ends the run.
+    pub(super) is_strict: bool,
+}
+
 /// A child process that is told what to start, and reports what happens.
+///
+/// When the user asks to end, a wait ends at once, though its answer is still to come; it is then
+/// the answer to the next wait.
 pub(super) struct ProcessWorld {
     child: Child,
     mouth: Mouth,
     ears: Ears,
     patience: Duration,
+    is_strict: bool,
+    interrupt: Interrupt,
+    /// When a wait was ended because the user has asked to end.
+    hurried: Option<Clock>,
+    /// Whether a question was asked that has not been answered.
+    is_asked: bool,
+    /// The last time it said it is.
+    now: Rational,
     /// There is no use in telling it anything more.
     is_deaf: bool,
     names: Names,
@@ -35,12 +61,12 @@ pub(super) struct ProcessWorld {
 }
 
 impl ProcessWorld {
-    /// Starts the program, with the words of `command` as its arguments. `patience` is how long it
-    /// may take over one answer, in seconds.
+    /// Starts the program, with the words of `command` as its arguments.
     pub(super) fn start(
         command: &str,
         task: &Arc<Task>,
-        patience: &Rational,
+        manners: &Manners,
+        interrupt: Interrupt,
     ) -> Result<Self, Failure> {
         let cannot = |why: String| {
             Failure::new(
@@ -53,12 +79,15 @@ impl ProcessWorld {
         let program = words
             .next()
             .ok_or_else(|| cannot("the command is empty".to_owned()))?;
-        let mut child = Program::new(program)
+        let mut program = Program::new(program);
+        program
             .args(words)
             .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(|error| cannot(plain(&error)))?;
+            .stdout(Stdio::piped());
+        // Ctrl-C is for this program, which then ends that one in order.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut program, 0);
+        let mut child = program.spawn().map_err(|error| cannot(plain(&error)))?;
         let (Some(stdin), Some(stdout)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(cannot(
                 "its standard input and output are not there".to_owned(),
@@ -68,7 +97,13 @@ impl ProcessWorld {
             child,
             mouth: Mouth::new(stdin),
             ears: Ears::new(stdout),
-            patience: Duration::try_from_secs_f64(patience.to_f64()).unwrap_or(Duration::MAX),
+            patience: Duration::try_from_secs_f64(manners.patience.to_f64())
+                .unwrap_or(Duration::MAX),
+            is_strict: manners.is_strict,
+            interrupt,
+            hurried: None,
+            is_asked: false,
+            now: Rational::ZERO,
             is_deaf: false,
             names: Names::of(task),
             task: Arc::clone(task),
@@ -98,7 +133,7 @@ impl ProcessWorld {
     }
 
     fn tell(&mut self, message: &Value) -> Result<(), WorldError> {
-        match self.tell_within(message, self.patience) {
+        match self.tell_within(message, self.left()) {
             Told::Yes => Ok(()),
             Told::NobodyReads => Err(WorldError::new(format!(
                 "it has not read what it was told within {} s; --answer-within says how long to \
@@ -115,24 +150,48 @@ impl ProcessWorld {
         told
     }
 
+    /// How long it may take over something that begins now.
+    fn left(&self) -> Duration {
+        match self.hurried {
+            Some(since) => self.patience.min(OBEDIENCE.saturating_sub(since.elapsed())),
+            None => self.patience,
+        }
+    }
+
+    /// Asks a question, unless one is open already, and listens.
+    fn ask(&mut self, question: &Value) -> Result<Passage, WorldError> {
+        if !self.is_asked {
+            self.tell(question)?;
+            self.is_asked = true;
+        }
+        self.hear()
+    }
+
     /// Everything up to the message that says what time it is.
     fn hear(&mut self) -> Result<Passage, WorldError> {
-        let clock = Clock::start();
+        let (clock, patience) = (Clock::start(), self.left());
         let mut observations = Vec::new();
         let mut said = 0;
+        // What it said last that could not be understood.
+        let mut babble = None;
         loop {
-            let line = match self
-                .ears
-                .hear(self.patience.saturating_sub(clock.elapsed()))
-            {
+            let left = patience.saturating_sub(clock.elapsed());
+            let line = match self.ears.hear(left.min(GLANCE)) {
                 Heard::Line(line) => line,
                 Heard::EndlessLine => return Err(endless_line()),
                 Heard::TooMuch => return Err(babbles()),
+                Heard::Nothing if self.hurried.is_none() && self.interrupt.is_requested() => {
+                    self.hurried = Some(Clock::start());
+                    let now = self.now.clone();
+                    return Ok(Passage { now, observations });
+                }
+                Heard::Nothing if left > GLANCE => continue,
                 Heard::Nothing => {
                     return Err(WorldError::new(format!(
                         "it has not ended its answer with `time` within {} s; --answer-within \
-                         says how long to wait",
-                        self.patience.as_secs_f64()
+                         says how long to wait{}",
+                        patience.as_secs_f64(),
+                        babble.unwrap_or_default()
                     )));
                 }
                 Heard::End => return Err(self.gone()),
@@ -146,13 +205,28 @@ impl ProcessWorld {
                 continue;
             }
             match self.read(line) {
-                Ok(Said::Time(now)) => return Ok(Passage { now, observations }),
+                Ok(Said::Time(now)) => {
+                    self.is_asked = false;
+                    self.now.clone_from(&now);
+                    return Ok(Passage { now, observations });
+                }
                 Ok(Said::Observation(observation)) => observations.push(observation),
                 Err(why) => {
-                    return Err(WorldError::new(format!(
-                        "it said `{}`: {why}",
-                        excerpt(line)
-                    )));
+                    let said = excerpt(line);
+                    if self.is_strict {
+                        return Err(WorldError::new(format!("it said `{said}`: {why}")));
+                    }
+                    babble = Some(format!("; it said `{said}`: {why}"));
+                    observations.push(Observation {
+                        time: self.now.clone(),
+                        event: Event::Unintelligible { said, why },
+                    });
+                    if is_time(line) {
+                        // It has ended its answer, whatever time it may be.
+                        self.is_asked = false;
+                        let now = self.now.clone();
+                        return Ok(Passage { now, observations });
+                    }
                 }
             }
         }
@@ -211,6 +285,12 @@ fn babbles() -> WorldError {
     ))
 }
 
+/// Whether a line is a message that ends an answer, right or wrong.
+fn is_time(line: &str) -> bool {
+    let message = serde_json::from_str::<Value>(line).unwrap_or_default();
+    message.get("type").and_then(Value::as_str) == Some("time")
+}
+
 /// One line, understood.
 enum Said {
     Time(Rational),
@@ -239,8 +319,7 @@ impl World for ProcessWorld {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        self.tell(&json!({ "type": "wait", "until": wire::number(until) }))?;
-        let mut passage = self.hear()?;
+        let mut passage = self.ask(&json!({ "type": "wait", "until": wire::number(until) }))?;
         // Who counts in floats has come as far as a float can.
         if passage.now.to_f64().total_cmp(&until.to_f64()).is_eq() {
             passage.now.clone_from(until);
@@ -260,8 +339,7 @@ impl World for ProcessWorld {
             "facts": facts.collect::<Vec<_>>(),
             "fluents": fluents.collect::<Vec<_>>(),
         });
-        self.tell(&message)?;
-        Ok(self.hear()?.observations)
+        Ok(self.ask(&message)?.observations)
     }
 
     fn know(&mut self, task: &Arc<Task>) {

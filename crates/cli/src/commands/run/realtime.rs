@@ -17,6 +17,7 @@ use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 
 use crate::clock::Clock;
+use crate::interrupt::Interrupt;
 
 /// How the time of a world passes: `factor` of its seconds in one of the wall clock's.
 pub(super) struct Pace {
@@ -42,6 +43,14 @@ impl Pace {
         on_the_wall(time, &self.factor).saturating_sub(passed)
     }
 
+    /// What the world's clock will read in so long a time, by the thousandth of a second.
+    fn after(&self, while_on_the_wall: Duration) -> Rational {
+        let passed = self.clock.elapsed().saturating_sub(self.stopped.get());
+        let millis = (passed + while_on_the_wall).as_millis();
+        let seconds = Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000);
+        seconds * &self.factor
+    }
+
     /// `spent` is all that planning took on the wall clock; in the world it takes `allowed`. For
     /// what is longer, the world's clock was stopped.
     fn stop(&self, spent: Duration, allowed: &Rational) {
@@ -65,7 +74,12 @@ fn on_the_wall(time: &Rational, factor: &Rational) -> Duration {
 pub(super) struct Realtime<'a> {
     pub(super) inner: &'a mut dyn World,
     pub(super) pace: &'a Pace,
+    /// Ends a wait where it has come to.
+    pub(super) interrupt: &'a Interrupt,
 }
+
+/// How long to sleep until somebody looks whether to go on.
+const NAP: Duration = Duration::from_millis(50);
 
 impl World for Realtime<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
@@ -73,9 +87,15 @@ impl World for Realtime<'_> {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        let passage = self.inner.wait(until)?;
-        std::thread::sleep(self.pace.left(&passage.now));
-        Ok(passage)
+        loop {
+            let soon = self.pace.after(NAP);
+            let passage = self.inner.wait(until.min(&soon))?;
+            std::thread::sleep(self.pace.left(&passage.now));
+            let is_over = !passage.observations.is_empty() || passage.now >= *until;
+            if is_over || self.interrupt.is_requested() {
+                return Ok(passage);
+            }
+        }
     }
 
     fn look(

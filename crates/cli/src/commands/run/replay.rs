@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use elbowroom::execution::Odds;
 use elbowroom::execution::run::{PlanningTime, RunSettings, RunningRule};
@@ -52,7 +53,10 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
         planner: &mut planner,
         odds,
     };
-    choices.run_with(&task, first.as_ref(), &mut world, planning, &mut replay);
+    let interruption = replay.interruption();
+    let is_to_end = || interruption.load(Ordering::SeqCst);
+    let (task, first) = (&task, first.as_ref());
+    choices.run_with(task, first, &mut world, planning, &mut replay, &is_to_end);
     let (agreed, difference) = replay.outcome();
     if as_json {
         output::print_json(&json!({

@@ -49,15 +49,27 @@ pub(super) fn human(report: &Report) -> String {
                 styled(HINT, "limit")
             )
         }
+        Verdict::Interrupted => {
+            format!(
+                "{}: asked to end at {time}, after {replans}\n",
+                styled(HINT, "interrupted")
+            )
+        }
         Verdict::WorldFailed { why } => {
             let why = wrapped(&tame(why), width, 2);
             let failed = styled(BAD, "failed");
             format!("{failed}: the world failed at {time}:\n{why}\n")
         }
     };
-    if !report.reasons.is_empty() {
-        let _ = writeln!(text, "\n{}", styled(STRONG, "Why the plan was given up"));
-        for reason in &report.reasons {
+    for (heading, reasons) in [
+        ("Why no plan reaches the goal", &report.dead_end),
+        ("Why the plan was given up", &report.reasons),
+    ] {
+        if reasons.is_empty() {
+            continue;
+        }
+        let _ = writeln!(text, "\n{}", styled(STRONG, heading));
+        for reason in reasons {
             // What worlds and other programs say is in there.
             let reason = tame(&reason.to_string());
             let _ = writeln!(text, "{}", wrapped(&reason, width, 2));

@@ -42,14 +42,12 @@ impl TraceFile {
         }
     }
 
-    /// Whether all lines were written.
-    pub(super) fn close(self) -> Result<(), Failure> {
-        match (self.file, self.error) {
-            (Some((_, name)), Some(error)) => Err(Failure::new(
-                format!("cannot write the trace {name}: {}", plain(&error)),
-                "is the disk full?",
-            )),
-            _ => Ok(()),
-        }
+    /// Why not all lines were written, if so.
+    pub(super) fn close(self) -> Option<String> {
+        let ((_, name), error) = (self.file?, self.error?);
+        let why = plain(&error);
+        Some(format!(
+            "the trace {name} is incomplete: {why}; is the disk full?"
+        ))
     }
 }

@@ -1,0 +1,58 @@
+//! What can be said to `elbowroom network`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+#[derive(Args, Debug)]
+#[command(after_long_help = FORMATS_HELP)]
+pub(crate) struct NetworkArgs {
+    /// The network, in any of the formats below
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// Write the minimal network there: all bounds that follow, each as tight as it is. Only for
+    /// consistent networks without contingent links
+    #[arg(long, value_name = "OUT")]
+    pub(crate) minimal: Option<PathBuf>,
+    /// Write the dispatchable network there, waits included, if there is one
+    #[arg(long, value_name = "OUT")]
+    pub(crate) dispatchable: Option<PathBuf>,
+    /// Execute the network so many times, with durations drawn by chance
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub(crate) simulate: Option<u64>,
+    /// Which of the possible durations to draw
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "simulate")]
+    pub(crate) seed: u64,
+    /// How to draw them
+    #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
+    pub(crate) durations: DurationsChoice,
+    /// Give up the question of weak controllability, which can be hard, after so many branches
+    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES)]
+    pub(crate) branches: usize,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// How the durations of contingent links are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DurationsChoice {
+    /// As the file says, and evenly between the bounds where it says nothing
+    Given,
+    /// Evenly between the bounds
+    Uniform,
+}
+
+const FORMATS_HELP: &str = "\
+Formats, told by the content:
+  HEATlab JSON        `nodes` and `constraints`, with the types stc, stcu and pstc
+  PSTN-lib JSON       `timepoints` and `constraints`, with correlations
+  CSTNU Tool GraphML  .stn and .stnu; conditional networks are refused
+  plain STNU text     begins with `# KIND OF NETWORK`
+  DIMACS text         `p sp NODES ARCS`, `a U V W`
+  inequalities        JSON: lists of `[u, v, w]` under the numbers of nodes
+  Elbowroom JSON      what --minimal and --dispatchable write
+
+What --minimal and --dispatchable write is GraphML if the name ends in .stn, .stnu, .graphml or
+.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md says what the answers
+mean, docs/formats/network.md has the formats.";

@@ -1,0 +1,61 @@
+//! Why a plan does not work, with values and a schedule that show it.
+
+use std::fmt::Write as _;
+
+use elbowroom::model::Task;
+use elbowroom::plan::ParametrizedPlan;
+use elbowroom::{Explanation, Shortfall, pddl};
+
+use crate::limits::push_wrapped;
+use crate::look::{Look, STRONG, styled};
+use crate::number;
+
+/// The reason, and by how much.
+pub(super) fn what(explanation: &Explanation) -> String {
+    let reason = &explanation.reason;
+    match &explanation.shortfall {
+        Some(Shortfall::Time(late)) => {
+            format!("{reason}: too late by {}", number::nearest(late))
+        }
+        Some(Shortfall::Amount(short)) => {
+            format!("{reason}: short by {}", number::nearest(short))
+        }
+        Some(Shortfall::Boundless) => {
+            format!("{reason}, but nothing in the plan sees to it")
+        }
+        None => reason.clone(),
+    }
+}
+
+/// Values and a schedule at which it goes wrong.
+pub(super) fn example(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    explanation: &Explanation,
+    look: Look,
+) -> String {
+    let mut text = String::new();
+    let values: Vec<String> = plan
+        .parameters
+        .iter()
+        .zip(&explanation.valuation)
+        .map(|(parameter, value)| format!("{} = {}", parameter.name, number::nearest(value)))
+        .collect();
+    if !values.is_empty() {
+        let _ = write!(text, "\n{}\n", styled(STRONG, "For example with"));
+        push_wrapped(&mut text, &values.join(", "), 2, look.width);
+    }
+    let Some(schedule) = &explanation.schedule else {
+        return text;
+    };
+    let fixed = plan.plan.at(&explanation.valuation).scheduled(schedule);
+    let _ = write!(text, "\n{}\n", styled(STRONG, "executed as"));
+    for line in pddl::write_plan(task, &fixed).lines() {
+        let _ = writeln!(text, "  {line}");
+    }
+    if let Some(verdict) = &explanation.verdict {
+        let _ = write!(text, "\n{}\n", styled(STRONG, "this happens"));
+        push_wrapped(&mut text, verdict, 2, look.width);
+    }
+    text
+}

@@ -1,0 +1,294 @@
+//! `elbowroom network`: what can be promised about a temporal network of the field.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use elbowroom::network::{
+    self, Answer as Found, Durations, Mistakes, NetworkFile, Promise, Reason, Request, Simulated,
+    Simulation, Verdict,
+};
+use serde_json::Value;
+
+use crate::args::{DurationsChoice, NetworkArgs};
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::limits::push_wrapped;
+use crate::look::{BAD, FAINT, GOOD, HINT, Look, STRONG, styled};
+use crate::output::{self, counted};
+
+/// Bounds of a reason that people get to see; `--json` has all.
+const STEPS_SHOWN: usize = 12;
+
+/// Reads a network, answers, and writes what else was asked for.
+pub(crate) fn run(arguments: &NetworkArgs) -> Answer {
+    let outputs = [&arguments.minimal, &arguments.dispatchable];
+    let on_stdout = outputs
+        .into_iter()
+        .flatten()
+        .filter(|path| path.as_os_str() == "-");
+    let on_stdout = on_stdout.count() + usize::from(arguments.json);
+    if on_stdout > 1 {
+        return Err(Failure::new(
+            "only one of --json, --minimal and --dispatchable can go to standard output",
+            "name a file for the others",
+        ));
+    }
+    let text = input::source(&arguments.file, "network")?;
+    let file = network::read(text.name(), text.text().as_bytes())
+        .map_err(|mistakes| Failure::rendered(rendered(&mistakes)))?;
+    for remark in &file.remarks {
+        output::tell(&format!("{}: {remark}", styled(HINT, "warning")));
+    }
+    if arguments.minimal.is_some() && !file.is_certain() {
+        return Err(Failure::new(
+            "the network has contingent links, and only simple networks have a minimal form",
+            "--dispatchable writes the form to execute it by",
+        ));
+    }
+    let request = Request {
+        most_branches: arguments.branches,
+        simulation: arguments.simulate.map(|runs| Simulation {
+            runs,
+            seed: arguments.seed,
+            durations: match arguments.durations {
+                DurationsChoice::Given => Durations::Given,
+                DurationsChoice::Uniform => Durations::Uniform,
+            },
+        }),
+    };
+    let found = network::examine(&file, &request).map_err(|error| Failure::new(error, ""))?;
+    write_forms(arguments, &file)?;
+    if arguments.json {
+        output::print_json(&document(&arguments.file, &found)?)?;
+    } else if on_stdout == 0 {
+        output::print(&report(text.name(), &found, Look::of_stdout()))?;
+    }
+    Ok(if found.is_executable() {
+        Exit::Yes
+    } else {
+        Exit::No
+    })
+}
+
+fn document(file: &Path, found: &Found) -> Result<Value, Failure> {
+    let mut document = serde_json::to_value(found)
+        .map_err(|error| Failure::new(format!("cannot write the answer: {error}"), ""))?;
+    if let Value::Object(members) = &mut document {
+        let name = Value::String(file.display().to_string());
+        members.shift_insert(2, "file".to_owned(), name);
+    }
+    Ok(document)
+}
+
+/// Writes the minimal and the dispatchable network, where there is one.
+fn write_forms(arguments: &NetworkArgs, file: &NetworkFile) -> Result<(), Failure> {
+    if let Some(path) = &arguments.minimal {
+        match file.minimal() {
+            Ok(minimal) => write_network(path, &minimal)?,
+            Err(_) => not_written(path, "the network is not consistent"),
+        }
+    }
+    if let Some(path) = &arguments.dispatchable {
+        match file.network.dynamic() {
+            Ok(form) => write_network(path, &file.dispatchable(&form))?,
+            Err(_) => not_written(path, "the network is not dynamically controllable"),
+        }
+    }
+    Ok(())
+}
+
+fn not_written(path: &Path, why: &str) {
+    output::tell(&format!(
+        "{}: {why}, so {} is not written",
+        styled(HINT, "note"),
+        path.display()
+    ));
+}
+
+/// In the format that the name of the file asks for.
+fn write_network(path: &Path, file: &NetworkFile) -> Result<(), Failure> {
+    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    let ending = ending.as_ref().and_then(|ending| ending.to_str());
+    let text = if matches!(ending, Some("stn" | "stnu" | "graphml" | "xml")) {
+        network::write_graphml(file).ok_or_else(|| {
+            Failure::new(
+                "a wait of this network ends only with its link, which GraphML cannot say",
+                "write to a file that ends in .json",
+            )
+        })?
+    } else {
+        network::write_json(file)
+    };
+    output::write_file(path, &text)
+}
+
+/// The answer for people.
+fn report(name: &str, found: &Found, look: Look) -> String {
+    let mut text = String::new();
+    let mut parts = vec![
+        counted(found.points, "time point"),
+        counted(found.requirements, "requirement"),
+    ];
+    if found.links > 0 {
+        parts.push(counted(found.links, "contingent link"));
+    }
+    let head = format!("{name}: {}, {}", found.read_as, parts.join(", "));
+    push_wrapped(&mut text, &head, 0, look.width);
+    text.push('\n');
+    let promises = [
+        ("consistent", Some(&found.consistent)),
+        ("weakly controllable", found.weak.as_ref()),
+        ("dynamically controllable", found.dynamic.as_ref()),
+        ("strongly controllable", found.strong.as_ref()),
+    ];
+    for (what, promise) in promises {
+        let Some(promise) = promise else { continue };
+        let (style, word) = match promise.verdict {
+            Verdict::Yes => (GOOD, "yes"),
+            Verdict::No => (BAD, "no"),
+            Verdict::Undecided => (HINT, "undecided"),
+        };
+        let _ = writeln!(text, "  {what:<24}  {}", styled(style, word));
+    }
+    push_reasons(&mut text, &promises, look);
+    if let Some(simulated) = &found.simulation {
+        push_simulated(&mut text, simulated, look);
+    }
+    text
+}
+
+/// Why the promises that cannot be made cannot: the first of them for sure, the others where they
+/// have reasons of their own.
+fn push_reasons(text: &mut String, promises: &[(&str, Option<&Promise>)], look: Look) {
+    let mut is_explained = false;
+    for (what, promise) in promises {
+        let Some(promise) = promise else { continue };
+        if let Some(branches) = promise.branches {
+            let line = format!(
+                "Whether it is {what} was not found out in {}; --branches allows for more.",
+                counted(branches, "branch").replace("branchs", "branches")
+            );
+            text.push('\n');
+            push_wrapped(text, &line, 0, look.width);
+        }
+        let Some(reason) = &promise.reason else {
+            continue;
+        };
+        // What has no schedule at all needs no further reason.
+        if is_explained {
+            continue;
+        }
+        is_explained = matches!(*what, "consistent" | "weakly controllable");
+        push_reason(text, what, reason, look);
+    }
+}
+
+fn push_reason(text: &mut String, what: &str, reason: &Reason, look: Look) {
+    let by = match reason.by.exact.as_str() {
+        "inf" => "without limit".to_owned(),
+        _ => format!("by {}", reason.by.short()),
+    };
+    let title = format!("Not {what}: these contradict each other {by}");
+    let _ = writeln!(text, "\n{}", styled(STRONG, &title));
+    for step in reason.steps.iter().take(STEPS_SHOWN) {
+        push_wrapped(text, &step.words, 2, look.width);
+    }
+    let more = reason.steps.len().saturating_sub(STEPS_SHOWN);
+    if more > 0 || !reason.is_whole {
+        let more = if reason.is_whole {
+            format!("and {more} more (--json has all)")
+        } else {
+            "and more than can be listed".to_owned()
+        };
+        let _ = writeln!(text, "  {}", styled(FAINT, &more));
+    }
+    // The other steps say at which end they take a link.
+    let are_fixed = reason.steps.iter().any(|step| step.given == "duration");
+    if are_fixed && !reason.durations.is_empty() {
+        let ends = reason.durations.iter().map(|link| {
+            let at = match link.at.as_str() {
+                "within" => "",
+                "lower" => " (its lower bound)",
+                _ => " (its upper bound)",
+            };
+            let value = match link.value.exact.as_str() {
+                "inf" => "any time".to_owned(),
+                _ => link.value.short(),
+            };
+            format!("{} to {} takes {value}{at}", link.activation, link.end)
+        });
+        let ends: Vec<String> = ends.collect();
+        let shown = ends.len().min(STEPS_SHOWN);
+        let mut line = format!("where {}", ends[..shown].join(", "));
+        if ends.len() > shown {
+            let _ = write!(line, ", and {} more", ends.len() - shown);
+        }
+        push_wrapped(text, &line, 2, look.width);
+    }
+}
+
+fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
+    let percent = |share: f64| format!("{:.1}%", share * 100.0);
+    let [least, most] = simulated.interval;
+    let durations = match simulated.durations {
+        Durations::Given => "as the file says",
+        Durations::Uniform => "evenly between their bounds",
+    };
+    let executor = match simulated.executor.as_str() {
+        "dispatchable" => "by the dispatchable network",
+        _ => "as early as the windows allow, which promises nothing",
+    };
+    let mut line = format!(
+        "{} of {} succeed: {}, with 95% confidence between {} and {}. Durations are drawn \
+         {durations} (seed {}); points are dispatched {executor}.",
+        simulated.successes,
+        counted(usize::try_from(simulated.runs).unwrap_or(usize::MAX), "run"),
+        percent(simulated.share),
+        percent(least),
+        percent(most),
+        simulated.seed,
+    );
+    if simulated.outside > 0 {
+        let _ = write!(
+            line,
+            " In {} a duration lies outside the bounds of its link.",
+            counted(
+                usize::try_from(simulated.outside).unwrap_or(usize::MAX),
+                "run"
+            )
+        );
+    }
+    text.push('\n');
+    push_wrapped(text, &line, 0, look.width);
+    if !simulated.broken.is_empty() {
+        let _ = writeln!(text, "\n{}", styled(STRONG, "Broken most often"));
+        for broken in &simulated.broken {
+            let line = format!("{} ({})", broken.requirement, broken.runs);
+            push_wrapped(text, &line, 2, look.width);
+        }
+    }
+}
+
+/// The mistakes in a file, with excerpts.
+fn rendered(mistakes: &Mistakes) -> String {
+    let mut text = String::new();
+    for mistake in &mistakes.mistakes {
+        let line = mistake.line.to_string();
+        let margin = " ".repeat(line.len());
+        let offset = " ".repeat(mistake.offset);
+        let _ = write!(
+            text,
+            "{}: {}\n{margin}--> {}:{line}:{}\n{margin} |\n{line} | {}\n{margin} | {offset}^\n\
+             {margin} = {}: {}\n\n",
+            styled(BAD, "error"),
+            mistake.message,
+            mistakes.name,
+            mistake.column,
+            mistake.excerpt,
+            styled(HINT, "help"),
+            mistake.help,
+        );
+    }
+    text.push_str(&counted(mistakes.mistakes.len(), "error"));
+    text
+}

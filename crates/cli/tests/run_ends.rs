@@ -1,0 +1,329 @@
+//! Runs that are ended from outside, in worlds that are processes: nothing is left running.
+#![cfg(target_os = "linux")]
+
+mod command;
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use command::{elbowroom, root};
+use serde_json::Value;
+
+const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
+
+/// A robot that writes down what it is told. Each wait takes a fifth of a second. What it starts
+/// never ends, but for the action with the number `$2`, which fails; it stops what is cancelled.
+const ROBOT: &str = r#"
+log=$1; fails=$2; now=0; news=
+number() { n=${line#*\"ticket\":}; n=${n%%[!0-9]*}; }
+while read -r line; do
+  printf '%s\n' "$line" >> "$log"
+  case "$line" in
+    *'"start"'*) number
+      news="$news{\"type\":\"started\",\"ticket\":$n,\"time\":$now}\n"
+      if [ "$n" = "$fails" ]; then
+        news="$news{\"type\":\"ended\",\"ticket\":$n,\"outcome\":\"failed\",\"time\":$now}\n"
+      fi;;
+    *'"cancel"'*) number
+      news="$news{\"type\":\"ended\",\"ticket\":$n,\"outcome\":\"cancelled\",\"time\":$now}\n";;
+    *'"wait"'*|*'"look"'*)
+      if [ -z "$news" ]; then sleep 0.2; now=$((now+1)); fi
+      printf "$news{\"type\":\"time\",\"now\":$now}\n"; news=;;
+    *'"stop"'*) exit 0;;
+  esac
+done
+"#;
+
+/// A robot that has answered once, and is then busy for a minute.
+const STUBBORN: &str = r#"
+log=$1
+trap '' TERM INT HUP
+while read -r line; do
+  printf '%s\n' "$line" >> "$log"
+  case "$line" in
+    *'"wait"'*) if [ -n "$asked" ]; then sleep 60; fi; asked=yes
+      echo '{"type":"time","now":0}';;
+  esac
+done
+"#;
+
+/// Files of one test.
+struct Place(PathBuf);
+
+impl Place {
+    fn new(name: &str) -> Self {
+        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("ends-{name}"));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).expect("a folder");
+        Self(folder)
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).unwrap_or_default()
+    }
+
+    /// What the world was told, message by message.
+    fn told(&self) -> Vec<Value> {
+        let text = self.read("log");
+        let lines = text.lines().map(serde_json::from_str);
+        lines.map(|line| line.expect("JSON")).collect()
+    }
+
+    /// Starts a run in that world.
+    fn run(&self, world: &str, fails: &str, options: &[&str]) -> Child {
+        let script = self.file("world.sh");
+        fs::write(&script, world).expect("written");
+        let world = format!("sh {script} {} {fails}", self.file("log"));
+        let trace = self.file("trace.jsonl");
+        let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--world-process", &world];
+        run.extend(["--trace", &trace]);
+        run.extend(options);
+        Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+            .current_dir(root())
+            .env("NO_COLOR", "1")
+            .args(run)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command can be started")
+    }
+
+    fn wait_until_told(&self, message: &str, times: usize) {
+        let begun = Instant::now();
+        while self.read("log").matches(message).count() < times {
+            assert!(
+                begun.elapsed() < Duration::from_secs(60),
+                "{}",
+                self.read("log")
+            );
+            sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+fn send(child: &Child, signal: u32) {
+    let killed = Command::new("kill")
+        .args([format!("-{signal}"), child.id().to_string()])
+        .status()
+        .expect("every Unix has `kill`");
+    assert!(killed.success());
+}
+
+/// How often the world was told this.
+fn count(told: &[Value], kind: &str) -> usize {
+    told.iter()
+        .filter(|message| message["type"] == kind)
+        .count()
+}
+
+fn last_entry(place: &Place) -> Value {
+    let trace = place.read("trace.jsonl");
+    serde_json::from_str(trace.lines().last().expect("a line")).expect("JSON")
+}
+
+#[test]
+fn ctrl_c_and_requests_to_terminate_end_a_run_in_order() {
+    for (name, signal) in [("interrupt", 2), ("terminate", 15), ("hang-up", 1)] {
+        let place = Place::new(name);
+        let child = place.run(
+            ROBOT,
+            "",
+            &["--executor", "esterel", "--planner-states", "400"],
+        );
+        // It has begun, and waits for something to end.
+        place.wait_until_told("\"wait\"", 4);
+        send(&child, signal);
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(130), "{name}: {output:?}");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            text.starts_with("interrupted: asked to end"),
+            "{name}: {text}"
+        );
+        assert!(text.contains("cancelled"), "{name}: {text}");
+        assert!(!text.contains("still running"), "{name}: {text}");
+
+        let told = place.told();
+        assert!(count(&told, "start") > 0, "{name}: {told:?}");
+        assert_eq!(
+            count(&told, "cancel"),
+            count(&told, "start"),
+            "{name}: {told:?}"
+        );
+        assert_eq!(told.last().expect("a message")["type"], "stop", "{name}");
+
+        let over = last_entry(&place);
+        assert_eq!(over["event"], "over", "{name}: {over}");
+        assert_eq!(over["verdict"], "interrupted", "{name}: {over}");
+        let replayed = elbowroom(&["run", "--replay", &place.file("trace.jsonl")]);
+        assert!(replayed.status.success(), "{name}: {replayed:?}");
+    }
+}
+
+#[test]
+fn with_json_an_interrupted_run_is_a_document_too() {
+    let place = Place::new("document");
+    let child = place.run(ROBOT, "", &["--executor", "esterel", "--json"]);
+    place.wait_until_told("\"wait\"", 4);
+    send(&child, 2);
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let document: Value = serde_json::from_slice(&output.stdout).expect("a document");
+    assert_eq!(document["verdict"], "interrupted");
+}
+
+#[test]
+fn a_world_that_does_not_obey_is_not_waited_for_for_long() {
+    let place = Place::new("stubborn");
+    let child = place.run(STUBBORN, "", &["--executor", "esterel"]);
+    place.wait_until_told("\"wait\"", 2);
+    let begun = Instant::now();
+    send(&child, 2);
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    assert!(begun.elapsed() < Duration::from_secs(20), "{output:?}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.starts_with("interrupted"), "{text}");
+    assert_eq!(last_entry(&place)["verdict"], "interrupted");
+}
+
+#[test]
+fn a_second_ctrl_c_ends_the_run_at_once() {
+    let place = Place::new("twice");
+    let child = place.run(STUBBORN, "", &["--executor", "esterel"]);
+    place.wait_until_told("\"wait\"", 2);
+    send(&child, 2);
+    sleep(Duration::from_millis(300));
+    let begun = Instant::now();
+    send(&child, 2);
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    assert!(begun.elapsed() < Duration::from_secs(3));
+    assert!(output.stdout.is_empty(), "{output:?}");
+}
+
+/// One action fails while another one runs, and nobody makes another plan.
+#[test]
+fn when_the_planner_fails_what_runs_is_cancelled_and_the_world_is_told_to_stop() {
+    for planner in ["none", "false"] {
+        let place = Place::new(&format!("planner-{planner}"));
+        let plan = root()
+            .join("cases/delivery/plan.plan")
+            .display()
+            .to_string();
+        let options = [
+            "--executor",
+            "esterel",
+            "--plan",
+            &plan,
+            "--planner",
+            planner,
+        ];
+        let child = place.run(ROBOT, "1", &options);
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(1), "{planner}: {output:?}");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(text.contains("no plan to go on with"), "{planner}: {text}");
+        assert!(!text.contains("still running"), "{planner}: {text}");
+        let told = place.told();
+        // The one that failed has ended by itself.
+        assert_eq!(count(&told, "start"), 2, "{planner}: {told:?}");
+        assert_eq!(count(&told, "cancel"), 1, "{planner}: {told:?}");
+        assert_eq!(told.last().expect("a message")["type"], "stop", "{planner}");
+        assert_eq!(last_entry(&place)["verdict"], "no-plan", "{planner}");
+    }
+}
+
+/// In a simulated world on a wall clock, it ends where it has come to.
+#[test]
+fn a_run_on_a_wall_clock_ends_when_it_is_asked_to() {
+    let place = Place::new("clock");
+    let trace = place.file("trace.jsonl");
+    let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .args(["run", DELIVERY[0], DELIVERY[1], "--realtime", "1"])
+        .args(["--trace", &trace])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the command can be started");
+    let begun = Instant::now();
+    while !place.read("trace.jsonl").contains("\"command\"") {
+        assert!(begun.elapsed() < Duration::from_secs(60));
+        sleep(Duration::from_millis(20));
+    }
+    send(&child, 15);
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let over = last_entry(&place);
+    assert_eq!(over["verdict"], "interrupted");
+    let time = over["time"]["decimal"].as_f64().expect("a time");
+    assert!(time < 30.0, "{over}");
+    let replayed = elbowroom(&["run", "--replay", &trace]);
+    assert!(replayed.status.success(), "{replayed:?}");
+}
+
+#[test]
+fn a_full_disk_does_not_hide_the_verdict() {
+    let run = ["run", DELIVERY[0], DELIVERY[1], "--trace", "/dev/full"];
+    let output = elbowroom(&run);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.starts_with("done: goal reached"), "{text}");
+    let warning = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        warning.contains("warning: the trace /dev/full is incomplete"),
+        "{warning}"
+    );
+}
+
+/// What was finished is kept, and says that it is not all.
+#[test]
+fn a_comparison_that_is_interrupted_keeps_what_is_finished() {
+    for (name, experiment) in [
+        ("mixed", "crates/cli/tests/files/late-drives.toml"),
+        ("perturbed", "experiments/olisipo_sf3.toml"),
+    ] {
+        let place = Place::new(name);
+        let child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+            .current_dir(root())
+            .args([
+                "compare",
+                experiment,
+                "--trials",
+                "100000000",
+                "--jobs",
+                "1",
+            ])
+            .args(["--output", &place.file("results")])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the command can be started");
+        sleep(Duration::from_secs(4));
+        send(&child, 2);
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(130), "{name}: {output:?}");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(text.contains("interrupted"), "{name}: {text}");
+        let results: Value =
+            serde_json::from_str(&place.read("results/results.json")).expect("results");
+        assert_eq!(results["is_interrupted"], true, "{name}");
+        assert!(
+            place.read("results/table.md").contains("interrupted"),
+            "{name}"
+        );
+        let runs = results["cells"][0][0]["runs"].as_u64();
+        let count = results["rows"][0]["success"]["count"].as_u64();
+        assert!(
+            runs.or(count).is_some_and(|count| count > 0),
+            "{name}: {results:#}"
+        );
+    }
+}

@@ -1,0 +1,49 @@
+//! Questions about plans and their answers: a request goes in, an answer comes out.
+//!
+//! An answer is plain data. It can be stored, sent and read again with `serde`, and its JSON is the
+//! document that `docs/formats` describes and that the command line prints. The front doors (the
+//! command, other languages, reports) differ only in how they show it.
+//!
+//! A request that can take long is given a [`Watcher`], which hears how far the work has come and
+//! can end it. What was found by then is the answer; for an envelope, it is sound at any moment.
+//!
+//! | question | request | answer |
+//! |---|---|---|
+//! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
+//! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
+//! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+
+pub mod check;
+pub mod envelope;
+mod exact;
+mod format;
+pub mod stn;
+mod violation;
+mod watch;
+
+pub use check::{CheckAnswer, CheckRequest};
+pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
+pub use exact::Exact;
+pub use format::Version;
+pub use stn::{StnAnswer, StnOutcome, StnRequest};
+pub use violation::ViolationAnswer;
+pub use watch::{EnvelopeProgress, Event, Halt, Unwatched, Watcher};
+
+use crate::box_text::BoxTextError;
+use crate::flow::FlowError;
+
+/// Why there is no answer: the request cannot be understood, or is beyond what can be analysed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// The plan has no order, nothing like that can be left open, or the plan is beyond exact
+    /// analysis.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// The box asked about is not one of this plan.
+    #[error(transparent)]
+    Box(#[from] BoxTextError),
+    /// The judge cannot tell whether the plan is valid: why.
+    #[error("cannot tell whether the plan is valid: {0}")]
+    Undecided(String),
+}

@@ -1,0 +1,210 @@
+//! Is a plan valid?
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::ground::FluentId;
+use elbowroom_model::validate::{self, Margin, Report, Settings, Verdict};
+use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use serde::{Deserialize, Serialize};
+
+use super::{Exact, RequestError, Version, ViolationAnswer, exact};
+
+/// Asks whether a plan is valid, or, without a plan, what a problem consists of.
+#[derive(Clone, Debug)]
+pub struct CheckRequest<'a> {
+    /// The problem.
+    pub task: &'a Task,
+    /// The plan.
+    pub plan: Option<&'a TimeTriggeredPlan>,
+    /// What the plan is called in the answer, such as its file.
+    pub name: String,
+    /// By which rules.
+    pub settings: Settings,
+}
+
+/// Whether a plan is valid: `docs/formats/check-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum CheckAnswer {
+    /// The answer about a plan.
+    Plan(PlanChecked),
+    /// The answer about a problem.
+    Problem(ProblemRead),
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CheckFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-check")]
+    Check,
+}
+
+/// What the judge says about a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanChecked {
+    /// Always the same.
+    pub format: CheckFormat,
+    /// Always the same.
+    pub version: Version,
+    /// What the request calls the plan.
+    pub plan: String,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: CheckFinding,
+}
+
+/// Whether the plan is valid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum CheckFinding {
+    /// It is.
+    Valid {
+        /// The time of the last happening of the plan's actions.
+        #[serde(with = "exact")]
+        makespan: Rational,
+        /// The value of each numeric fluent at the end.
+        values: Vec<FluentValue>,
+        /// How close each comparison came to failing.
+        margins: Vec<MarginAnswer>,
+    },
+    /// It is not.
+    Invalid {
+        /// What is wrong.
+        violation: ViolationAnswer,
+    },
+}
+
+/// A numeric fluent at the end of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FluentValue {
+    /// Its name: `(energy rover)`.
+    pub fluent: String,
+    /// Its value.
+    pub value: Exact,
+    /// Whether an action of the plan changes it. Not in the document.
+    #[serde(skip)]
+    pub is_changed: bool,
+}
+
+/// How close a comparison came to failing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MarginAnswer {
+    /// The comparison.
+    pub condition: String,
+    /// `at start`, `over all`, `at end`, `precondition` or `goal`.
+    pub when: String,
+    /// The action that needs it; `None` for the goal.
+    pub action: Option<String>,
+    /// How close it came.
+    #[serde(with = "exact")]
+    pub margin: Rational,
+    /// The tightest moment.
+    #[serde(with = "exact")]
+    pub time: Rational,
+    /// Whether a margin of 0 would be a violation.
+    #[serde(rename = "strict")]
+    pub is_strict: bool,
+}
+
+/// What a problem consists of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProblemRead {
+    /// Always the same.
+    pub format: CheckFormat,
+    /// Always the same.
+    pub version: Version,
+    /// Always the same.
+    pub answer: Readable,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+}
+
+/// The only answer about a problem that has been read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Readable {
+    /// It can be read.
+    #[default]
+    Readable,
+}
+
+/// Has the judge decide about a plan.
+///
+/// # Errors
+/// When the judge cannot tell.
+pub fn check(request: &CheckRequest<'_>) -> Result<CheckAnswer, RequestError> {
+    let task = request.task;
+    let (domain, problem) = (task.problem().domain.clone(), task.problem().name.clone());
+    let Some(plan) = request.plan else {
+        return Ok(CheckAnswer::Problem(ProblemRead {
+            format: CheckFormat::Check,
+            version: Version,
+            answer: Readable::Readable,
+            domain,
+            problem,
+        }));
+    };
+    let finding = match validate::validate(task, plan, &request.settings) {
+        Verdict::Valid(report) => valid(task, plan, &report),
+        Verdict::Invalid(violation) => CheckFinding::Invalid {
+            violation: (&violation).into(),
+        },
+        Verdict::Undecided(why) => return Err(RequestError::Undecided(why.to_string())),
+    };
+    Ok(CheckAnswer::Plan(PlanChecked {
+        format: CheckFormat::Check,
+        version: Version,
+        plan: request.name.clone(),
+        domain,
+        problem,
+        finding,
+    }))
+}
+
+fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding {
+    let changed = changed(task, plan);
+    let values = report.state.values.iter();
+    CheckFinding::Valid {
+        makespan: report.makespan.clone(),
+        values: values
+            .map(|(fluent, value)| FluentValue {
+                fluent: task.fluent_name(*fluent),
+                value: Exact(value.clone()),
+                is_changed: changed.contains(fluent),
+            })
+            .collect(),
+        margins: report.margins.iter().map(margin).collect(),
+    }
+}
+
+fn margin(margin: &Margin) -> MarginAnswer {
+    MarginAnswer {
+        condition: margin.condition.clone(),
+        when: margin.when.to_string(),
+        action: margin.action.as_ref().map(|action| action.name.clone()),
+        margin: margin.margin.clone(),
+        time: margin.time.clone(),
+        is_strict: margin.is_strict,
+    }
+}
+
+/// The fluents that the plan's actions change.
+fn changed(task: &Task, plan: &TimeTriggeredPlan) -> BTreeSet<FluentId> {
+    let steps = plan.steps.iter();
+    steps
+        .flat_map(|step| {
+            let start = Footprint::of_start(task, &step.action);
+            [start, Footprint::of_end(task, &step.action)]
+        })
+        .flat_map(|footprint| footprint.shifts.into_iter().chain(footprint.assigns))
+        .collect()
+}

@@ -1,0 +1,246 @@
+//! How far may each quantity of a plan deviate?
+
+mod answer;
+mod foresight;
+mod limits;
+mod search;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::{Growth, Guarantee, Method, Oracle};
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::parametrize::VarySpec;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+
+use super::{Event, RequestError, Watcher};
+use crate::explain::{Explainer, Explanation};
+use crate::flow::{self, FlowError};
+use crate::{AnyPlan, parse_box};
+
+pub use answer::{
+    Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
+    Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
+};
+pub use foresight::Foresight;
+
+/// Asks for the envelope of a plan, or whether a box lies inside it.
+#[derive(Clone, Debug)]
+pub struct EnvelopeRequest {
+    /// The problem.
+    pub task: Arc<Task>,
+    /// The plan.
+    pub plan: AnyPlan,
+    /// What the plan is called in the answer, such as its file.
+    pub name: String,
+    /// What to leave open; all durations if empty. An STN plan may leave something open itself.
+    pub vary: Vec<VarySpec>,
+    /// The least separation of interfering happenings (ε); positive.
+    pub epsilon: Rational,
+    /// What to guarantee inside the envelope.
+    pub guarantee: Guarantee,
+    /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
+    /// ([`elbowroom_envelope::enforced`]).
+    pub enforce: bool,
+    /// Whether this box lies inside the envelope: `d0=[5,30] d1=[10,20]`, as [`parse_box`] reads
+    /// it. If there is none, a large box inside it is searched for.
+    pub contains: Option<String>,
+    /// How to search.
+    pub search: Search,
+}
+
+/// How to search for an envelope.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Search {
+    /// How boxes are looked for.
+    pub method: Method,
+    /// The search ends when all steps are below this; positive.
+    pub precision: Rational,
+    /// How steps change after a success.
+    pub growth: Growth,
+    /// Whether each end is moved onto its limit when the search has ended.
+    pub sharpen: bool,
+    /// The search ends after that many box checks.
+    pub most_checks: Option<usize>,
+}
+
+impl Default for Search {
+    /// Precision 1, doubling steps, no sharpening and no limit.
+    fn default() -> Self {
+        let settings = elbowroom_envelope::Settings::default();
+        Self {
+            method: Method::default(),
+            precision: settings.precision,
+            growth: settings.growth,
+            sharpen: false,
+            most_checks: settings.most_checks,
+        }
+    }
+}
+
+/// The answer, and what it is about.
+#[derive(Clone, Debug)]
+pub struct EnvelopeOutcome {
+    /// The answer as a document.
+    pub answer: EnvelopeAnswer,
+    /// The plan with what is left open; `None` if the judge rejects the plan as it stands.
+    pub plan: Option<Arc<ParametrizedPlan>>,
+    /// The box that the plan is guaranteed to work in; `None` if there is none, or if the question
+    /// was another one.
+    pub envelope: Option<DecoupledEnvelope>,
+    /// Why the plan fails as planned, or in the box asked about.
+    pub why_not: Option<Explanation>,
+}
+
+impl EnvelopeRequest {
+    /// The envelope of a plan, all durations open, with ε = 0.001 and the default search.
+    pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
+        Self {
+            task: Arc::clone(task),
+            plan: plan.into(),
+            name: String::new(),
+            vary: Vec::new(),
+            epsilon: Rational::new(1, 1000),
+            guarantee: Guarantee::default(),
+            enforce: false,
+            contains: None,
+            search: Search::default(),
+        }
+    }
+
+    /// The same with what these settings say.
+    #[must_use]
+    pub fn with_settings(mut self, settings: &flow::Settings) -> Self {
+        self.vary.clone_from(&settings.vary);
+        self.epsilon = settings.epsilon.clone();
+        self.guarantee = settings.guarantee;
+        self.search.precision = settings.search.precision.clone();
+        self.search.growth = settings.search.growth;
+        self.search.most_checks = settings.search.most_checks;
+        self
+    }
+}
+
+/// Finds out how far each quantity may deviate, or whether a box lies inside the envelope.
+///
+/// That the plan does not work is an answer, and so is what was found until the watcher wanted no
+/// more.
+///
+/// # Errors
+/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+pub fn envelope(
+    request: &EnvelopeRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<EnvelopeOutcome, RequestError> {
+    let plan = match opened(request, watcher) {
+        Ok(plan) if request.enforce => {
+            let enforced = elbowroom_envelope::enforced(&request.task, &plan, &request.epsilon);
+            // Without a schedule there is nothing to keep to, which will be said with its reason.
+            Arc::new(enforced.map_or(plan, |(enforced, _)| enforced))
+        }
+        Ok(plan) => Arc::new(plan),
+        Err(FlowError::Invalid(violation)) => {
+            let violation = (&*violation).into();
+            let failing = Failing::Invalid { violation };
+            return Ok(EnvelopeOutcome {
+                answer: EnvelopeAnswer::new(request, EnvelopeFinding::Fails(failing)),
+                plan: None,
+                envelope: None,
+                why_not: None,
+            });
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let subject = Subject {
+        request,
+        plan: &plan,
+        explainer: Explainer::new(&request.task, &plan, &request.epsilon),
+    };
+    let oracle = match Oracle::new(&request.task, &plan, &request.epsilon, request.guarantee) {
+        Ok(oracle) => oracle,
+        Err(Refusal::NoNominalSchedule) => {
+            return Ok(subject.fails(subject.explainer.no_schedule(&plan.nominal())));
+        }
+        Err(refusal) => return Err(FlowError::Refused(refusal).into()),
+    };
+    if let Some(text) = &request.contains {
+        return contains(&subject, oracle, text);
+    }
+    match watcher.flow() {
+        ControlFlow::Continue(()) => search::search(&subject, oracle, watcher),
+        ControlFlow::Break(halt) => {
+            Ok(subject.outcome(EnvelopeFinding::None { stop: halt.into() }))
+        }
+    }
+}
+
+/// The plan with what is left open.
+fn opened(
+    request: &EnvelopeRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<ParametrizedPlan, FlowError> {
+    let (task, epsilon) = (&request.task, &request.epsilon);
+    match &request.plan {
+        AnyPlan::Stn(plan) => Ok(flow::open_more(task, plan.clone(), &request.vary)?),
+        AnyPlan::TimeTriggered(plan) => {
+            let freed = flow::free(task, plan, epsilon)?;
+            if let Some(violation) = &freed.repaired {
+                watcher.notice(&Event::Repaired(violation));
+            }
+            flow::open(task, freed, &request.vary, epsilon)
+        }
+    }
+}
+
+/// Whether a box lies inside the envelope.
+fn contains(
+    subject: &Subject<'_>,
+    mut oracle: Oracle,
+    text: &str,
+) -> Result<EnvelopeOutcome, RequestError> {
+    let envelope = parse_box(text, subject.plan)?;
+    let objection = oracle.objection(&envelope).map_err(FlowError::Refused)?;
+    let parameters = subject.ranges(&envelope);
+    let Some(objection) = objection else {
+        return Ok(subject.outcome(EnvelopeFinding::Inside { parameters }));
+    };
+    let why_not = subject.explainer.objection(&oracle, &envelope, &objection);
+    let mut outcome = subject.outcome(EnvelopeFinding::Outside {
+        parameters,
+        counterexample: subject.counterexample(&why_not),
+    });
+    outcome.why_not = Some(why_not);
+    Ok(outcome)
+}
+
+/// What an answer is about.
+#[derive(Clone, Copy)]
+struct Subject<'a> {
+    request: &'a EnvelopeRequest,
+    plan: &'a Arc<ParametrizedPlan>,
+    explainer: Explainer<'a>,
+}
+
+impl Subject<'_> {
+    fn outcome(&self, finding: EnvelopeFinding) -> EnvelopeOutcome {
+        EnvelopeOutcome {
+            answer: EnvelopeAnswer::new(self.request, finding),
+            plan: Some(Arc::clone(self.plan)),
+            envelope: None,
+            why_not: None,
+        }
+    }
+
+    /// The plan fails even as planned.
+    fn fails(&self, why_not: Explanation) -> EnvelopeOutcome {
+        let failing = Failing::AsPlanned {
+            parameters: self.quantities(),
+            counterexample: self.counterexample(&why_not),
+        };
+        let mut outcome = self.outcome(EnvelopeFinding::Fails(failing));
+        outcome.why_not = Some(why_not);
+        outcome
+    }
+}

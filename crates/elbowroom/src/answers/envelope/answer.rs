@@ -1,0 +1,485 @@
+//! The answer as a document: `docs/formats/envelope-json.md`.
+
+use elbowroom_envelope::{Growth, Guarantee, Method, Widening};
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{
+    DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Side, Valuation,
+};
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use super::{EnvelopeRequest, Foresight, Subject};
+use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
+use crate::explain::{Explanation, Shortfall};
+use crate::makespan::earliest_end;
+
+/// How far each quantity may deviate, or why that cannot be said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnvelopeAnswer {
+    /// Always the same.
+    pub format: EnvelopeFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// What the request calls the plan.
+    pub plan: String,
+    /// How the answer was found.
+    pub settings: EnvelopeSettings,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: EnvelopeFinding,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EnvelopeFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-envelope")]
+    Envelope,
+}
+
+/// How an answer was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EnvelopeSettings {
+    /// How boxes were looked for.
+    pub method: Method,
+    /// What is guaranteed inside the envelope.
+    pub guarantee: Guarantee,
+    /// How steps changed after a success.
+    pub growth: Growth,
+    /// The search ends when all steps are below this.
+    #[serde(with = "exact")]
+    pub precision: Rational,
+    /// The least separation of interfering happenings (ε).
+    #[serde(with = "exact")]
+    pub epsilon: Rational,
+    /// Whether ends were moved onto their limits.
+    pub sharpen: bool,
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum EnvelopeFinding {
+    /// There is an envelope.
+    Envelope {
+        /// What is left open, and how far each may deviate.
+        parameters: Vec<Room>,
+        /// Why the search ended.
+        stop: Stop,
+        /// How many boxes were checked.
+        checks: usize,
+        /// How long the search took.
+        seconds: f64,
+        /// Each box found to be inside, in order.
+        widenings: Vec<Widened>,
+        /// What it would be worth to know values in advance, if anything.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        foresight: Option<Foresight>,
+        /// When the plan is done. Not in the document.
+        #[serde(skip)]
+        makespans: Option<Makespans>,
+    },
+    /// The plan fails even if everything goes as planned.
+    Fails(Failing),
+    /// The box asked about lies inside the envelope.
+    Inside {
+        /// What is left open, and the box.
+        parameters: Vec<Range>,
+    },
+    /// It does not.
+    Outside {
+        /// What is left open, and the box.
+        parameters: Vec<Range>,
+        /// What can happen in it.
+        counterexample: Counterexample,
+    },
+    /// Nothing is known yet.
+    None {
+        /// Why the search ended before it began.
+        stop: Stop,
+    },
+}
+
+/// How a plan fails even if everything goes as planned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Failing {
+    /// The judge rejects it as it stands.
+    Invalid {
+        /// Why.
+        violation: ViolationAnswer,
+    },
+    /// It has no schedule, or one that breaks it.
+    AsPlanned {
+        /// What is left open.
+        parameters: Vec<Quantity>,
+        /// What can happen.
+        counterexample: Counterexample,
+    },
+}
+
+/// A quantity that is left open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// Unique in its plan.
+    pub name: String,
+    /// In plain words: `duration of (drive rover depot shelf)`.
+    pub quantity: String,
+    /// Which sort of quantity it is.
+    pub kind: QuantityKind,
+    /// The value in the original plan.
+    #[serde(with = "exact")]
+    pub nominal: Rational,
+    /// How strongly the search favours it.
+    #[serde(with = "exact")]
+    pub weight: Rational,
+}
+
+/// A quantity that is left open, and its interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// The quantity.
+    #[serde(flatten)]
+    pub quantity: Quantity,
+    /// The lower end.
+    #[serde(with = "exact::lower")]
+    pub lower: End,
+    /// The upper end.
+    #[serde(with = "exact::upper")]
+    pub upper: End,
+}
+
+/// A quantity that is left open, how far it may deviate, and what keeps it from deviating further.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Room {
+    /// The quantity and its interval.
+    #[serde(flatten)]
+    pub range: Range,
+    /// What keeps the lower end, in words; `None` if nothing does, or if it is not known.
+    pub lower_limit: Option<String>,
+    /// What keeps the upper end.
+    pub upper_limit: Option<String>,
+}
+
+/// Which sort of quantity a parameter is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum QuantityKind {
+    /// The duration of an action.
+    Duration,
+    /// A number in an action.
+    Constant,
+    /// A number of the domain.
+    Domain,
+    /// The value of a fluent at time 0.
+    Initial,
+    /// The time of timed initials.
+    Timed,
+    /// A bound between two time points of an STN plan file.
+    Bound,
+}
+
+/// Why a search for an envelope ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Stop {
+    /// No end can be moved by the precision.
+    #[serde(rename = "converged")]
+    Converged,
+    /// The limit on box checks was reached.
+    #[serde(rename = "check limit")]
+    CheckLimit,
+    /// The watcher said that time is up.
+    #[serde(rename = "time limit")]
+    TimeLimit,
+    /// The watcher wanted no more.
+    #[serde(rename = "cancelled")]
+    Cancelled,
+    /// Of some wider boxes nothing could be told: too many cases to tell apart.
+    #[serde(rename = "too many cases")]
+    Undecided,
+}
+
+/// The box has grown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Widened {
+    /// After that long.
+    pub seconds: f64,
+    /// After that many checks.
+    pub checks: usize,
+    /// The name of the parameter whose interval has grown.
+    pub parameter: String,
+    /// Which end has moved, and where it is now.
+    #[serde(flatten)]
+    pub end: MovedEnd,
+}
+
+/// An end of an interval that has moved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "end", content = "value", rename_all = "lowercase")]
+pub enum MovedEnd {
+    /// The lower end.
+    #[serde(with = "exact::lower")]
+    Lower(End),
+    /// The upper end.
+    #[serde(with = "exact::upper")]
+    Upper(End),
+}
+
+/// What can go wrong, with an example.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Counterexample {
+    /// What goes wrong, in words.
+    pub message: String,
+    /// By how much, where that is one number.
+    #[serde(with = "exact::option")]
+    pub shortfall: Option<Rational>,
+    /// What the judge says about the schedule, if it was asked.
+    pub verdict: Option<String>,
+    /// The parameters' values, by name.
+    pub values: IndexMap<String, Exact>,
+    /// When everything happens; empty if there is no schedule for these values.
+    pub schedule: Vec<Happening>,
+    /// How the world beats an executor that cannot know in advance what it learns too late: one
+    /// that starts everything early, and one that starts everything late.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plays: Vec<String>,
+}
+
+/// When an action starts and ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Happening {
+    /// The label of the action's instance.
+    pub instance: String,
+    /// The action.
+    pub action: String,
+    /// When it starts, or happens.
+    pub start: Exact,
+    /// When it ends; `None` for an instantaneous action.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end: Option<Exact>,
+}
+
+/// When the plan is done, with everything started as early as possible.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Makespans {
+    /// With all quantities at their nominal values.
+    pub nominal: Rational,
+    /// With all at their lower ends; `None` if one of these is infinite.
+    pub at_lower: Option<Rational>,
+    /// With all at their upper ends.
+    pub at_upper: Option<Rational>,
+}
+
+/// A reason, and all ends that it limits.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LimitGroup {
+    /// The reason, in words.
+    pub reason: String,
+    /// The names of the parameters whose lower ends it limits.
+    pub lower: Vec<String>,
+    /// The same for upper ends.
+    pub upper: Vec<String>,
+}
+
+impl EnvelopeAnswer {
+    pub(super) fn new(request: &EnvelopeRequest, finding: EnvelopeFinding) -> Self {
+        let problem = request.task.problem();
+        let search = &request.search;
+        Self {
+            format: EnvelopeFormat::Envelope,
+            version: Version,
+            domain: problem.domain.clone(),
+            problem: problem.name.clone(),
+            plan: request.name.clone(),
+            settings: EnvelopeSettings {
+                method: search.method,
+                guarantee: request.guarantee,
+                growth: search.growth,
+                precision: search.precision.clone(),
+                epsilon: request.epsilon.clone(),
+                sharpen: search.sharpen,
+            },
+            finding,
+        }
+    }
+
+    /// What limits the ends of the envelope, the ends with one reason together, in the order in
+    /// which the reasons first occur; empty if there is no envelope.
+    pub fn limits(&self) -> Vec<LimitGroup> {
+        let EnvelopeFinding::Envelope { parameters, .. } = &self.finding else {
+            return Vec::new();
+        };
+        let mut groups: IndexMap<&str, [Vec<String>; 2]> = IndexMap::new();
+        for room in parameters {
+            for (side, limit) in Side::BOTH
+                .into_iter()
+                .zip([&room.lower_limit, &room.upper_limit])
+            {
+                if let Some(reason) = limit {
+                    let names = groups.entry(reason).or_default();
+                    names[side.index()].push(room.range.quantity.name.clone());
+                }
+            }
+        }
+        let group = |(reason, [lower, upper]): (&str, [Vec<String>; 2])| LimitGroup {
+            reason: reason.to_owned(),
+            lower,
+            upper,
+        };
+        groups.into_iter().map(group).collect()
+    }
+}
+
+impl From<Halt> for Stop {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::TimeLimit => Self::TimeLimit,
+            Halt::Cancelled => Self::Cancelled,
+        }
+    }
+}
+
+impl From<ParameterKind> for QuantityKind {
+    fn from(kind: ParameterKind) -> Self {
+        match kind {
+            ParameterKind::Duration(_) => Self::Duration,
+            ParameterKind::Constant(_) => Self::Constant,
+            ParameterKind::Domain => Self::Domain,
+            ParameterKind::Initial(_) => Self::Initial,
+            ParameterKind::Timed(_) => Self::Timed,
+            ParameterKind::Bound => Self::Bound,
+        }
+    }
+}
+
+impl Range {
+    /// The interval.
+    pub fn interval(&self) -> Interval {
+        Interval {
+            lower: self.lower.clone(),
+            upper: self.upper.clone(),
+        }
+    }
+}
+
+impl Widened {
+    pub(super) fn of(plan: &ParametrizedPlan, widening: &Widening<'_>, seconds: f64) -> Self {
+        let end = widening.end;
+        let moved = end
+            .side
+            .of(widening.envelope.interval(end.parameter))
+            .clone();
+        Self {
+            seconds,
+            checks: widening.checks,
+            parameter: plan.parameter(end.parameter).name.clone(),
+            end: match end.side {
+                Side::Lower => MovedEnd::Lower(moved),
+                Side::Upper => MovedEnd::Upper(moved),
+            },
+        }
+    }
+}
+
+impl Makespans {
+    pub(super) fn of(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
+        let at = |side: Side| {
+            let ends = envelope.intervals.iter();
+            let values: Option<Valuation> = ends.map(|i| side.of(i).value().cloned()).collect();
+            earliest_end(plan, &values?)
+        };
+        Some(Self {
+            nominal: earliest_end(plan, &plan.nominal())?,
+            at_lower: at(Side::Lower),
+            at_upper: at(Side::Upper),
+        })
+    }
+}
+
+impl Subject<'_> {
+    /// What is left open.
+    pub(super) fn quantities(&self) -> Vec<Quantity> {
+        let parameters = self.plan.parameters.iter().enumerate();
+        parameters
+            .map(|(index, parameter)| Quantity {
+                name: parameter.name.clone(),
+                quantity: self.explainer.quantity(ParameterId::from(index)),
+                kind: parameter.kind.into(),
+                nominal: parameter.nominal.clone(),
+                weight: parameter.weight.clone(),
+            })
+            .collect()
+    }
+
+    /// What is left open, with its interval in a box.
+    pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
+        let quantities = self.quantities().into_iter().zip(&envelope.intervals);
+        quantities
+            .map(|(quantity, interval)| Range {
+                quantity,
+                lower: interval.lower.clone(),
+                upper: interval.upper.clone(),
+            })
+            .collect()
+    }
+
+    /// The same with what limits it.
+    pub(super) fn rooms(
+        &self,
+        envelope: &DecoupledEnvelope,
+        limits: Vec<[Option<String>; 2]>,
+    ) -> Vec<Room> {
+        let ranges = self.ranges(envelope).into_iter().zip(limits);
+        ranges
+            .map(|(range, [lower_limit, upper_limit])| Room {
+                range,
+                lower_limit,
+                upper_limit,
+            })
+            .collect()
+    }
+
+    /// The example of an explanation.
+    pub(super) fn counterexample(&self, explanation: &Explanation) -> Counterexample {
+        let names = self.plan.parameters.iter().map(|p| p.name.clone());
+        let values = explanation.valuation.iter().cloned().map(Exact);
+        let shortfall = explanation.shortfall.as_ref();
+        let times = explanation.schedule.as_ref();
+        Counterexample {
+            message: explanation.reason.clone(),
+            shortfall: shortfall.and_then(Shortfall::value).cloned(),
+            verdict: explanation.verdict.clone(),
+            values: names.zip(values).collect(),
+            schedule: times.map_or_else(Vec::new, |times| self.happenings(times)),
+            plays: explanation.plays.clone(),
+        }
+    }
+
+    fn happenings(&self, times: &[Rational]) -> Vec<Happening> {
+        let plan = &self.plan.plan;
+        let at = |node: NodeId| Exact(times[node.index()].clone());
+        let mut happenings: Vec<Happening> = plan
+            .instances
+            .iter()
+            .map(|instance| Happening {
+                instance: instance.label.clone(),
+                action: instance.action.name.clone(),
+                start: Exact(Rational::ZERO),
+                end: None,
+            })
+            .collect();
+        for (node, what) in plan.nodes() {
+            match what {
+                Node::Start(of) | Node::Instant(of) => happenings[of.index()].start = at(node),
+                Node::End(of) => happenings[of.index()].end = Some(at(node)),
+                _ => {}
+            }
+        }
+        happenings
+    }
+}

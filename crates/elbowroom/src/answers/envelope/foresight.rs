@@ -1,0 +1,125 @@
+//! What knowing values in advance would be worth.
+
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{Guarantee, Objection, Oracle, StopReason, irr};
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
+use serde::{Deserialize, Serialize};
+
+use super::Subject;
+use super::search::flow;
+use crate::answers::{Exact, RequestError, Watcher};
+use crate::flow::FlowError;
+
+/// In sums of widths an end counts up to that many times the nominal value.
+const CAP: i64 = 10;
+
+/// How much larger the envelope would be for an executor that knows values in advance.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Foresight {
+    /// The quantities that one would have to know in advance, by name.
+    pub unknown: Vec<String>,
+    /// The sum of the widths of all intervals, ends counted up to ten times the nominal value.
+    pub width: Exact,
+    /// The same of the weak envelope.
+    pub weak_width: Exact,
+}
+
+/// What foresight would be worth, if an end of the box is kept where it is by its want.
+pub(super) fn foresight(
+    subject: &Subject<'_>,
+    oracle: &mut Oracle,
+    envelope: &DecoupledEnvelope,
+    watcher: &mut dyn Watcher,
+) -> Result<Option<Foresight>, RequestError> {
+    let request = subject.request;
+    if request.guarantee != Guarantee::Dynamic {
+        return Ok(None);
+    }
+    let unknown = unknown(
+        subject.plan,
+        oracle,
+        envelope,
+        &request.search.precision,
+        watcher,
+    )?;
+    if unknown.is_empty() || flow(watcher).is_break() {
+        return Ok(None);
+    }
+    let weak = Oracle::new(
+        &request.task,
+        subject.plan,
+        &request.epsilon,
+        Guarantee::Weak,
+    );
+    let mut weak = weak.map_err(FlowError::Refused)?;
+    let settings = elbowroom_envelope::Settings {
+        precision: request.search.precision.clone(),
+        growth: request.search.growth,
+        most_checks: request.search.most_checks,
+    };
+    let run = irr(&mut weak, &settings, &mut |_| flow(watcher)).map_err(FlowError::Refused)?;
+    let (StopReason::Converged, Ok(weak)) = (run.stop, run.envelope) else {
+        return Ok(None);
+    };
+    let (width, weak_width) = (width(subject.plan, envelope), width(subject.plan, &weak));
+    if weak_width <= width {
+        return Ok(None);
+    }
+    let name = |id: ParameterId| subject.plan.parameter(id).name.clone();
+    Ok(Some(Foresight {
+        unknown: unknown.into_iter().map(name).collect(),
+        width: Exact(width),
+        weak_width: Exact(weak_width),
+    }))
+}
+
+/// The quantities whose values would have to be known in advance for some end to move further.
+fn unknown(
+    plan: &ParametrizedPlan,
+    oracle: &mut Oracle,
+    envelope: &DecoupledEnvelope,
+    step: &Rational,
+    watcher: &mut dyn Watcher,
+) -> Result<Vec<ParameterId>, RequestError> {
+    let mut unknown = Vec::new();
+    for index in 0..plan.parameters.len() {
+        for side in Side::BOTH {
+            if let ControlFlow::Break(()) = flow(watcher) {
+                return Ok(unknown);
+            }
+            let end = BoxEnd {
+                parameter: ParameterId::from(index),
+                side,
+            };
+            let Some(reach) = end.reach(envelope) else {
+                continue;
+            };
+            let farther = end.with_reach(envelope, Some(reach + step));
+            let objection = oracle.objection(&farther).map_err(FlowError::Refused)?;
+            if let Some(Objection::Uncontrollable(conflict)) = objection {
+                unknown.extend(conflict.ends().iter().map(|end| end.parameter));
+            }
+        }
+    }
+    unknown.sort_unstable();
+    unknown.dedup();
+    Ok(unknown)
+}
+
+/// The sum of the widths of all intervals.
+fn width(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
+    let cap = Rational::from(CAP);
+    let widths = plan.parameters.iter().zip(&envelope.intervals);
+    let widths = widths.map(|(parameter, interval)| {
+        let most = parameter.nominal.abs() * &cap;
+        let upper = interval
+            .upper
+            .value()
+            .map_or(&most, |upper| upper.min(&most));
+        let lower = interval.lower.value().cloned().unwrap_or_else(|| -&most);
+        (upper - lower).max(Rational::ZERO)
+    });
+    widths.fold(Rational::ZERO, |sum, width| sum + width)
+}

@@ -1,0 +1,132 @@
+//! The search for an envelope, from the nominal values to what limits each end.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom_envelope::{Oracle, StopReason, Widening, irr, sharpen};
+use elbowroom_plan::DecoupledEnvelope;
+
+use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
+use super::foresight::foresight;
+use super::limits::what_limits;
+use super::{EnvelopeOutcome, Subject};
+use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
+use crate::flow::FlowError;
+
+/// Searches, moves the ends onto their limits if that is wanted, and asks what limits them.
+pub(super) fn search(
+    subject: &Subject<'_>,
+    mut oracle: Oracle,
+    watcher: &mut dyn Watcher,
+) -> Result<EnvelopeOutcome, RequestError> {
+    let how = &subject.request.search;
+    let begun = watcher.elapsed();
+    let settings = elbowroom_envelope::Settings {
+        precision: how.precision.clone(),
+        growth: how.growth,
+        most_checks: how.most_checks,
+    };
+    let mut widenings = Vec::new();
+    let mut history = History {
+        subject,
+        watcher,
+        begun,
+        envelope: DecoupledEnvelope::point(&subject.plan.nominal()),
+        widenings: &mut widenings,
+        steps: 0,
+        halt: None,
+    };
+    let search = irr(&mut oracle, &settings, &mut |widening| {
+        history.step(widening)
+    })
+    .map_err(FlowError::Refused)?;
+    let mut stop = match (search.stop, history.halt) {
+        (_, Some(halt)) => halt.into(),
+        (StopReason::CheckLimit, None) => Stop::CheckLimit,
+        (StopReason::Undecided, None) => Stop::Undecided,
+        (StopReason::Converged | StopReason::Cancelled, None) => Stop::Converged,
+    };
+    let mut envelope = match search.envelope {
+        Ok(envelope) => envelope,
+        Err(objection) => {
+            let point = DecoupledEnvelope::point(&subject.plan.nominal());
+            let why_not = subject.explainer.objection(&oracle, &point, &objection);
+            return Ok(subject.fails(why_not));
+        }
+    };
+    if how.sharpen && stop == Stop::Converged {
+        let sharp = sharpen(&mut oracle, &envelope, &mut || flow(watcher));
+        if let Some(sharp) = sharp.map_err(FlowError::Refused)? {
+            envelope = sharp;
+        }
+        if let ControlFlow::Break(halt) = watcher.flow() {
+            stop = halt.into();
+        }
+    }
+    let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
+    let checks = oracle.checks();
+    let limits = what_limits(subject, &mut oracle, &envelope, watcher);
+    let foresight = match stop {
+        Stop::Converged => foresight(subject, &mut oracle, &envelope, watcher)?,
+        _ => None,
+    };
+    let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
+        parameters: subject.rooms(&envelope, limits),
+        stop,
+        checks,
+        seconds,
+        widenings,
+        foresight,
+        makespans: Makespans::of(subject.plan, &envelope),
+    });
+    outcome.envelope = Some(envelope);
+    Ok(outcome)
+}
+
+/// What a watcher says, for those who need not know why.
+pub(super) fn flow(watcher: &mut dyn Watcher) -> ControlFlow<()> {
+    match watcher.flow() {
+        ControlFlow::Continue(()) => ControlFlow::Continue(()),
+        ControlFlow::Break(_) => ControlFlow::Break(()),
+    }
+}
+
+/// Keeps a list of widenings, and tells the watcher.
+struct History<'a> {
+    subject: &'a Subject<'a>,
+    watcher: &'a mut dyn Watcher,
+    begun: Duration,
+    /// The box so far.
+    envelope: DecoupledEnvelope,
+    widenings: &'a mut Vec<Widened>,
+    /// How many steps have been tried.
+    steps: usize,
+    /// Why the watcher wanted no more.
+    halt: Option<Halt>,
+}
+
+impl History<'_> {
+    fn step(&mut self, widening: Option<&Widening<'_>>) -> ControlFlow<()> {
+        self.steps += 1;
+        if let Some(widening) = widening {
+            let seconds = self.watcher.elapsed().saturating_sub(self.begun);
+            let plan = self.subject.plan;
+            self.widenings
+                .push(Widened::of(plan, widening, seconds.as_secs_f64()));
+            self.envelope.clone_from(widening.envelope);
+        }
+        self.watcher.notice(&Event::Envelope(EnvelopeProgress {
+            plan: self.subject.plan,
+            envelope: &self.envelope,
+            widenings: self.widenings.len(),
+            steps: self.steps,
+        }));
+        match self.watcher.flow() {
+            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+            ControlFlow::Break(halt) => {
+                self.halt = Some(halt);
+                ControlFlow::Break(())
+            }
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! What every document begins with.
+
+use serde::{Deserialize, Serialize};
+
+/// The version of a document, 1. Within it, members are added but never changed or removed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct Version;
+
+impl From<Version> for u32 {
+    fn from(Version: Version) -> Self {
+        1
+    }
+}
+
+impl TryFrom<u32> for Version {
+    type Error = String;
+
+    fn try_from(number: u32) -> Result<Self, String> {
+        match number {
+            1 => Ok(Self),
+            other => Err(format!(
+                "version {other} of this document cannot be read, only 1"
+            )),
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Which orderings and times does a plan need?
+
+use elbowroom_model::Task;
+use elbowroom_model::validate::Violation;
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, Node, NodeId, ParametrizedPlan};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{RequestError, Version, ViolationAnswer, exact};
+use crate::AnyPlan;
+use crate::flow::{self, FlowError};
+use crate::graph;
+
+/// Asks for a plan with only the orderings and bounds that it needs.
+#[derive(Clone, Debug)]
+pub struct StnRequest<'a> {
+    /// The problem.
+    pub task: &'a Task,
+    /// The plan. One that is a network already is taken as it is.
+    pub plan: AnyPlan,
+    /// The least separation of interfering happenings (ε); positive.
+    pub epsilon: Rational,
+}
+
+/// The answer, and what it is about.
+#[derive(Clone, Debug)]
+pub struct StnOutcome {
+    /// The answer as a document.
+    pub answer: StnAnswer,
+    /// The network; `None` if the judge rejects the plan.
+    pub plan: Option<ParametrizedPlan>,
+    /// What the judge objects to in the plan's own times, if times close to these were taken.
+    pub repaired: Option<Box<Violation>>,
+}
+
+/// A plan as a network: `docs/formats/stn-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StnAnswer {
+    /// Always the same.
+    pub format: StnFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: StnFinding,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum StnFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-stn")]
+    Stn,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum StnFinding {
+    /// The plan as a network.
+    Network {
+        /// The domain's name.
+        domain: String,
+        /// The problem's name.
+        problem: String,
+        /// The time points.
+        nodes: Vec<NodeAnswer>,
+        /// Bounds on their differences.
+        constraints: Vec<ConstraintAnswer>,
+    },
+    /// The judge rejects the plan.
+    Invalid {
+        /// Why.
+        violation: ViolationAnswer,
+    },
+}
+
+/// A time point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodeAnswer {
+    /// As in STN plan files.
+    pub name: String,
+    /// What happens there, in words.
+    pub what: String,
+    /// When, for timed initials.
+    #[serde(with = "exact::option")]
+    pub time: Option<Rational>,
+}
+
+/// `lower <= to - from <= upper`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConstraintAnswer {
+    /// The name of a node.
+    pub from: String,
+    /// The name of a node.
+    pub to: String,
+    /// The lower bound.
+    #[serde(
+        serialize_with = "BoundAnswer::serialize_lower",
+        deserialize_with = "BoundAnswer::deserialize_lower"
+    )]
+    pub lower: BoundAnswer,
+    /// The upper bound.
+    #[serde(
+        serialize_with = "BoundAnswer::serialize_upper",
+        deserialize_with = "BoundAnswer::deserialize_upper"
+    )]
+    pub upper: BoundAnswer,
+    /// Why it is there, in one word.
+    pub reason: String,
+}
+
+/// A bound of a constraint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BoundAnswer {
+    /// There is none.
+    Infinite,
+    /// A number.
+    Finite(Rational),
+    /// The parameter of that name.
+    Parameter(String),
+}
+
+/// Makes a network of a plan.
+///
+/// # Errors
+/// When the plan cannot be deordered. That it is not valid is an answer.
+pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
+    let task = request.task;
+    let (plan, repaired) = match &request.plan {
+        AnyPlan::Stn(plan) => (plan.clone(), None),
+        AnyPlan::TimeTriggered(plan) => match flow::free(task, plan, &request.epsilon) {
+            Ok(freed) => {
+                let repaired = freed.repaired.clone();
+                (flow::closed(task, freed, &request.epsilon), repaired)
+            }
+            Err(FlowError::Invalid(violation)) => {
+                let violation = (&*violation).into();
+                return Ok(StnOutcome {
+                    answer: answer(StnFinding::Invalid { violation }),
+                    plan: None,
+                    repaired: None,
+                });
+            }
+            Err(error) => return Err(error.into()),
+        },
+    };
+    Ok(StnOutcome {
+        answer: answer(network(task, &plan)),
+        plan: Some(plan),
+        repaired,
+    })
+}
+
+fn answer(finding: StnFinding) -> StnAnswer {
+    StnAnswer {
+        format: StnFormat::Stn,
+        version: Version,
+        finding,
+    }
+}
+
+fn network(task: &Task, plan: &ParametrizedPlan) -> StnFinding {
+    let nodes = plan.plan.nodes();
+    let constraints = plan.plan.constraints.iter();
+    StnFinding::Network {
+        domain: task.problem().domain.clone(),
+        problem: task.problem().name.clone(),
+        nodes: nodes.map(|(id, what)| node(task, plan, id, what)).collect(),
+        constraints: constraints.map(|own| constraint(plan, own)).collect(),
+    }
+}
+
+fn node(task: &Task, plan: &ParametrizedPlan, id: NodeId, what: Node) -> NodeAnswer {
+    NodeAnswer {
+        name: plan.plan.node_label(id),
+        what: plan.plan.node_words(task, id),
+        time: match what {
+            Node::Timed(index) => Some(task.timed()[index].time.clone()),
+            _ => None,
+        },
+    }
+}
+
+fn constraint(plan: &ParametrizedPlan, constraint: &Constraint) -> ConstraintAnswer {
+    let bound = |bound: &Bound| match bound {
+        Bound::Infinite => BoundAnswer::Infinite,
+        Bound::Finite(value) => BoundAnswer::Finite(value.clone()),
+        Bound::Parameter(id) => BoundAnswer::Parameter(plan.parameter(*id).name.clone()),
+    };
+    ConstraintAnswer {
+        from: plan.plan.node_label(constraint.from),
+        to: plan.plan.node_label(constraint.to),
+        lower: bound(&constraint.lower),
+        upper: bound(&constraint.upper),
+        reason: graph::reason(&constraint.reason).to_owned(),
+    }
+}
+
+/// A bound as it stands in a document: one of the two.
+#[derive(Deserialize)]
+struct Written {
+    parameter: Option<String>,
+    exact: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Named<'a> {
+    parameter: &'a str,
+}
+
+impl BoundAnswer {
+    fn serialize_lower<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.serialize(exact::MINUS_INFINITY, serializer)
+    }
+
+    fn serialize_upper<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.serialize(exact::INFINITY, serializer)
+    }
+
+    fn deserialize_lower<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::deserialize(exact::MINUS_INFINITY, deserializer)
+    }
+
+    fn deserialize_upper<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::deserialize(exact::INFINITY, deserializer)
+    }
+
+    fn serialize<S: Serializer>(
+        &self,
+        infinity: &'static str,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Infinite => exact::infinite(infinity, serializer),
+            Self::Finite(value) => exact::serialize(value, serializer),
+            Self::Parameter(parameter) => Named { parameter }.serialize(serializer),
+        }
+    }
+
+    fn deserialize<'de, D: Deserializer<'de>>(
+        infinity: &'static str,
+        deserializer: D,
+    ) -> Result<Self, D::Error> {
+        match Written::deserialize(deserializer)? {
+            Written {
+                parameter: Some(parameter),
+                ..
+            } => Ok(Self::Parameter(parameter)),
+            Written {
+                exact: Some(exact), ..
+            } if exact == infinity => Ok(Self::Infinite),
+            Written {
+                exact: Some(exact), ..
+            } => exact.parse().map(Self::Finite).map_err(D::Error::custom),
+            _ => Err(D::Error::custom("a bound is a number or a parameter")),
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! What the judge says is wrong with a plan.
+
+use elbowroom_model::validate::Violation;
+use elbowroom_num::Rational;
+use serde::{Deserialize, Serialize};
+
+/// When a plan goes wrong, in which action, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViolationAnswer {
+    /// When.
+    #[serde(with = "super::exact")]
+    pub time: Rational,
+    /// In which action; `None` if it is the goal that does not hold.
+    pub action: Option<String>,
+    /// The position of that action in the plan, from 0.
+    pub step: Option<usize>,
+    /// All of it, in words.
+    pub message: String,
+}
+
+impl From<&Violation> for ViolationAnswer {
+    fn from(violation: &Violation) -> Self {
+        let action = violation.action.as_ref();
+        Self {
+            time: violation.time.clone(),
+            action: action.map(|action| action.name.clone()),
+            step: action.map(|action| action.step),
+            message: violation.to_string(),
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! How a world beats every executor in a box that cannot be kept to, played out.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::uncertain::PlanNetwork;
+use elbowroom_plan::{DecoupledEnvelope, InstanceId, Node, NodeId, network_node};
+use elbowroom_stn::uncertain::Spoiler;
+use elbowroom_stn::{ConsistentNetwork, Constraint, MovingWindows, OutOfWindow};
+
+use super::Explainer;
+
+/// A play is given up after so many rounds: it goes on for ever only if nothing has a limit.
+const MOST_ROUNDS: usize = 10_000;
+
+/// When an executor that knows nothing in advance starts what it may start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Policy {
+    /// As early as the windows allow.
+    Early,
+    /// As late as they allow.
+    Late,
+}
+
+/// What came of a play.
+struct Play {
+    /// What happened, in order.
+    happened: Vec<(Rational, NodeId)>,
+    /// What could not be kept.
+    broken: OutOfWindow,
+    windows: MovingWindows,
+}
+
+impl Explainer<'_> {
+    /// What the world does to an executor that starts everything early, and to one that starts
+    /// everything late, in words. Empty if the network can be controlled after all.
+    pub(super) fn spoiled(&self, refused: &DecoupledEnvelope) -> Vec<String> {
+        let Ok(network) = self.plan.uncertain_network(refused) else {
+            return Vec::new();
+        };
+        if network.network.is_dynamically_controllable() {
+            return Vec::new();
+        }
+        [Policy::Early, Policy::Late]
+            .into_iter()
+            .filter_map(|policy| {
+                let play = self.play(&network, policy)?;
+                Some(self.play_in_words(&network, policy, &play))
+            })
+            .collect()
+    }
+
+    fn play(&self, network: &PlanNetwork, policy: Policy) -> Option<Play> {
+        let zero = network_node(NodeId::ZERO);
+        let spoiler = Spoiler::new(network.network.clone(), zero);
+        let mut all = network.network.requirements().clone();
+        for link in network.network.links() {
+            let (from, to) = (link.activation, link.end);
+            all.add(Constraint::at_least(from, to, link.lower.clone()));
+            if let Some(upper) = &link.upper {
+                all.add(Constraint::at_most(from, to, upper.clone()));
+            }
+        }
+        let mut windows = MovingWindows::new(ConsistentNetwork::try_from(all).ok()?, zero);
+        let mut times: Vec<Option<Rational>> = vec![None; self.plan.plan.nodes.len()];
+        times[0] = Some(Rational::ZERO);
+        let mut happened = Vec::new();
+        let mut now = Rational::ZERO;
+        for _ in 0..MOST_ROUNDS {
+            let mut next: Option<(Rational, NodeId)> = None;
+            let ending = spoiler.ends_now(&now, &times);
+            let mut moved: Vec<NodeId> = ending
+                .iter()
+                .map(|link| NodeId(network.network.link(*link).end.0))
+                .collect();
+            if moved.is_empty() {
+                for (node, _) in self.plan.plan.nodes().skip(1) {
+                    if times[node.index()].is_some()
+                        || network.network.is_contingent(network_node(node))
+                        || !is_ready(network, &times, node)
+                    {
+                        continue;
+                    }
+                    let window = windows.window(network_node(node));
+                    let time = match policy {
+                        Policy::Early => window.earliest.clone(),
+                        Policy::Late => window.latest.clone(),
+                    };
+                    // What may be put off for ever is not put off.
+                    let time = time.or_else(|| window.earliest.clone()).unwrap_or_default();
+                    if next.as_ref().is_none_or(|(earliest, _)| time < *earliest) {
+                        next = Some((time, node));
+                    }
+                }
+                if let Some((_, node)) = next.as_ref().filter(|(time, _)| *time <= now) {
+                    moved.push(*node);
+                }
+            }
+            for node in &moved {
+                times[node.index()] = Some(now.clone());
+                happened.push((now.clone(), *node));
+                if let Err(broken) = windows.fix(network_node(*node), &now) {
+                    return Some(Play {
+                        happened,
+                        broken,
+                        windows,
+                    });
+                }
+            }
+            if !moved.is_empty() {
+                continue;
+            }
+            let look = spoiler.next_look(&now, &times);
+            let next = next.map(|(time, _)| time);
+            let Some(later) = look.into_iter().chain(next).min() else {
+                return None;
+            };
+            now = later;
+        }
+        None
+    }
+
+    fn play_in_words(&self, network: &PlanNetwork, policy: Policy, play: &Play) -> String {
+        let begun = |id: InstanceId| {
+            let is_start = |(_, node): &&(Rational, NodeId)| {
+                self.plan.plan.nodes[node.index()] == Node::Start(id)
+            };
+            play.happened
+                .iter()
+                .find(is_start)
+                .map(|(time, _)| time.clone())
+        };
+        let mut events = Vec::new();
+        for (time, node) in &play.happened {
+            match self.plan.plan.nodes[node.index()] {
+                Node::Start(id) | Node::Instant(id) => {
+                    events.push(format!(
+                        "{} at {}",
+                        self.action_name(id),
+                        time.to_decimal(3)
+                    ));
+                }
+                Node::End(id) if network.network.is_contingent(network_node(*node)) => {
+                    let took = begun(id).map(|begun| (time - begun).to_decimal(3));
+                    events.push(format!(
+                        "{} takes {}",
+                        self.action_name(id),
+                        took.unwrap_or_default()
+                    ));
+                }
+                Node::End(_) | Node::Zero | Node::Timed(_) => {}
+            }
+        }
+        let how = match policy {
+            Policy::Early => "early",
+            Policy::Late => "late",
+        };
+        let node = NodeId(play.broken.node.0);
+        let at = play
+            .happened
+            .last()
+            .map(|(time, _)| time.to_decimal(3))
+            .unwrap_or_default();
+        let limit = play.windows.grounds(play.broken.node, play.broken.end);
+        let mut behind: Vec<String> = limit
+            .iter()
+            .flat_map(|grounds| &grounds.constraints)
+            .filter_map(|id| network.constraint_of(*id))
+            .map(|index| self.constraint(index))
+            .collect();
+        behind.dedup();
+        let behind = match behind.as_slice() {
+            [] => String::new(),
+            _ => format!(" ({})", behind.join(", ")),
+        };
+        format!(
+            "started {how}: {}; then {} at {at} comes too {}{behind}",
+            events.join(", "),
+            self.plan.plan.node_words(self.task, node),
+            match play.broken.end {
+                elbowroom_stn::WindowEnd::Earliest => "early",
+                elbowroom_stn::WindowEnd::Latest => "late",
+            },
+        )
+    }
+}
+
+/// Whether all that a requirement puts before a node has happened.
+fn is_ready(network: &PlanNetwork, times: &[Option<Rational>], node: NodeId) -> bool {
+    let requirements = network.network.requirements();
+    let mut leaving = requirements.leaving(network_node(node));
+    leaving.all(|id| {
+        let constraint = requirements.constraint(id);
+        constraint.bound.is_positive() || times[constraint.to.index()].is_some()
+    })
+}

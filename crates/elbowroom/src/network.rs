@@ -1,0 +1,96 @@
+//! Temporal networks from files of the field: what can be promised about them, and how often they
+//! are kept.
+//!
+//! [`read()`] reads a file in any known format, [`examine`] answers a [`Request`] about it with an
+//! [`Answer`] that can be written as JSON and read back (`docs/formats/network.md`).
+//!
+//! ```
+//! use elbowroom::network::{Request, Verdict, examine, read};
+//!
+//! let text = "# KIND OF NETWORK\nSTNU\n# Time-Point Names\nbrewed drunk cooled\n\
+//!             # Ordinary Edges\ndrunk 0 cooled\n# Contingent Links\nbrewed 5 9 cooled\n";
+//! let file = read("tea.plainstnu", text.as_bytes())?;
+//! let answer = examine(&file, &Request::default())?;
+//! assert_eq!(answer.dynamic.map(|promise| promise.verdict), Some(Verdict::Yes));
+//! assert_eq!(answer.strong.map(|promise| promise.verdict), Some(Verdict::Yes));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod answer;
+mod dispatch;
+mod draws;
+mod reasons;
+mod simulate;
+
+use std::sync::Arc;
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::Dispatchable;
+
+pub use answer::{
+    Answer, Broken, Duration, Number, Promise, Reason, Simulated, Step, Time, Verdict,
+};
+pub use elbowroom_network::*;
+pub use simulate::{Durations, Simulation, SimulationError};
+
+/// More branches than that are not looked at for weak controllability, unless one asks for more.
+pub const MOST_BRANCHES: usize = 1 << 12;
+
+/// What to find out about a network.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// After how many branches the question of weak controllability is given up.
+    pub most_branches: usize,
+    /// Runs to make, if any.
+    pub simulation: Option<Simulation>,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            most_branches: MOST_BRANCHES,
+            simulation: None,
+        }
+    }
+}
+
+/// Which promises can be made about a network, why not others, and how often dispatch succeeds.
+///
+/// # Errors
+/// When the network cannot be simulated as asked.
+pub fn examine(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
+    let consistent = reasons::consistent(file);
+    let form = file.network.dynamic();
+    let (mut weak, mut dynamic, mut strong) = (None, None, None);
+    if !file.is_certain() {
+        weak = Some(match &form {
+            Ok(_) => Promise::yes(),
+            Err(_) => reasons::weak(file, request.most_branches),
+        });
+        dynamic = Some(match &form {
+            Ok(_) => Promise::yes(),
+            Err(conflict) => reasons::dynamic(file, conflict),
+        });
+        strong = Some(reasons::strong(file));
+    }
+    let form: Option<Arc<Dispatchable<Rational>>> = form.ok().map(Arc::new);
+    let simulation = match &request.simulation {
+        Some(simulation) => Some(simulate::run(file, form, simulation)?),
+        None => None,
+    };
+    Ok(Answer {
+        format: answer::FORMAT.to_owned(),
+        version: answer::VERSION,
+        name: file.name.clone(),
+        read_as: file.format.name().to_owned(),
+        points: file.points.len(),
+        requirements: file.network.requirements().constraints().len(),
+        links: file.network.links().len(),
+        remarks: file.remarks.clone(),
+        consistent,
+        weak,
+        dynamic,
+        strong,
+        simulation,
+    })
+}

@@ -1,0 +1,133 @@
+//! How often dispatch satisfies a network.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_network::NetworkFile;
+use elbowroom_num::Rational;
+use elbowroom_report::statistics::Proportion;
+use elbowroom_stn::uncertain::Dispatchable;
+use elbowroom_stn::{ConsistentNetwork, ConstraintId};
+use serde::{Deserialize, Serialize};
+
+use super::answer::{Broken, Simulated};
+use super::dispatch::{self, Executor};
+use super::draws::Draws;
+
+/// Requirements that are named as broken.
+const MOST_BROKEN: usize = 3;
+
+/// Runs to make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Simulation {
+    /// How many.
+    pub runs: u64,
+    /// The same seed gives the same runs.
+    pub seed: u64,
+    /// How durations are drawn.
+    pub durations: Durations,
+}
+
+/// How the durations of links are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Durations {
+    /// As the file says, and evenly between the bounds where it says nothing.
+    Given,
+    /// Evenly between the bounds.
+    Uniform,
+}
+
+/// A link has no upper bound, so its durations cannot be drawn evenly.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the link from `{activation}` to `{end}` has no upper bound, so no duration can be drawn \
+     evenly; {}",
+    if *is_given {
+        "draw durations as the file says"
+    } else {
+        "give it an upper bound or a distribution"
+    }
+)]
+pub struct SimulationError {
+    /// Where the link begins.
+    pub activation: String,
+    /// Where it ends.
+    pub end: String,
+    /// Whether the file says how its duration is distributed.
+    pub is_given: bool,
+}
+
+/// Makes the runs; without a dispatchable form, as early as windows allow.
+pub(super) fn run(
+    file: &NetworkFile,
+    form: Option<Arc<Dispatchable<Rational>>>,
+    simulation: &Simulation,
+) -> Result<Simulated, SimulationError> {
+    let draws = Draws::new(file, simulation.seed, simulation.durations)?;
+    let executor = form.map(Executor::Dispatchable).or_else(|| {
+        let kind = ConsistentNetwork::try_from(file.kind_network()).ok()?;
+        Some(Executor::EarlyFirst(kind.minimal()))
+    });
+    let name = match &executor {
+        Some(Executor::Dispatchable(_)) => "dispatchable",
+        _ => "early-first",
+    };
+    let mut proportion = Proportion::default();
+    let mut outside = 0;
+    let mut broken: BTreeMap<ConstraintId, u64> = BTreeMap::new();
+    for number in 0..simulation.runs {
+        let durations = draws.run(number);
+        outside += u64::from(is_outside(file, &durations));
+        // Without any schedule at all there is nothing to try.
+        let schedule = executor
+            .as_ref()
+            .and_then(|executor| dispatch::run(&file.network, executor, &durations));
+        let requirements = file.network.requirements();
+        let mut is_kept = schedule.is_some();
+        for id in requirements.constraint_ids() {
+            let constraint = requirements.constraint(id);
+            if schedule
+                .as_ref()
+                .is_some_and(|times| !constraint.holds_in(times))
+            {
+                is_kept = false;
+                *broken.entry(id).or_default() += 1;
+            }
+        }
+        proportion.add(is_kept);
+    }
+    let mut broken: Vec<(ConstraintId, u64)> = broken.into_iter().collect();
+    broken.sort_by_key(|&(id, runs)| (std::cmp::Reverse(runs), id));
+    let broken = broken
+        .into_iter()
+        .take(MOST_BROKEN)
+        .map(|(id, runs)| Broken {
+            requirement: file.requirement_in_words(id),
+            runs,
+        });
+    let (lowest, highest) = proportion.wilson().unwrap_or((0.0, 1.0));
+    Ok(Simulated {
+        runs: simulation.runs,
+        successes: proportion.successes,
+        share: proportion.share().unwrap_or_default(),
+        interval: [lowest, highest],
+        seed: simulation.seed,
+        durations: if file.durations.iter().all(Option::is_none) {
+            Durations::Uniform
+        } else {
+            simulation.durations
+        },
+        executor: name.to_owned(),
+        outside,
+        broken: broken.collect(),
+    })
+}
+
+fn is_outside(file: &NetworkFile, durations: &[Rational]) -> bool {
+    let links = file.network.links().iter().zip(durations);
+    let mut outside = links.map(|(link, duration)| {
+        *duration < link.lower || link.upper.as_ref().is_some_and(|upper| duration > upper)
+    });
+    outside.any(|is_outside| is_outside)
+}

@@ -1,0 +1,287 @@
+//! What must be fixed in a plan for each of its schedules to work, and how little of it.
+//!
+//! Deordering keeps what facts need. Conditions on numbers may need more: that a pump starts no
+//! later than so long after another one, say. Which differences of times these are is found by
+//! asking the soundness check ([`pin_until_sound`]); they are fixed at what they are in the plan,
+//! which is enough in any case. Then each end of each is moved out, all in turn and together with
+//! the durations that are left open, as long as every schedule works. So neither the pins nor the
+//! durations take all the room that there is.
+
+use elbowroom_envelope::linear::Factor;
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::soundness::{Broken, SoundBox, broken_in};
+use elbowroom_model::Task;
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
+use elbowroom_plan::{
+    Bound, BoxEnd, DecoupledEnvelope, InstanceId, NodeId, Parameter, ParameterId, ParameterKind,
+    ParametrizedPlan, Reason, Side, StnPlan,
+};
+
+/// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
+/// to work. If even fixing all of them does not help, the plan as it is: the box check will say
+/// what is wrong with it.
+pub(crate) fn sound(
+    task: &Task,
+    plan: ParametrizedPlan,
+    nominal: &[Rational],
+    epsilon: &Rational,
+) -> ParametrizedPlan {
+    let sided = |sided: fn(StnPlan) -> StnPlan| ParametrizedPlan {
+        plan: sided(plan.plan.clone()),
+        ..plan.clone()
+    };
+    let (one_way, all) = (sided(with_sides_one_way), sided(with_all_sides));
+    // With too much freedom there are too many cases to tell apart.
+    let is_manageable = most_sides(&plan.plan) <= MOST_SIDES;
+    let free = is_manageable.then(|| plan.clone());
+    let found = free
+        .iter()
+        .chain([&one_way, &all])
+        .find_map(|plan| pinned(task, plan, nominal, epsilon));
+    found.unwrap_or(all)
+}
+
+/// How many sides of one time point may be left open.
+const MOST_SIDES: usize = 12;
+
+/// The greatest number of sides of one time point.
+fn most_sides(plan: &StnPlan) -> usize {
+    let mut counts = vec![0_usize; plan.nodes.len()];
+    let sides = plan.constraints.iter();
+    for side in sides.filter(|constraint| constraint.reason == Reason::Side) {
+        counts[side.from.index()] += 1;
+        counts[side.to.index()] += 1;
+    }
+    counts.into_iter().max().unwrap_or(0)
+}
+
+/// The plan with pins, none of them needless, as loose as can be; `None` if nothing can be told.
+fn pinned(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    nominal: &[Rational],
+    epsilon: &Rational,
+) -> Option<ParametrizedPlan> {
+    let mut free = plan.clone();
+    free.plan = without_sides(free.plan).0;
+    let given = free.plan.constraints.len();
+    let with_pins = |fixed: &StnPlan| {
+        let mut candidate = free.clone();
+        let pins = fixed.constraints[given..].iter().cloned();
+        candidate.plan.constraints.extend(pins);
+        candidate
+    };
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let mut is_refused = false;
+    let mut oracle = |fixed: &StnPlan| {
+        let candidate = with_pins(fixed);
+        let broken = broken_in(task, &candidate, epsilon, &point);
+        is_refused |= broken.is_err();
+        let broken = broken.ok().flatten()?;
+        Some(nodes_of(&broken, candidate.plan.nodes.len()))
+    };
+    let at_nominal = plan.plan.at(&plan.nominal());
+    let fixed = pin_until_sound(at_nominal, nominal, &mut oracle)?;
+    let scale = longest(&plan.plan, nominal);
+    (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale, epsilon))
+}
+
+/// How long the longest action takes.
+fn longest(plan: &StnPlan, nominal: &[Rational]) -> Rational {
+    let durations = plan.instances.iter().enumerate().map(|(index, _)| {
+        let id = InstanceId::from(index);
+        &nominal[plan.end(id).index()] - &nominal[plan.start(id).index()]
+    });
+    durations.max().unwrap_or_default()
+}
+
+/// The time points that a broken obligation is about.
+fn nodes_of(broken: &Broken, count: usize) -> Vec<NodeId> {
+    let differences = broken.case.differences.iter();
+    let mut nodes: Vec<NodeId> = differences
+        .flat_map(|difference| [difference.from, difference.to])
+        .collect();
+    for inequality in &broken.case.inequalities {
+        let expression = &inequality.expression;
+        nodes.extend(expression.times.keys());
+        nodes.extend(
+            expression
+                .products
+                .keys()
+                .filter_map(|(_, factor)| match factor {
+                    Factor::Time(node) => Some(*node),
+                    Factor::Parameter(_) => None,
+                }),
+        );
+    }
+    // The moment inside an over-all condition is no node of the plan.
+    nodes.retain(|node| node.index() < count);
+    if let Requirement::Condition { node, .. }
+    | Requirement::Defined { node, .. }
+    | Requirement::OneUpdate { node, .. } = broken.requirement
+    {
+        nodes.push(node);
+    }
+    nodes
+}
+
+/// The plan with the bounds in its constraints from number `given` on moved out as far as was
+/// found.
+fn loosened(
+    task: &Task,
+    plan: ParametrizedPlan,
+    given: usize,
+    scale: &Rational,
+    epsilon: &Rational,
+) -> ParametrizedPlan {
+    let mut open = plan.clone();
+    let mut pins = Vec::new();
+    for (index, constraint) in open.plan.constraints.iter_mut().enumerate().skip(given) {
+        let Bound::Finite(least) = &constraint.lower else {
+            continue;
+        };
+        let id = ParameterId::from(open.parameters.len());
+        open.parameters.push(Parameter {
+            name: format!("pin {index}"),
+            kind: ParameterKind::Bound,
+            nominal: least.clone(),
+            weight: Rational::ONE,
+            range: match constraint.upper {
+                Bound::Infinite => Interval::at_most(least.clone()),
+                _ => Interval::EVERYTHING,
+            },
+        });
+        if constraint.lower == constraint.upper {
+            constraint.upper = Bound::Parameter(id);
+        }
+        constraint.lower = Bound::Parameter(id);
+        pins.push((index, id));
+    }
+    if pins.is_empty() {
+        return plan;
+    }
+    let Ok(Some(sound)) = SoundBox::new(task, &open, epsilon) else {
+        return plan;
+    };
+    let mut growth = Growth {
+        sound,
+        plan: &open,
+        checks: 0,
+    };
+    growth.run(scale, epsilon);
+    for &(_, id) in &pins {
+        growth.beyond(id);
+    }
+    let envelope = growth.sound.envelope();
+    let mut loose = plan;
+    for &(index, id) in &pins {
+        let bound = |end: &End| end.value().cloned().map_or(Bound::Infinite, Bound::Finite);
+        let interval = envelope.interval(id);
+        let constraint = &mut loose.plan.constraints[index];
+        constraint.lower = bound(&interval.lower);
+        if constraint.upper != Bound::Infinite {
+            constraint.upper = bound(&interval.upper);
+        }
+    }
+    loose.plan.constraints.retain(|constraint| {
+        let is_empty =
+            (&constraint.lower, &constraint.upper) == (&Bound::Infinite, &Bound::Infinite);
+        !is_empty || matches!(constraint.reason, Reason::Duration(_) | Reason::Timed(_))
+    });
+    loose
+}
+
+/// How many boxes are looked at before the rest stays as it is.
+const MOST_CHECKS: usize = 2_000;
+
+/// A box that grows as long as every schedule works.
+///
+/// Unlike in an envelope, there need not be a schedule for each value of a pin: that the schedules
+/// with that value work is enough.
+struct Growth<'a> {
+    sound: SoundBox<'a>,
+    plan: &'a ParametrizedPlan,
+    checks: usize,
+}
+
+impl Growth<'_> {
+    /// Moves all ends that are times out, by ever smaller steps, in turn: 500, 200, 100, 50, …
+    /// down to ε, or to a thousandth of `scale` where there are others to share with.
+    fn run(&mut self, scale: &Rational, epsilon: &Rational) {
+        let ends = self.ends();
+        let is_shared = ends.len() > 2;
+        let share = scale * &Rational::new(1, 1000);
+        let steps = steps(scale, epsilon).into_iter();
+        for step in steps.filter(|step| !is_shared || *step >= share) {
+            let mut open = ends.clone();
+            // A few steps of one size make the next larger one: that was refused, or nothing stops
+            // this end at all.
+            for _ in 0..MOST_STEPS {
+                open.retain(|&end| self.moves(end, &step));
+            }
+        }
+    }
+
+    /// Upper and lower ends of everything that is a time between two happenings.
+    fn ends(&self) -> Vec<BoxEnd> {
+        let is_time = |parameter: &Parameter| {
+            matches!(
+                parameter.kind,
+                ParameterKind::Duration(_) | ParameterKind::Bound
+            )
+        };
+        let parameters = self.plan.parameters.iter().enumerate();
+        parameters
+            .filter(|(_, parameter)| is_time(parameter))
+            .flat_map(|(index, _)| {
+                Side::BOTH.map(|side| BoxEnd {
+                    parameter: ParameterId::from(index),
+                    side,
+                })
+            })
+            .collect()
+    }
+
+    fn moves(&mut self, end: BoxEnd, step: &Rational) -> bool {
+        let Some(reach) = end.reach(self.sound.envelope()) else {
+            return false;
+        };
+        let reach = reach + step;
+        let border = end.side.reach(&self.plan.parameter(end.parameter).range);
+        border.is_none_or(|border| reach <= border) && self.accepts(end, Some(reach))
+    }
+
+    fn accepts(&mut self, end: BoxEnd, reach: Option<Rational>) -> bool {
+        self.checks += 1;
+        self.checks <= MOST_CHECKS && self.sound.try_reach(end, reach).unwrap_or(false)
+    }
+
+    /// Takes away the ends of a pin that nothing limits.
+    fn beyond(&mut self, pin: ParameterId) {
+        for side in Side::BOTH {
+            let end = BoxEnd {
+                parameter: pin,
+                side,
+            };
+            self.accepts(end, None);
+        }
+    }
+}
+
+/// How often an end moves by the same step.
+const MOST_STEPS: usize = 4;
+
+/// 5, 2 and 1 times each power of ten, from the first below `largest` down to `least`.
+fn steps(largest: &Rational, least: &Rational) -> Vec<Rational> {
+    let ten = Rational::from(10);
+    let mut unit = least.clone();
+    let mut steps = Vec::new();
+    while unit <= *largest {
+        steps.extend([1, 2, 5].map(|factor| &unit * &Rational::from(factor)));
+        unit = &unit * &ten;
+    }
+    steps.retain(|step| step <= largest);
+    steps.reverse();
+    steps
+}

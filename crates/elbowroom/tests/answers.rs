@@ -1,0 +1,255 @@
+//! Requests and their answers: what is in them, that they can be stored and read again, and that a
+//! watcher is heard.
+
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, check};
+use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Stop, envelope};
+use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
+use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
+use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
+use elbowroom::model::validate::Settings;
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+use elbowroom::{AnyPlan, plan};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+const CASES: [&str; 5] = ["battery", "delivery", "errand", "match", "tank"];
+
+fn text(case: &str, file: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
+    fs::read_to_string(folder.join(case).join(file)).expect("a file of the case")
+}
+
+fn read(case: &str) -> (Arc<Task>, TimeTriggeredPlan) {
+    read_with(case, &text(case, "plan.plan"))
+}
+
+fn read_with(case: &str, plan: &str) -> (Arc<Task>, TimeTriggeredPlan) {
+    let source = |file: &str| Source::new(file, text(case, file));
+    let read = pddl::read_problem(&source("domain.pddl"), &source("problem.pddl"));
+    let mut task = Task::new(read.expect("a case without mistakes").0);
+    let plan = pddl::read_plan(&Source::new("plan", plan), &mut task);
+    let plan = plan.expect("a plan without mistakes").0;
+    (Arc::new(task), plan)
+}
+
+fn asked(request: &EnvelopeRequest) -> EnvelopeOutcome {
+    envelope(request, &mut Unwatched).expect("within exact reasoning")
+}
+
+/// What is written can be read, and written again to the same bytes.
+fn assert_stored<T: Serialize + DeserializeOwned>(answer: &T) -> String {
+    let written = serde_json::to_string_pretty(answer).expect("a document");
+    let read: T = serde_json::from_str(&written).unwrap_or_else(|e| panic!("{e}\n{written}"));
+    let again = serde_json::to_string_pretty(&read).expect("a document");
+    assert_eq!(written, again);
+    written
+}
+
+#[test]
+fn answers_can_be_stored_and_read_again() {
+    for case in CASES {
+        let (task, plan) = read(case);
+        let request = EnvelopeRequest::new(&task, plan.clone());
+        let found = asked(&request);
+        assert_stored(&found.answer);
+        let opened = found.plan.expect("a valid plan");
+        let boxed = elbowroom::write_box(&found.envelope.expect("room"), &opened);
+        let inside = EnvelopeRequest {
+            contains: Some(boxed),
+            ..request.clone()
+        };
+        let inside = asked(&inside);
+        assert!(matches!(
+            inside.answer.finding,
+            EnvelopeFinding::Inside { .. }
+        ));
+        assert_stored(&inside.answer);
+        let everything = opened
+            .parameters
+            .iter()
+            .map(|p| format!("{}=[0,inf]", p.name));
+        let outside = EnvelopeRequest {
+            contains: Some(everything.collect::<Vec<_>>().join(" ")),
+            ..request.clone()
+        };
+        let outside = asked(&outside);
+        assert!(matches!(
+            outside.answer.finding,
+            EnvelopeFinding::Outside { .. }
+        ));
+        assert_stored(&outside.answer);
+        let judged = CheckRequest {
+            task: &task,
+            plan: Some(&plan),
+            name: "plan".to_owned(),
+            settings: Settings::default(),
+        };
+        let judged = check(&judged).expect("decidable");
+        assert_stored(&judged);
+        let network = stn(&StnRequest {
+            task: &task,
+            plan: AnyPlan::TimeTriggered(plan),
+            epsilon: request.epsilon.clone(),
+        });
+        assert_stored(&network.expect("a valid plan").answer);
+        // With parameters and infinite bounds.
+        let network = stn(&StnRequest {
+            task: &task,
+            plan: AnyPlan::Stn(plan::ParametrizedPlan::clone(&opened)),
+            epsilon: request.epsilon.clone(),
+        });
+        let written = assert_stored(&network.expect("a valid plan").answer);
+        assert!(written.contains("\"parameter\": \""));
+    }
+}
+
+#[test]
+fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
+    let (task, plan) = read_with("delivery", "0: (drive rover depot shelf) [10]");
+    let outcome = asked(&EnvelopeRequest::new(&task, plan.clone()));
+    assert!(outcome.plan.is_none() && outcome.envelope.is_none());
+    let EnvelopeFinding::Fails(Failing::Invalid { violation }) = &outcome.answer.finding else {
+        panic!("{:?}", outcome.answer)
+    };
+    let judged = check(&CheckRequest {
+        task: &task,
+        plan: Some(&plan),
+        name: String::new(),
+        settings: Settings::default(),
+    });
+    let Ok(CheckAnswer::Plan(judged)) = judged else {
+        panic!("{judged:?}")
+    };
+    let expected = CheckFinding::Invalid {
+        violation: violation.clone(),
+    };
+    assert_eq!(judged.finding, expected);
+    assert_stored(&outcome.answer);
+    let network = stn(&StnRequest {
+        task: &task,
+        plan: plan.into(),
+        epsilon: Rational::new(1, 1000),
+    })
+    .expect("an answer");
+    let expected = StnFinding::Invalid {
+        violation: violation.clone(),
+    };
+    assert_eq!(network.answer.finding, expected);
+    assert_stored(&network.answer);
+}
+
+#[test]
+fn documents_of_another_format_or_version_are_not_read() {
+    let (task, plan) = read("errand");
+    let written = assert_stored(&asked(&EnvelopeRequest::new(&task, plan)).answer);
+    let refuses = |text: &str| serde_json::from_str::<EnvelopeAnswer>(text).is_err();
+    assert!(!refuses(&written));
+    assert!(refuses(
+        &written.replace("elbowroom-envelope", "elbowroom-stn")
+    ));
+    assert!(refuses(
+        &written.replace("\"version\": 1", "\"version\": 2")
+    ));
+}
+
+#[test]
+fn ends_that_share_a_reason_stand_together_in_the_answer() {
+    let (task, plan) = read("delivery");
+    let mut request = EnvelopeRequest::new(&task, plan);
+    request.search.sharpen = true;
+    let answer = asked(&request).answer;
+    let EnvelopeFinding::Envelope {
+        parameters,
+        makespans,
+        ..
+    } = &answer.finding
+    else {
+        panic!("{answer:?}")
+    };
+    let limits = answer.limits();
+    let mut reasons: Vec<&str> = limits.iter().map(|limit| limit.reason.as_str()).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    assert_eq!(reasons.len(), limits.len(), "each reason once");
+    let limited: usize = limits.iter().map(|l| l.lower.len() + l.upper.len()).sum();
+    let known = parameters
+        .iter()
+        .flat_map(|room| [&room.lower_limit, &room.upper_limit]);
+    assert_eq!(limited, known.flatten().count());
+    let makespans = makespans.as_ref().expect("a plan with a schedule");
+    assert!(makespans.at_lower.as_ref() < Some(&makespans.nominal));
+    assert!(makespans.at_upper.as_ref() > Some(&makespans.nominal));
+}
+
+/// Wants no more after so many looks at a box, and remembers the last box.
+struct Impatient {
+    patience: usize,
+    halt: Halt,
+    last: Option<plan::DecoupledEnvelope>,
+}
+
+impl Watcher for Impatient {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.patience == 0 {
+            return ControlFlow::Break(self.halt);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        if let Event::Envelope(progress) = event {
+            self.patience -= 1;
+            self.last = Some(progress.envelope.clone());
+        }
+    }
+}
+
+#[test]
+fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
+    let (task, plan) = read("delivery");
+    let request = EnvelopeRequest::new(&task, plan);
+    for (patience, halt, stop) in [
+        (1, Halt::Cancelled, Stop::Cancelled),
+        (7, Halt::TimeLimit, Stop::TimeLimit),
+    ] {
+        let mut watcher = Impatient {
+            patience,
+            halt,
+            last: None,
+        };
+        let outcome = envelope(&request, &mut watcher).expect("within exact reasoning");
+        let EnvelopeFinding::Envelope { stop: found, .. } = outcome.answer.finding else {
+            panic!("{:?}", outcome.answer)
+        };
+        assert_eq!(found, stop);
+        assert_eq!(outcome.envelope, watcher.last, "it is the box seen last");
+        let contains = elbowroom::write_box(
+            &watcher.last.expect("seen"),
+            &outcome.plan.expect("a valid plan"),
+        );
+        let inside = asked(&EnvelopeRequest {
+            contains: Some(contains),
+            ..request.clone()
+        });
+        let is_inside = matches!(inside.answer.finding, EnvelopeFinding::Inside { .. });
+        assert!(is_inside, "what was found is sound");
+    }
+    let mut watcher = Impatient {
+        patience: 0,
+        halt: Halt::Cancelled,
+        last: None,
+    };
+    let outcome = envelope(&request, &mut watcher).expect("within exact reasoning");
+    let expected = EnvelopeFinding::None {
+        stop: Stop::Cancelled,
+    };
+    assert_eq!(outcome.answer.finding, expected);
+    assert_stored(&outcome.answer);
+}

@@ -1,0 +1,399 @@
+//! The end of a run: nothing is left running, nothing is thrown away, and a dead end has a reason.
+
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use elbowroom::execute::{Analyst, WholeRegion};
+use elbowroom::execution::executors::ExecutorSpec;
+use elbowroom::execution::run::{Ports, Report, Run, Verdict};
+use elbowroom::execution::{
+    Cause, Command, Ending, Event, NoPlanner, NoRecord, Observation, Passage, Planner, Recorder,
+    World, WorldError,
+};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
+use elbowroom::sim::{SimWorld, WorldModel};
+use serde_json::json;
+
+use crate::scene::{EXECUTORS, Scene};
+
+/// Two robots that have nothing to do with each other, and a lamp that somebody may put out.
+const ROBOTS: &str = "(define (domain robots)
+    (:requirements :durative-actions :negative-preconditions :timed-initial-literals)
+    (:predicates (lamp) (carried) (picked) (shelved) (open) (lit))
+    (:durative-action carry :parameters () :duration (= ?duration 100)
+      :condition () :effect (at end (carried)))
+    (:durative-action pick :parameters () :duration (= ?duration 10)
+      :condition (at start (shelved))
+      :effect (and (at start (not (shelved))) (at end (picked))))
+    (:durative-action fetch :parameters () :duration (= ?duration 10)
+      :condition (and (at start (carried)) (at start (shelved))) :effect (at end (picked)))
+    (:durative-action switch :parameters () :duration (= ?duration 1)
+      :condition () :effect (at end (lamp)))
+    (:durative-action sort :parameters () :duration (= ?duration 10)
+      :condition (and (at start (open)) (over all (lamp))) :effect (at end (lit))))";
+
+fn robots(init: &str, goal: &str, plan: &str) -> Scene {
+    let problem = format!("(define (problem p) (:domain robots) (:init {init}) (:goal {goal}))");
+    Scene::new(ROBOTS, &problem, Some(plan))
+}
+
+const BOTH: &str = "0: (carry) [100]\n0: (pick) [10]";
+
+/// A run that explains itself, and ends when it is asked to.
+fn run(
+    scene: &Scene,
+    executor: &str,
+    world: &mut dyn World,
+    planner: &mut dyn Planner,
+    recorder: &mut dyn Recorder,
+    is_to_end: &dyn Fn() -> bool,
+) -> Report {
+    let spec: ExecutorSpec = executor.parse().expect("a correct test");
+    let mut decider = spec.build(Box::new(WholeRegion {
+        epsilon: scene.settings.epsilon.clone(),
+    }));
+    let ports = Ports {
+        world,
+        planner,
+        preparer: &mut Analyst::new(scene.flow.clone()),
+        executor: decider.as_mut(),
+        need: spec.registered.need,
+        recorder,
+    };
+    Run::new(Arc::clone(&scene.task), &scene.settings, ports)
+        .explaining()
+        .ending_when(is_to_end)
+        .go(Some(&scene.plan))
+}
+
+/// A run in a simulated world, with what is running in it when the run is over.
+fn simulated(scene: &Scene, executor: &str, model: &WorldModel, plans: bool) -> (Report, usize) {
+    let mut world = SimWorld::new(Arc::clone(&scene.task), model, 0);
+    let report = if plans {
+        let mut planner = scene.planner();
+        run(
+            scene,
+            executor,
+            &mut world,
+            &mut planner,
+            &mut NoRecord,
+            &|| false,
+        )
+    } else {
+        run(
+            scene,
+            executor,
+            &mut world,
+            &mut NoPlanner,
+            &mut NoRecord,
+            &|| false,
+        )
+    };
+    let running = world.truth().running().len();
+    (report, running)
+}
+
+fn endings(report: &Report) -> Vec<(&str, Option<&str>)> {
+    let steps = report.executed.iter();
+    steps
+        .map(|it| {
+            let name = it.step.action.name.as_str();
+            (name, it.ending.as_ref().map(Ending::name))
+        })
+        .collect()
+}
+
+#[test]
+fn a_failed_pick_does_not_cancel_the_other_robots_drive() {
+    let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    // It fails before it has started, the first time.
+    let model =
+        scene.world("[[failure]]\naction = \"pick\"\nprobability = 0.5\nwhen = \"start\"\n");
+    for executor in EXECUTORS {
+        let mut replans = 0;
+        for seed in 0..20 {
+            let report = scene.run(executor, &model, seed);
+            assert_eq!(
+                report.verdict,
+                Verdict::GoalReached,
+                "{executor}: {report:#?}"
+            );
+            let carries = endings(&report);
+            let carries: Vec<_> = carries.iter().filter(|it| it.0 == "(carry)").collect();
+            assert_eq!(carries, [&("(carry)", Some("succeeded"))], "{executor}");
+            replans += report.replans;
+        }
+        // Those that try again by themselves need no new plan.
+        let retries = ["esterel", "adaptable", "lookahead"].contains(executor);
+        assert!(replans > 0 || retries, "{executor}");
+    }
+}
+
+#[test]
+fn when_the_planner_fails_what_runs_is_cancelled() {
+    let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    let model = scene.world("[[failure]]\naction = \"pick\"\nprobability = 1\nwhen = \"end\"\n");
+    for executor in EXECUTORS {
+        let (report, running) = simulated(&scene, executor, &model, false);
+        assert!(
+            matches!(report.verdict, Verdict::NoPlan { .. }),
+            "{executor}: {report:#?}"
+        );
+        assert_eq!(running, 0, "{executor}");
+        let all = endings(&report);
+        assert!(
+            all.iter().all(|(_, ending)| ending.is_some()),
+            "{executor}: {all:?}"
+        );
+        // Those that go by orders first do what is left of the plan.
+        let gives_up = !["adaptable", "lookahead"].contains(executor);
+        let is_cancelled = all.contains(&("(carry)", Some("cancelled")));
+        assert!(is_cancelled || !gives_up, "{executor}: {all:?}");
+    }
+}
+
+#[test]
+fn so_it_is_when_the_time_is_up_or_there_were_too_many_plans() {
+    let mut scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    scene.settings.time_limit = Rational::from(50);
+    let model = WorldModel::as_planned();
+    let (report, running) = simulated(&scene, "stn", &model, true);
+    assert_eq!((&report.verdict, running), (&Verdict::TimeLimit, 0));
+    assert_eq!(endings(&report)[0], ("(carry)", Some("cancelled")));
+    scene.settings.time_limit = Rational::from(100_000);
+    scene.settings.most_replans = 0;
+    let model = scene.world("[[failure]]\naction = \"pick\"\nprobability = 1\nwhen = \"end\"\n");
+    let (report, running) = simulated(&scene, "stn", &model, true);
+    assert_eq!((&report.verdict, running), (&Verdict::ReplanLimit, 0));
+    assert_eq!(endings(&report)[0], ("(carry)", Some("cancelled")));
+}
+
+/// The parcel is neither on the shelf nor in the hand: since the pick broke off.
+#[test]
+fn a_dead_end_says_what_can_never_become_true_again_and_since_when() {
+    let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    let model = scene.world("[[failure]]\naction = \"pick\"\nprobability = 1\nwhen = \"end\"\n");
+    let (report, running) = simulated(&scene, "guarded", &model, true);
+    assert_eq!((&report.verdict, running), (&Verdict::Unsolvable, 0));
+    let [reason] = report.dead_end.as_slice() else {
+        panic!("{:#?}", report.dead_end);
+    };
+    assert_eq!(reason.cause, Cause::NeverAgain);
+    assert_eq!(
+        reason.to_string(),
+        "(picked) can never become true again, since 10 (behind it: (pick) failed: it broke \
+         down)"
+    );
+}
+
+#[test]
+fn a_dead_end_may_come_from_an_observation_or_a_timed_initial_or_be_there_from_the_beginning() {
+    let plan = "0: (carry) [100]\n100.001: (fetch) [10]";
+    let scene = robots("(shelved)", "(and (carried) (picked))", plan);
+    let model = scene.world("[[event]]\nfact = \"(shelved)\"\nbecomes = false\nconstant = 30\n");
+    let (report, _) = simulated(&scene, "stn", &model, true);
+    let [reason] = report.dead_end.as_slice() else {
+        panic!("{report:#?}");
+    };
+    assert_eq!(reason.since, Some(Rational::from(30)));
+    assert_eq!(reason.behind, ["(shelved) was seen to be false"]);
+
+    // Nobody tells `esterel` that the shop closes.
+    let plan = "0: (pick) [10]\n10.001: (sort) [10]";
+    let init = "(shelved) (open) (lamp) (at 25 (not (open)))";
+    let scene = robots(init, "(and (picked) (lit))", plan);
+    let model = scene.world(
+        "[[duration]]\naction = \"pick\"\nconstant = 40\n\
+         [[failure]]\naction = \"sort\"\nprobability = 1\nwhen = \"start\"\n",
+    );
+    let (report, _) = simulated(&scene, "esterel", &model, true);
+    let reasons = report.dead_end.iter().map(ToString::to_string);
+    let reasons: Vec<_> = reasons.collect();
+    if !reasons.is_empty() {
+        assert_eq!(
+            reasons,
+            ["(lit) can never become true again, since 25 (behind it: (open) became false)"]
+        );
+    }
+    assert_ne!(report.verdict, Verdict::GoalReached);
+}
+
+/// At each moment at which it is asked, in every executor's run.
+#[test]
+fn a_run_that_is_asked_to_end_does_so_in_order_and_can_be_played_back() {
+    let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    let model =
+        scene.world("[[failure]]\naction = \"pick\"\nprobability = 0.5\nwhen = \"start\"\n");
+    for executor in ["fixed:30", "stn", "guarded", "live", "esterel"] {
+        for limit in 0..12 {
+            let asked = Cell::new(0);
+            let is_to_end = || {
+                asked.set(asked.get() + 1);
+                asked.get() > limit
+            };
+            let mut text = String::new();
+            let mut sink = |line: &str| text.push_str(line);
+            let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
+            writer.header(json!({}));
+            let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 1);
+            let mut planner = scene.planner();
+            let report = run(
+                &scene,
+                executor,
+                &mut world,
+                &mut planner,
+                &mut writer,
+                &is_to_end,
+            );
+            if report.verdict == Verdict::GoalReached {
+                continue;
+            }
+            assert_eq!(report.verdict, Verdict::Interrupted, "{executor}, {limit}");
+            assert!(world.truth().running().is_empty(), "{executor}, {limit}");
+            let open = report.executed.iter().filter(|it| it.ending.is_none());
+            assert_eq!(open.count(), 0, "{executor}, {limit}: {report:#?}");
+            // A late success is one.
+            assert!(text.contains("\"verdict\":\"interrupted\""), "{text}");
+
+            let stored = Stored::read(&text).expect("a correct test");
+            let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
+            let interruption = replay.interruption();
+            let again = run(
+                &scene,
+                executor,
+                &mut ReplayWorld::new(&stored, &scene.task),
+                &mut ReplayPlanner::new(&stored),
+                &mut replay,
+                &|| interruption.load(Ordering::SeqCst),
+            );
+            let (agreed, difference) = replay.outcome();
+            assert_eq!(difference, None, "{executor}, {limit}");
+            assert_eq!(agreed + 1, text.lines().count(), "{executor}, {limit}");
+            assert_eq!(again.verdict, Verdict::Interrupted);
+        }
+    }
+}
+
+/// A world in which cancelled actions need a while to stop, or never do.
+struct Sluggish<'a> {
+    inner: SimWorld<'a>,
+    stops_after: Option<i64>,
+    stopping: Vec<(Rational, Command)>,
+}
+
+impl World for Sluggish<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        match (command, self.stops_after) {
+            (Command::Cancel { .. }, Some(seconds)) => {
+                let time = now + Rational::from(seconds);
+                self.stopping.push((time, command.clone()));
+                Ok(())
+            }
+            (Command::Cancel { .. }, None) => Ok(()),
+            _ => self.inner.command(now, command),
+        }
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let Some((time, command)) = self.stopping.first().cloned() else {
+            return self.inner.wait(until);
+        };
+        let passage = self.inner.wait(until.min(&time))?;
+        if passage.now < time || !passage.observations.is_empty() {
+            return Ok(passage);
+        }
+        self.stopping.remove(0);
+        self.inner.command(&time, &command)?;
+        self.inner.wait(&time)
+    }
+}
+
+#[test]
+fn what_is_cancelled_at_the_end_has_a_moment_to_stop_and_no_more() {
+    let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
+    let model = scene.world("[[failure]]\naction = \"pick\"\nprobability = 1\nwhen = \"end\"\n");
+    for (stops_after, ending, time) in [
+        (Some(2), Some("cancelled"), 12),
+        (Some(60), None, 15),
+        (None, None, 15),
+    ] {
+        let inner = SimWorld::new(Arc::clone(&scene.task), &model, 0);
+        let mut world = Sluggish {
+            inner,
+            stops_after,
+            stopping: Vec::new(),
+        };
+        let report = run(
+            &scene,
+            "stn",
+            &mut world,
+            &mut NoPlanner,
+            &mut NoRecord,
+            &|| false,
+        );
+        assert!(
+            matches!(report.verdict, Verdict::NoPlan { .. }),
+            "{report:#?}"
+        );
+        assert_eq!(endings(&report)[0], ("(carry)", ending), "{stops_after:?}");
+        assert_eq!(report.time, Rational::from(time), "{stops_after:?}");
+    }
+}
+
+/// A world that never says that an action has failed.
+struct Silent<'a>(SimWorld<'a>);
+
+impl World for Silent<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.0.command(now, command)
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let mut passage = self.0.wait(until)?;
+        let is_told = |it: &Observation| {
+            let ending = match &it.event {
+                Event::Ended { ending, .. } => Some(ending),
+                _ => None,
+            };
+            !matches!(ending, Some(Ending::Failed { .. }))
+        };
+        passage.observations.retain(is_told);
+        Ok(passage)
+    }
+}
+
+/// The lamp goes out while somebody sorts: no plan can go on with that, but any with the carrying.
+#[test]
+fn what_can_no_longer_succeed_is_not_kept() {
+    let plan = "0: (carry) [100]\n0: (sort) [10]";
+    let scene = robots("(open) (lamp) (shelved)", "(and (carried) (lit))", plan);
+    let model = scene.world("[[event]]\nfact = \"(lamp)\"\nbecomes = false\nconstant = 5\n");
+    for executor in ["stn", "guarded", "live"] {
+        let mut world = Silent(SimWorld::new(Arc::clone(&scene.task), &model, 0));
+        let mut planner = scene.planner();
+        let report = run(
+            &scene,
+            executor,
+            &mut world,
+            &mut planner,
+            &mut NoRecord,
+            &|| false,
+        );
+        assert_eq!(
+            report.verdict,
+            Verdict::GoalReached,
+            "{executor}: {report:#?}"
+        );
+        let all = endings(&report);
+        assert_eq!(
+            all[..2],
+            [
+                ("(carry)", Some("succeeded")),
+                ("(sort)", Some("cancelled"))
+            ],
+            "{executor}"
+        );
+    }
+}

@@ -1,0 +1,89 @@
+//! Executors and what timed initials open and close; and what is left open together.
+
+use elbowroom::execution::run::Verdict;
+use elbowroom::num::Rational;
+use elbowroom::sim::WorldModel;
+
+use crate::scene::{EXECUTORS, Scene};
+
+const SHIPPING: &str = "(define (domain shipping)
+    (:requirements :durative-actions :timed-initial-literals)
+    (:predicates (packed) (van) (shipped) (ordered))
+    (:durative-action pack :parameters () :duration (= ?duration 4)
+      :condition (at start (ordered)) :effect (at end (packed)))
+    (:durative-action ship :parameters () :duration (= ?duration 6)
+      :condition (and (at start (packed)) (over all (van))) :effect (at end (shipped))))";
+
+/// `fixed:X` once shipped at 4.001, while the van comes at 20.
+#[test]
+fn nobody_ships_before_the_van_is_there() {
+    let problem = "(define (problem p) (:domain shipping)
+        (:init (ordered) (at 20 (van))) (:goal (shipped)))";
+    let plan = "0: (pack) [4]\n20.001: (ship) [6]";
+    let scene = Scene::new(SHIPPING, problem, Some(plan));
+    for executor in EXECUTORS.iter().chain(&["fixed:0", "fixed:60"]) {
+        let report = scene.run(executor, &WorldModel::as_planned(), 0);
+        assert_eq!(
+            report.verdict,
+            Verdict::GoalReached,
+            "{executor}: {report:#?}"
+        );
+        let ship = &report.executed.last().expect("two steps").step;
+        assert!(ship.start >= Rational::from(20), "{executor}: {report:#?}");
+        assert_eq!(report.replans, 0, "{executor}: {:?}", report.reasons);
+    }
+}
+
+#[test]
+fn fixed_sees_that_the_van_has_left_when_it_comes_to_shipping() {
+    let problem = "(define (problem p) (:domain shipping)
+        (:init (ordered) (van) (at 15 (not (van))) (at 40 (van))) (:goal (shipped)))";
+    let plan = "0: (pack) [4]\n4.001: (ship) [6]";
+    let scene = Scene::new(SHIPPING, problem, Some(plan));
+    let late = scene.world("[[duration]]\naction = \"pack\"\nconstant = 12\n");
+    let report = scene.run("fixed:300", &late, 0);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+    let ships = report.executed.iter();
+    let ships: Vec<_> = ships.filter(|it| it.step.action.name == "(ship)").collect();
+    let last = ships.last().expect("it was shipped");
+    assert!(last.step.start >= Rational::from(40), "{report:#?}");
+}
+
+const SPEED: &str = "(define (domain hauling)
+    (:requirements :durative-actions :fluents :duration-inequalities)
+    (:synth-parameters ?s) (:predicates (done)) (:functions (left))
+    (:durative-action haul :parameters () :duration (= ?duration 5)
+      :condition (at start (>= (left) 0))
+      :effect (and (at end (done)) (at start (decrease (left) ?s)))))";
+
+#[test]
+fn durations_and_a_domains_open_number_are_varied_together() {
+    let problem = "(define (problem p) (:domain hauling)
+        (:init (= (left) 10)) (:goal (and (done) (>= (left) 0))))";
+    let plan = "0: (haul) [5]";
+    for specs in [
+        &["?s=3"][..],
+        &["durations", "?s=3"],
+        &["?s=3", "durations"],
+    ] {
+        let mut scene = Scene::new(SPEED, problem, None.or(Some(plan)));
+        scene.flow.vary = specs
+            .iter()
+            .map(|spec| spec.parse().expect("a correct test"))
+            .collect();
+        elbowroom::execute::check_vary(&scene.task, &scene.flow.vary).expect("all are there");
+        let names = scene.prepared("guarded").plan.parameters;
+        let mut names: Vec<_> = names.into_iter().map(|parameter| parameter.name).collect();
+        names.sort();
+        assert_eq!(names.len(), 2, "{specs:?}: {names:?}");
+        let report = scene.run("guarded", &WorldModel::as_planned(), 0);
+        assert_eq!(
+            report.verdict,
+            Verdict::GoalReached,
+            "{specs:?}: {report:#?}"
+        );
+    }
+    let scene = Scene::new(SPEED, problem, Some(plan));
+    let wrong = ["?t=3".parse().expect("a correct test")];
+    elbowroom::execute::check_vary(&scene.task, &wrong).expect_err("there is no ?t");
+}

@@ -1,0 +1,309 @@
+//! Small plans of the kinds in which it is easy to promise something wrong: the judge, deordering,
+//! the box check and the nominal schedule, in whatever order the lines of the plan stand.
+
+mod kinds;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom::envelope::{self, Guarantee, Oracle, StopReason, irr};
+use elbowroom::model::{Task, TimeTriggeredPlan, Verdict, validate};
+use elbowroom::num::Rational;
+use elbowroom::plan::{DecoupledEnvelope, NodeId, ParametrizedPlan, format, network_node};
+use elbowroom::stn::ConsistentNetwork;
+use elbowroom::{flow, parse_box};
+use kinds::{Kind, kinds};
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn epsilon() -> Rational {
+    Rational::new(1, 1000)
+}
+
+fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
+    validate(task, plan, &elbowroom::model::validate::Settings::default())
+}
+
+/// The plan with all durations left open, and its nominal schedule.
+fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Vec<Rational>) {
+    let freed = flow::free(task, plan, &epsilon()).expect("a valid plan");
+    assert!(freed.repaired.is_none());
+    let nominal = freed.deordered.nominal.clone();
+    let open = flow::open(task, freed, &[], &epsilon()).expect("durations");
+    (Arc::new(open), nominal)
+}
+
+fn is_inside(kind: &Kind, guarantee: Guarantee, text: &str) -> bool {
+    let (task, plan) = kind.read();
+    let (open, _) = opened(&task, &plan);
+    let mut oracle = Oracle::new(&task, &open, &epsilon(), guarantee).expect("within reach");
+    let envelope = parse_box(text, &open).expect("a box of this plan");
+    oracle.objection(&envelope).expect("few cases").is_none()
+}
+
+/// Some schedules for values in the box: at its corners and inside, each as early or as late as can
+/// be, or with some times drawn.
+fn schedules(
+    open: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+    rng: &mut ChaCha8Rng,
+) -> Vec<TimeTriggeredPlan> {
+    let zero = network_node(NodeId::ZERO);
+    let draw = |rng: &mut ChaCha8Rng| {
+        let shares = [0, 0, 1, 3, 6, 6];
+        let share = |rng: &mut ChaCha8Rng| Rational::new(shares[rng.random_range(0..6)], 6);
+        let intervals = envelope.intervals.iter();
+        let values: Vec<Rational> = intervals
+            .map(|interval| {
+                let lower = interval.lower.value().expect("a finite box");
+                let upper = interval.upper.value().expect("a finite box");
+                lower + (upper - lower) * share(rng)
+            })
+            .collect();
+        let network = ConsistentNetwork::try_from(open.plan.network(&values));
+        let mut network = network.expect("a schedule for all values in the box");
+        let mut nodes: Vec<_> = open.plan.nodes().skip(1).map(|(node, _)| node).collect();
+        nodes.shuffle(rng);
+        for node in nodes.into_iter().map(network_node) {
+            let earliest = -network.distance(node, zero).expect("not before zero");
+            let latest = network.distance(zero, node);
+            let latest = latest.unwrap_or_else(|| &earliest + Rational::from(7));
+            let time = &earliest + (latest - &earliest) * share(rng);
+            for constraint in [
+                elbowroom::stn::Constraint::at_least(zero, node, time.clone()),
+                elbowroom::stn::Constraint::at_most(zero, node, time),
+            ] {
+                network.add(constraint).expect("in its window");
+            }
+        }
+        let schedule = network.earliest_schedule(zero).times().to_vec();
+        open.plan.at(&values).scheduled(&schedule)
+    };
+    (0..40).map(|_| draw(rng)).collect()
+}
+
+#[test]
+fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
+    for kind in kinds() {
+        let (task, plan) = kind.read();
+        assert!(judge(&task, &plan).is_valid(), "{}", kind.name);
+        let freed = flow::free(&task, &plan, &epsilon()).expect("a valid plan");
+        let nominal = freed.deordered.nominal.clone();
+        let closed = Arc::new(flow::closed(&task, freed, &epsilon()));
+        let schedule = elbowroom::stn::Schedule::new(nominal);
+        assert!(
+            schedule.holds_in(&closed.plan.network(&[])),
+            "{}",
+            kind.name
+        );
+        let mut oracle =
+            Oracle::new(&task, &closed, &epsilon(), Guarantee::Weak).expect("within reach");
+        let objection = oracle.objection(&DecoupledEnvelope::point(&[]));
+        assert_eq!(objection, Ok(None), "{}", kind.name);
+    }
+}
+
+#[test]
+fn boxes_are_inside_or_not_as_worked_out_by_hand() {
+    for kind in kinds() {
+        for (boxes, expected) in [(kind.inside, true), (kind.outside, false)] {
+            for text in boxes {
+                let found = is_inside(&kind, Guarantee::Weak, text);
+                assert_eq!(found, expected, "{}: {text}", kind.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn promises_can_be_kept_by_what_has_been_seen_or_not_as_worked_out_by_hand() {
+    for kind in kinds() {
+        for (boxes, expected) in [(kind.dynamic, true), (kind.not_dynamic, false)] {
+            for text in boxes {
+                assert!(is_inside(&kind, Guarantee::Weak, text), "{}", kind.name);
+                let found = is_inside(&kind, Guarantee::Dynamic, text);
+                assert_eq!(found, expected, "{}: {text}", kind.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_judge_accepts_every_schedule_drawn_from_a_box_that_is_inside() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    for kind in kinds() {
+        let (task, plan) = kind.read();
+        let (open, _) = opened(&task, &plan);
+        for text in kind.inside.iter().chain(kind.dynamic) {
+            let envelope = parse_box(text, &open).expect("a box of this plan");
+            for schedule in schedules(&open, &envelope, &mut rng) {
+                let verdict = judge(&task, &schedule);
+                let violation = verdict.violation().map(ToString::to_string);
+                assert_eq!(violation, None, "{}: {text}: {schedule:?}", kind.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    for kind in kinds() {
+        let (task, plan) = kind.read();
+        let (open, nominal) = opened(&task, &plan);
+        let at_nominal = open.plan.network(&open.nominal());
+        assert!(elbowroom::stn::Schedule::new(nominal).holds_in(&at_nominal));
+        let mut oracle =
+            Oracle::new(&task, &open, &epsilon(), Guarantee::Weak).expect("within reach");
+        let go_on = &mut |_: Option<&envelope::Widening<'_>>| ControlFlow::Continue(());
+        let run = irr(&mut oracle, &envelope::Settings::default(), go_on).expect("few cases");
+        assert_eq!(run.stop, StopReason::Converged, "{}", kind.name);
+        let mut found = run.envelope.expect("it works as planned");
+        for interval in &mut found.intervals {
+            let far = &interval.lower.value().cloned().unwrap_or_default() + Rational::from(60);
+            *interval = interval.intersection(&elbowroom::num::Interval::at_most(far));
+        }
+        for schedule in schedules(&open, &found, &mut rng) {
+            assert!(
+                judge(&task, &schedule).is_valid(),
+                "{}: {schedule:?}",
+                kind.name
+            );
+        }
+    }
+}
+
+/// All orders of the lines of a plan.
+fn orders(lines: &[&str]) -> Vec<String> {
+    if lines.is_empty() {
+        return vec![String::new()];
+    }
+    let mut all = Vec::new();
+    for index in 0..lines.len() {
+        let mut rest = lines.to_vec();
+        let first = rest.remove(index);
+        all.extend(
+            orders(&rest)
+                .into_iter()
+                .map(|rest| format!("{first}\n{rest}")),
+        );
+    }
+    all
+}
+
+#[test]
+fn the_order_of_the_lines_of_a_plan_does_not_matter() {
+    for kind in kinds() {
+        let (task, plan) = kind.read();
+        let (open, nominal) = opened(&task, &plan);
+        let envelope = flow::robust_plan(&task, &plan, &flow::Settings::default());
+        let envelope = envelope.expect("within reach").run.envelope;
+        let lines: Vec<&str> = kind.plan.lines().collect();
+        for text in orders(&lines) {
+            let (task, plan) = kind.read_with(&text);
+            assert!(judge(&task, &plan).is_valid(), "{}:\n{text}", kind.name);
+            let found = opened(&task, &plan);
+            assert_eq!(
+                found,
+                (Arc::clone(&open), nominal.clone()),
+                "{}:\n{text}",
+                kind.name
+            );
+            let found = flow::robust_plan(&task, &plan, &flow::Settings::default());
+            let found = found.expect("within reach").run.envelope;
+            assert_eq!(found, envelope, "{}:\n{text}", kind.name);
+        }
+    }
+}
+
+#[test]
+fn nothing_ties_ends_together_that_do_not_need_each_other() {
+    for kind in kinds() {
+        let (task, plan) = kind.read();
+        let (open, _) = opened(&task, &plan);
+        // Free of what durations are at present, no two ends coincide in all schedules.
+        let mut network = elbowroom::stn::Network::with_nodes(open.plan.nodes.len());
+        for constraint in &open.plan.constraints {
+            let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+            if let elbowroom::plan::Bound::Finite(lower) = &constraint.lower {
+                network.add(elbowroom::stn::Constraint::at_least(
+                    from,
+                    to,
+                    lower.clone(),
+                ));
+            }
+            if let elbowroom::plan::Bound::Finite(upper) = &constraint.upper {
+                network.add(elbowroom::stn::Constraint::at_most(from, to, upper.clone()));
+            }
+        }
+        let network = ConsistentNetwork::try_from(network).expect("a schedule");
+        let ends: Vec<NodeId> = open
+            .plan
+            .nodes()
+            .filter(|(_, what)| matches!(what, elbowroom::plan::Node::End(_)))
+            .map(|(node, _)| node)
+            .collect();
+        for &first in &ends {
+            for &second in &ends {
+                let there = network.distance(network_node(first), network_node(second));
+                let back = network.distance(network_node(second), network_node(first));
+                let is_tied = first != second && there.zip(back).is_some_and(|(a, b)| a == -b);
+                assert!(!is_tied, "{}", kind.name);
+            }
+        }
+    }
+}
+
+/// Two chains of actions, of which each has its namesake in the other: they take the same time,
+/// whatever that is, so both chains end together. A box does not show that before it has been taken
+/// apart at every duration.
+fn twin_chains(count: usize) -> String {
+    let mut text = String::new();
+    for index in 0..count {
+        text += &format!("parameter p{index} default 10 lb 0;\n");
+        for chain in ["a", "b"] {
+            text += &format!("durative-action instance {chain}{index} : (tick);\n");
+        }
+    }
+    for chain in ["a", "b"] {
+        text += &format!("c: {chain}0.start - .zero in [0, 0];\n");
+        for index in 0..count {
+            text +=
+                &format!("c: {chain}{index}.end - {chain}{index}.start in [p{index}, p{index}];\n");
+        }
+        for index in 1..count {
+            let before = index - 1;
+            text += &format!("c: {chain}{index}.start - {chain}{before}.end in [0, 0];\n");
+        }
+    }
+    let last = count - 1;
+    text + &format!("c: b{last}.end - a{last}.end in [-1, 1];\n")
+}
+
+#[test]
+fn what_was_found_is_kept_when_there_are_too_many_cases_to_tell_apart() {
+    const DOMAIN: &str = "(define (domain clocks)
+  (:requirements :durative-actions)
+  (:predicates (ticked))
+  (:durative-action tick :parameters () :duration (>= ?duration 0)
+    :condition () :effect (at end (ticked))))";
+    const PROBLEM: &str = "(define (problem two) (:domain clocks) (:init) (:goal (ticked)))";
+    let source = |text: &str| elbowroom::pddl::Source::new("clocks", text);
+    let (problem, _) =
+        elbowroom::pddl::read_problem(&source(DOMAIN), &source(PROBLEM)).expect("a problem");
+    let mut task = Task::new(problem);
+    let plan = format::read(twin_chains(20).as_bytes(), &mut task).expect("a plan");
+    let (task, plan) = (Arc::new(task), Arc::new(plan));
+    let mut oracle = Oracle::new(&task, &plan, &epsilon(), Guarantee::Weak).expect("within reach");
+    let go_on = &mut |_: Option<&envelope::Widening<'_>>| ControlFlow::Continue(());
+    let run = irr(&mut oracle, &envelope::Settings::default(), go_on).expect("an answer");
+    assert_eq!(run.stop, StopReason::Undecided);
+    assert!(run.widenings > 5, "{}", run.widenings);
+    let found = run.envelope.expect("it works as planned");
+    assert_eq!(
+        oracle.objection(&found),
+        Ok(None),
+        "what was kept is inside"
+    );
+}

@@ -1,0 +1,83 @@
+//! Obligations that a dispatcher can see to.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParametrizedPlan, Reason};
+use elbowroom_stn::{ConsistentNetwork, Weight};
+
+use crate::obligations::{BadCase, Difference, Obligations, Refusal};
+use crate::reduction::Reduction;
+use crate::soundness::earliest_schedule;
+
+/// The plan with constraints for all obligations that are bounds on the difference of two times,
+/// and how many there are that its network does not imply anyway.
+///
+/// Paper 1 asks that *every* schedule of the plan be valid, also those that a dispatcher would never
+/// choose. Where what makes a schedule valid is a bound on the difference of two times, the
+/// dispatcher can be told to keep to it; what is left to ask is that it can.
+///
+/// # Errors
+/// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+/// reasoning.
+pub fn enforced(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    epsilon: &Rational,
+) -> Result<(ParametrizedPlan, usize), Refusal> {
+    let reduction = Reduction::new(plan);
+    let nominal = plan.nominal();
+    let schedule = earliest_schedule(&reduction, &nominal).ok_or(Refusal::NoNominalSchedule)?;
+    let obligations =
+        Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
+    let ranges = DecoupledEnvelope {
+        intervals: plan
+            .parameters
+            .iter()
+            .map(|parameter| parameter.range.clone())
+            .collect(),
+    };
+    let network = ConsistentNetwork::try_from(reduction.network(&ranges).network).ok();
+    let is_implied = |wanted: &Difference| {
+        let Some(network) = &network else {
+            return false;
+        };
+        let (from, from_offset) = reduction.place(wanted.from);
+        let (to, to_offset) = reduction.place(wanted.to);
+        // `from - to <= distance`, so that `to - from >= -distance`.
+        let distance = network.distance(to, from);
+        distance.is_some_and(|distance| {
+            let least = distance.negated().real + to_offset - from_offset;
+            least >= wanted.bound
+        })
+    };
+    let mut enforced = plan.clone();
+    let direct = obligations
+        .direct
+        .iter()
+        .flat_map(|obligation| &obligation.bad_cases);
+    for difference in direct.filter_map(avoidable) {
+        if is_implied(difference) {
+            continue;
+        }
+        let constraint = Constraint {
+            from: difference.from,
+            to: difference.to,
+            lower: Bound::Finite(difference.bound.clone()),
+            upper: Bound::Infinite,
+            reason: Reason::Interference,
+        };
+        if !enforced.plan.constraints.contains(&constraint) {
+            enforced.plan.constraints.push(constraint);
+        }
+    }
+    let added = enforced.plan.constraints.len() - plan.plan.constraints.len();
+    Ok((enforced, added))
+}
+
+/// What is less than it must be in a bad case that is nothing else.
+fn avoidable(case: &BadCase) -> Option<&Difference> {
+    match (case.differences.as_slice(), case.inequalities.as_slice()) {
+        ([difference], []) if difference.is_strict => Some(difference),
+        _ => None,
+    }
+}

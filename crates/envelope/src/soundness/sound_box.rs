@@ -1,0 +1,64 @@
+//! A box that grows as long as every schedule in it is valid.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
+
+use super::Soundness;
+use crate::obligations::Refusal;
+
+/// A box in which every schedule is valid. That there is a schedule for each value is not asked,
+/// so where a parameter is the bound of a constraint, the ends of its interval may as well be the
+/// bounds of it.
+#[derive(Clone, Debug)]
+pub struct SoundBox<'a> {
+    task: &'a Task,
+    plan: &'a ParametrizedPlan,
+    soundness: Soundness,
+    envelope: DecoupledEnvelope,
+}
+
+impl<'a> SoundBox<'a> {
+    /// The nominal values; `None` if not even with these every schedule is valid.
+    ///
+    /// # Errors
+    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
+    /// reasoning.
+    pub fn new(
+        task: &'a Task,
+        plan: &'a ParametrizedPlan,
+        epsilon: &Rational,
+    ) -> Result<Option<Self>, Refusal> {
+        let nominal = plan.nominal();
+        let mut soundness = Soundness::around(task, plan, epsilon, &nominal)?;
+        let envelope = DecoupledEnvelope::point(&nominal);
+        let broken = soundness.broken(task, plan, &envelope, None)?;
+        Ok(broken.is_none().then_some(Self {
+            task,
+            plan,
+            soundness,
+            envelope,
+        }))
+    }
+
+    /// The box.
+    pub fn envelope(&self) -> &DecoupledEnvelope {
+        &self.envelope
+    }
+
+    /// Moves one end out so that it reaches that far ([`BoxEnd::reach`]; `None` is infinitely far),
+    /// if every schedule stays valid: whether it does.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub fn try_reach(&mut self, end: BoxEnd, reach: Option<Rational>) -> Result<bool, Refusal> {
+        let candidate = end.with_reach(&self.envelope, reach);
+        let broken = self
+            .soundness
+            .broken(self.task, self.plan, &candidate, Some(end))?;
+        if broken.is_none() {
+            self.envelope = candidate;
+        }
+        Ok(broken.is_none())
+    }
+}

@@ -1,0 +1,280 @@
+//! Why no plan reaches the goal any more: what can never become true again, and since when.
+//!
+//! What can become true at all is asked of [`reachability`], which ignores deletions and time: what
+//! is out of its reach, no plan reaches. The history of the run is lived through again to find the
+//! event after which part of the goal was out of reach and before which it was not.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Change, Condition, FactId, FluentId};
+use elbowroom_model::{Situation, Task, reachability};
+use elbowroom_num::{Interval, Rational};
+
+use super::{Account, Run};
+use crate::event::{Ending, Ticket};
+use crate::progression::Progression;
+use crate::reason::{Cause, Reason};
+
+/// Something observed that was believed.
+#[derive(Clone, Debug)]
+pub(super) struct Happened {
+    /// When it happened.
+    time: Rational,
+    what: What,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum What {
+    Started(Ticket),
+    /// As the domain says.
+    Ended(Ticket),
+    /// Without its end taking place.
+    Stopped(Ticket),
+    Fact(FactId, bool),
+    Value(FluentId, Rational),
+}
+
+/// So much of reachability's work is worth an explanation: about a second.
+const MOST_STEPS: u64 = 10_000_000;
+
+/// So many parts of the goal are explained.
+const MOST_NAMED: usize = 3;
+
+impl Run<'_> {
+    /// Notes something for the case that somebody asks why.
+    pub(super) fn note(&mut self, time: &Rational, what: What) {
+        if self.is_explaining {
+            self.history.push(Happened {
+                time: time.clone(),
+                what,
+            });
+        }
+    }
+
+    /// What can never become true again, and since when.
+    pub(super) fn dead_end(&self) -> Vec<Reason> {
+        let mut past = Past {
+            task: &self.task,
+            history: &self.history,
+            account: &self.account,
+            now: &self.now,
+            known: BTreeMap::new(),
+        };
+        let mut present = past.after(self.history.len());
+        let _ = present.advance(&self.now);
+        let Some(lost) = unreachable(&present) else {
+            return Vec::new();
+        };
+        if lost.is_empty() {
+            return vec![Reason::new(Cause::NotTogether)];
+        }
+        let explained = lost.iter().take(MOST_NAMED).map(|goal| past.explain(goal));
+        explained.collect()
+    }
+}
+
+/// The history of a run, to be asked about.
+struct Past<'a> {
+    task: &'a Arc<Task>,
+    history: &'a [Happened],
+    account: &'a Account,
+    now: &'a Rational,
+    /// What was out of reach after so many events.
+    known: BTreeMap<usize, Option<Vec<Condition>>>,
+}
+
+impl Past<'_> {
+    /// The parts of the goal that were out of reach after so many events, if that can be said.
+    fn unreachable_after(&mut self, count: usize) -> Option<Vec<Condition>> {
+        if let Some(known) = self.known.get(&count) {
+            return known.clone();
+        }
+        let found = unreachable(&self.after(count));
+        self.known.insert(count, found.clone());
+        found
+    }
+
+    fn is_lost_after(&mut self, count: usize, goal: &Condition) -> bool {
+        let lost = self.unreachable_after(count);
+        lost.is_some_and(|lost| lost.contains(goal))
+    }
+
+    /// Since which event a part of the goal has been out of reach.
+    fn explain(&mut self, goal: &Condition) -> Reason {
+        let about = self.task.describe_condition(goal);
+        let reason = Reason::new(Cause::NeverAgain).about(about);
+        // Back in ever longer strides to where it was in reach, then halving.
+        let mut lost = self.history.len();
+        if !self.is_lost_after(lost, goal) {
+            return self.between(lost, reason, goal);
+        }
+        let mut stride = 1;
+        let mut open = loop {
+            let before = lost.saturating_sub(stride);
+            if !self.is_lost_after(before, goal) {
+                break before;
+            }
+            if before == 0 {
+                return self.at_the_beginning(reason, goal);
+            }
+            lost = before;
+            stride *= 2;
+        };
+        while lost - open > 1 {
+            let middle = usize::midpoint(open, lost);
+            if self.is_lost_after(middle, goal) {
+                lost = middle;
+            } else {
+                open = middle;
+            }
+        }
+        self.between(open, reason, goal)
+    }
+
+    /// The goal was in reach after so many events, and after one more it was not; or time has
+    /// passed.
+    fn between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
+        let next = self.history.get(count);
+        let until = next.map_or(self.now, |next| &next.time).clone();
+        if let Some((time, words)) = self.timed(&self.after(count), &until, goal) {
+            return with_event(reason, words, time);
+        }
+        match next {
+            Some(next) => with_event(reason, self.words(&next.what), next.time.clone()),
+            None => reason.since(self.now.clone()),
+        }
+    }
+
+    /// It was never in reach after an observation: then since a timed initial, or never.
+    fn at_the_beginning(&self, reason: Reason, goal: &Condition) -> Reason {
+        let start = self.after(0);
+        if is_lost(&start, goal) {
+            return reason;
+        }
+        match self.timed(&start, self.now, goal) {
+            Some((time, words)) => with_event(reason, words, time),
+            None => reason,
+        }
+    }
+
+    /// The timed initials until then that take the goal out of reach.
+    fn timed(
+        &self,
+        from: &Progression,
+        until: &Rational,
+        goal: &Condition,
+    ) -> Option<(Rational, String)> {
+        let mut state = from.clone();
+        let to_come = self.task.timed().iter().skip(state.timed_past());
+        for timed in to_come.take_while(|timed| timed.time <= *until) {
+            let _ = state.advance(&timed.time);
+            if is_lost(&state, goal) {
+                let words = timed.changes.iter().map(|change| self.change(change));
+                return Some((timed.time.clone(), words.collect::<Vec<_>>().join(", ")));
+            }
+        }
+        None
+    }
+
+    fn change(&self, change: &Change) -> String {
+        let task = self.task;
+        match change {
+            Change::Add(fact) => format!("{} became true", task.fact_name(*fact)),
+            Change::Delete(fact) => format!("{} became false", task.fact_name(*fact)),
+            Change::Update { fluent, .. } => format!("{} changed", task.fluent_name(*fluent)),
+        }
+    }
+
+    fn words(&self, what: &What) -> String {
+        let task = self.task;
+        let entry = |ticket: &Ticket| {
+            let entry = self.account.get(*ticket);
+            let name = entry.map(|entry| entry.action.name.clone());
+            let ending = entry.and_then(|entry| Some(entry.ended.clone()?.1));
+            (name.unwrap_or_default(), ending)
+        };
+        match what {
+            What::Started(ticket) => format!("the start of {}", entry(ticket).0),
+            What::Ended(ticket) => format!("the end of {}", entry(ticket).0),
+            What::Stopped(ticket) => match entry(ticket) {
+                (name, Some(Ending::Failed { why })) if !why.is_empty() => {
+                    format!("{name} failed: {why}")
+                }
+                (name, Some(Ending::Failed { .. })) => format!("{name} failed"),
+                (name, _) => format!("{name} was cancelled"),
+            },
+            What::Fact(fact, truth) => {
+                format!("{} was seen to be {truth}", task.fact_name(*fact))
+            }
+            What::Value(fluent, value) => {
+                let value = value.to_decimal(3);
+                format!("{} was seen to be {value}", task.fluent_name(*fluent))
+            }
+        }
+    }
+
+    /// What was believed after so many events.
+    fn after(&self, count: usize) -> Progression {
+        let mut state = Progression::new(Arc::clone(self.task));
+        for happened in &self.history[..count] {
+            // What cannot be computed stays as it was, as when it happened.
+            let _ = state.arrive(&happened.time);
+            match &happened.what {
+                What::Started(ticket) => {
+                    if let Some(entry) = self.account.get(*ticket) {
+                        let planned = entry.planned.clone().unwrap_or_default();
+                        let measured = &entry.measured[0];
+                        let _ = state.start(*ticket, &entry.action, &planned, measured);
+                    }
+                }
+                What::Ended(ticket) => {
+                    if let Some(entry) = self.account.get(*ticket) {
+                        let _ = state.end(*ticket, &entry.measured[1]);
+                    }
+                }
+                What::Stopped(ticket) => state.stop(*ticket),
+                What::Fact(fact, truth) => {
+                    state.see_fact(*fact, *truth);
+                }
+                What::Value(fluent, value) => {
+                    state.see_value(*fluent, value);
+                }
+            }
+        }
+        state
+    }
+}
+
+fn with_event(reason: Reason, words: String, time: Rational) -> Reason {
+    Reason {
+        behind: vec![words],
+        ..reason.since(time)
+    }
+}
+
+fn is_lost(state: &Progression, goal: &Condition) -> bool {
+    unreachable(state).is_some_and(|lost| lost.contains(goal))
+}
+
+/// The parts of the goal that are out of reach, if that can be said within the limits.
+fn unreachable(state: &Progression) -> Option<Vec<Condition>> {
+    let running = state.running().values().map(|underway| {
+        let duration = Interval::point(underway.planned.clone());
+        state.running_action(underway, duration)
+    });
+    let situation = Situation {
+        time: state.time().clone(),
+        state: state.state(),
+        running: running.collect(),
+    };
+    let mut task = Task::beginning_at(state.task(), &situation);
+    let settings = reachability::Settings {
+        step_limit: MOST_STEPS,
+        ..reachability::Settings::default()
+    };
+    match reachability::ground(&mut task, &settings) {
+        reachability::Answer::Complete(grounding) => Some(grounding.unreachable_goals),
+        reachability::Answer::LimitReached => None,
+    }
+}

@@ -1,0 +1,254 @@
+//! Puts a network together while its file is read.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{BadLink, ContingentLink, LinkId, UncertainNetwork};
+use elbowroom_stn::{Constraint, Network, NodeId};
+
+use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
+use crate::mistake::Report;
+use crate::number::Bound;
+
+/// A network that is being read.
+#[derive(Debug)]
+pub(crate) struct Builder {
+    format: Format,
+    pub(crate) name: String,
+    pub(crate) reference: Option<NodeId>,
+    points: Vec<String>,
+    by_name: BTreeMap<String, NodeId>,
+    requirements: Network<Rational>,
+    links: Vec<ContingentLink<Rational>>,
+    durations: Vec<Option<Duration>>,
+    /// Where the text says what each link is.
+    places: Vec<usize>,
+    /// For each node, the link that ends there.
+    ending: BTreeMap<NodeId, LinkId>,
+    pub(crate) correlations: Vec<Correlation>,
+    pub(crate) waits: Vec<GivenWait>,
+}
+
+/// A contingent link as it stands in a file.
+#[derive(Debug)]
+pub(crate) struct GivenLink {
+    pub(crate) at: usize,
+    pub(crate) activation: NodeId,
+    pub(crate) end: NodeId,
+    pub(crate) lower: Bound,
+    pub(crate) upper: Bound,
+    pub(crate) duration: Option<Duration>,
+}
+
+impl Builder {
+    pub(crate) fn new(format: Format) -> Self {
+        Self {
+            format,
+            name: String::new(),
+            reference: None,
+            points: Vec::new(),
+            by_name: BTreeMap::new(),
+            requirements: Network::new(),
+            links: Vec::new(),
+            durations: Vec::new(),
+            places: Vec::new(),
+            ending: BTreeMap::new(),
+            correlations: Vec::new(),
+            waits: Vec::new(),
+        }
+    }
+
+    /// A new time point.
+    pub(crate) fn point(&mut self, name: &str, at: usize, report: &mut Report<'_>) {
+        if self.by_name.contains_key(name) {
+            report.mistake(
+                at,
+                format!("there are two time points `{name}`"),
+                "give each a name of its own",
+            );
+            return;
+        }
+        let node = self.requirements.add_node();
+        self.points.push(name.to_owned());
+        self.by_name.insert(name.to_owned(), node);
+    }
+
+    /// The time point of that name, if there is one.
+    pub(crate) fn find(&self, name: &str) -> Option<NodeId> {
+        self.by_name.get(name).copied()
+    }
+
+    /// The time point of that name; that there is none is a mistake.
+    pub(crate) fn named(&self, name: &str, at: usize, report: &mut Report<'_>) -> Option<NodeId> {
+        let node = self.find(name);
+        if node.is_none() {
+            report.mistake(
+                at,
+                format!("there is no time point `{name}`"),
+                "list it with the others, or correct the name",
+            );
+        }
+        node
+    }
+
+    /// `lower <= to - from <= upper`.
+    pub(crate) fn requirement(
+        &mut self,
+        (from, to): (NodeId, NodeId),
+        (lower, upper): (Bound, Bound),
+        at: usize,
+        report: &mut Report<'_>,
+    ) {
+        match upper {
+            Bound::Finite(upper) => {
+                self.requirements.add(Constraint::at_most(from, to, upper));
+            }
+            Bound::Infinity => {}
+            Bound::NegativeInfinity => unreachable_bound(at, report),
+        }
+        match lower {
+            Bound::Finite(lower) => {
+                self.requirements.add(Constraint::at_least(from, to, lower));
+            }
+            Bound::NegativeInfinity => {}
+            Bound::Infinity => unreachable_bound(at, report),
+        }
+    }
+
+    /// Adds a contingent link; `None` after a mistake was noted.
+    pub(crate) fn link(&mut self, given: GivenLink, report: &mut Report<'_>) -> Option<LinkId> {
+        let GivenLink {
+            at,
+            activation,
+            end,
+            ..
+        } = given;
+        let begin_name = self.points[activation.index()].clone();
+        let end_name = self.points[end.index()].clone();
+        let words = format!("the contingent link from `{begin_name}` to `{end_name}`");
+        let lower = match given.lower {
+            Bound::Finite(lower) if !lower.is_negative() => lower,
+            Bound::Finite(_) => {
+                report.remark(format!(
+                    "{words} may not take less than no time: its lower bound is taken as 0"
+                ));
+                Rational::ZERO
+            }
+            Bound::NegativeInfinity => Rational::ZERO,
+            Bound::Infinity => {
+                unreachable_bound(at, report);
+                return None;
+            }
+        };
+        let upper = match given.upper {
+            Bound::Infinity => None,
+            Bound::Finite(upper) => Some(upper),
+            Bound::NegativeInfinity => {
+                unreachable_bound(at, report);
+                return None;
+            }
+        };
+        if upper.as_ref().is_some_and(|upper| *upper < lower) {
+            report.mistake(
+                at,
+                format!("{words} has a lower bound above its upper bound"),
+                "write the smaller number first; durations are not negative",
+            );
+            return None;
+        }
+        if activation == end {
+            report.mistake(
+                at,
+                format!("the contingent link from `{begin_name}` ends where it begins"),
+                "a link leads from one time point to another",
+            );
+            return None;
+        }
+        let id = LinkId(u32::try_from(self.links.len()).ok()?);
+        if self.ending.insert(end, id).is_some() {
+            report.mistake(
+                at,
+                format!("two contingent links end at `{end_name}`"),
+                "each needs an end of its own",
+            );
+            return None;
+        }
+        self.links.push(ContingentLink {
+            activation,
+            end,
+            lower,
+            upper,
+        });
+        self.durations.push(given.duration);
+        self.places.push(at);
+        Some(id)
+    }
+
+    /// All time points so far, by node.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = NodeId> + use<> {
+        self.requirements.nodes()
+    }
+
+    /// The link that ends at a node.
+    pub(crate) fn link_ending_at(&self, node: NodeId) -> Option<LinkId> {
+        self.ending.get(&node).copied()
+    }
+
+    /// The link of that number.
+    pub(crate) fn link_of(&self, id: LinkId) -> &ContingentLink<Rational> {
+        &self.links[id.index()]
+    }
+
+    /// How the duration of a link is distributed.
+    pub(crate) fn duration_of(&self, id: LinkId) -> Option<&Duration> {
+        self.durations[id.index()].as_ref()
+    }
+
+    /// The network, unless there were mistakes.
+    pub(crate) fn finish(self, report: &mut Report<'_>) -> Option<NetworkFile> {
+        if report.is_failed() {
+            return None;
+        }
+        let network = match UncertainNetwork::new(self.requirements, self.links) {
+            Ok(network) => network,
+            Err(bad) => {
+                report.mistake(
+                    self.places[place_of(&bad).index()],
+                    "this contingent link depends on its own end",
+                    "begin each link at a time point that happens before",
+                );
+                return None;
+            }
+        };
+        Some(NetworkFile {
+            format: self.format,
+            name: self.name,
+            points: self.points,
+            reference: self.reference,
+            network,
+            durations: self.durations,
+            correlations: self.correlations,
+            waits: self.waits,
+            remarks: Vec::new(),
+        })
+    }
+}
+
+/// The link that makes no sense. All but circles were found before.
+fn place_of(bad: &BadLink) -> LinkId {
+    match bad {
+        BadLink::NoSuchNode(id)
+        | BadLink::Circular(id)
+        | BadLink::Negative(id)
+        | BadLink::Empty(id)
+        | BadLink::SharedEnd(_, id) => *id,
+    }
+}
+
+fn unreachable_bound(at: usize, report: &mut Report<'_>) {
+    report.mistake(
+        at,
+        "no difference of times is as large as that",
+        "a lower bound may be -inf and an upper bound inf, not the other way round",
+    );
+}

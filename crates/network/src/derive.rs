@@ -1,0 +1,75 @@
+//! Other forms of a network, as networks of their own.
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
+use elbowroom_stn::{ConsistentNetwork, Constraint, NegativeCycle, Network};
+
+use crate::file::{Format, GivenWait, NetworkFile};
+
+impl NetworkFile {
+    /// Requirements, and the bounds of links as if they could be chosen: what holds if the world
+    /// is kind. Constraints of links follow the requirements, for each link first the upper bound,
+    /// if there is one, and then the lower one.
+    pub fn kind_network(&self) -> Network<Rational> {
+        let mut network = self.network.requirements().clone();
+        for link in self.network.links() {
+            if let Some(upper) = &link.upper {
+                network.add(Constraint::at_most(
+                    link.activation,
+                    link.end,
+                    upper.clone(),
+                ));
+            }
+            let lower = link.lower.clone();
+            network.add(Constraint::at_least(link.activation, link.end, lower));
+        }
+        network
+    }
+
+    /// The network with all bounds that follow, each as tight as it is; links are kept.
+    ///
+    /// # Errors
+    /// When the network contradicts itself.
+    pub fn minimal(&self) -> Result<Self, NegativeCycle<Rational>> {
+        let minimal = ConsistentNetwork::try_from(self.kind_network())?.minimal();
+        let requirements = self.network.requirements();
+        let mut tight = Network::with_nodes(requirements.node_count());
+        for from in requirements.nodes() {
+            for to in requirements.nodes().filter(|&to| to != from) {
+                if let Some(bound) = minimal.distance(from, to) {
+                    tight.add(Constraint::at_most(from, to, bound.clone()));
+                }
+            }
+        }
+        Ok(self.with(tight, Vec::new()))
+    }
+
+    /// The network's dispatchable form, waits included.
+    #[must_use]
+    pub fn dispatchable(&self, form: &Dispatchable<Rational>) -> Self {
+        let mut network = Network::with_nodes(self.points.len());
+        for edge in form.edges() {
+            let bound = edge.bound.clone();
+            network.add(Constraint::at_most(edge.from, edge.to, bound));
+        }
+        let waits = form.waits().map(|(_, wait)| GivenWait {
+            node: wait.node,
+            link: wait.link,
+            delay: wait.delay.clone(),
+        });
+        self.with(network, waits.collect())
+    }
+
+    /// The same points and links with other requirements.
+    fn with(&self, requirements: Network<Rational>, waits: Vec<GivenWait>) -> Self {
+        let links = self.network.links().to_vec();
+        Self {
+            format: Format::Elbowroom,
+            network: UncertainNetwork::new(requirements, links)
+                .expect("the links are those of a network"),
+            waits,
+            remarks: Vec::new(),
+            ..self.clone()
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! JSON with places, exact numbers, and the bare infinities that some programs write.
+//!
+//! Python writes `Infinity`, which strict JSON does not have; numbers stay as they were written, so
+//! that they can be read exactly.
+
+use std::borrow::Cow;
+
+use crate::mistake::Report;
+
+/// Deeper nesting than any network has, shallow enough for any stack.
+const DEEPEST: usize = 64;
+
+/// A value and where it begins.
+#[derive(Debug)]
+pub(crate) struct Json<'a> {
+    pub(crate) at: usize,
+    pub(crate) value: Value<'a>,
+}
+
+#[derive(Debug)]
+pub(crate) enum Value<'a> {
+    Null,
+    Bool,
+    /// As it is written; also `Infinity`, `-Infinity` and `NaN`.
+    Number(&'a str),
+    Text(Cow<'a, str>),
+    List(Vec<Json<'a>>),
+    Object(Vec<(Cow<'a, str>, Json<'a>)>),
+}
+
+impl<'a> Json<'a> {
+    /// The member of that name; the last one, if there are several.
+    pub(crate) fn member(&self, name: &str) -> Option<&Json<'a>> {
+        match &self.value {
+            Value::Object(members) => {
+                let found = members.iter().rev().find(|(key, _)| key == name);
+                found.map(|(_, value)| value)
+            }
+            _ => None,
+        }
+    }
+
+    pub(crate) fn list(&self) -> Option<&[Json<'a>]> {
+        match &self.value {
+            Value::List(items) => Some(items),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn members(&self) -> Option<&[(Cow<'a, str>, Json<'a>)]> {
+        match &self.value {
+            Value::Object(members) => Some(members),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn text(&self) -> Option<&str> {
+        match &self.value {
+            Value::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// What the value is, in a message.
+    pub(crate) fn kind(&self) -> &'static str {
+        match &self.value {
+            Value::Null => "null",
+            Value::Bool => "a truth value",
+            Value::Number(_) => "a number",
+            Value::Text(_) => "a text",
+            Value::List(_) => "a list",
+            Value::Object(_) => "an object",
+        }
+    }
+}
+
+/// Reads a document; `None` after a mistake was noted.
+pub(crate) fn parse<'a>(text: &'a str, report: &mut Report<'_>) -> Option<Json<'a>> {
+    let mut reader = Reader { text, at: 0 };
+    let read = reader.value(0).and_then(|value| {
+        reader.skip_space();
+        if reader.at < text.len() {
+            return Err(reader.wrong("there is more text after the document", "remove it"));
+        }
+        Ok(value)
+    });
+    read.map_err(|wrong| report.mistake(wrong.at, wrong.message, wrong.help))
+        .ok()
+}
+
+/// Where the text is no JSON, and why.
+struct Wrong {
+    at: usize,
+    message: String,
+    help: &'static str,
+}
+
+struct Reader<'a> {
+    text: &'a str,
+    at: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn wrong(&self, message: impl Into<String>, help: &'static str) -> Wrong {
+        Wrong {
+            at: self.at,
+            message: message.into(),
+            help,
+        }
+    }
+
+    fn peek(&self) -> Option<u8> {
+        self.text.as_bytes().get(self.at).copied()
+    }
+
+    fn skip_space(&mut self) {
+        while matches!(self.peek(), Some(b' ' | b'\t' | b'\r' | b'\n')) {
+            self.at += 1;
+        }
+    }
+
+    /// What stands at this place, in a message.
+    fn here(&self) -> String {
+        match self.text[self.at..].chars().next() {
+            Some(letter) => format!("`{letter}`"),
+            None => "the end of the text".to_owned(),
+        }
+    }
+
+    fn value(&mut self, depth: usize) -> Result<Json<'a>, Wrong> {
+        self.skip_space();
+        let at = self.at;
+        if depth > DEEPEST {
+            return Err(self.wrong("lists and objects are nested too deeply", "flatten them"));
+        }
+        let value = match self.peek() {
+            Some(b'{') => self.object(depth)?,
+            Some(b'[') => self.items(depth)?,
+            Some(b'"') => Value::Text(self.string()?),
+            Some(b'-' | b'+' | b'.' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z') => self.word()?,
+            _ => {
+                let here = self.here();
+                return Err(self.wrong(
+                    format!("expected a value, found {here}"),
+                    "write a number, a text, a list or an object",
+                ));
+            }
+        };
+        Ok(Json { at, value })
+    }
+
+    fn object(&mut self, depth: usize) -> Result<Value<'a>, Wrong> {
+        self.at += 1;
+        let mut members = Vec::new();
+        loop {
+            self.skip_space();
+            match self.peek() {
+                Some(b'}') if members.is_empty() => break,
+                Some(b'"') => {}
+                _ => {
+                    let here = self.here();
+                    return Err(self.wrong(
+                        format!("expected the name of a member, found {here}"),
+                        "names stand in double quotes",
+                    ));
+                }
+            }
+            let name = self.string()?;
+            self.skip_space();
+            if self.peek() != Some(b':') {
+                let here = self.here();
+                return Err(self.wrong(
+                    format!("expected `:` after the name `{name}`, found {here}"),
+                    "write `\"name\": value`",
+                ));
+            }
+            self.at += 1;
+            members.push((name, self.value(depth + 1)?));
+            if self.is_last(b'}')? {
+                break;
+            }
+        }
+        self.at += 1;
+        Ok(Value::Object(members))
+    }
+
+    fn items(&mut self, depth: usize) -> Result<Value<'a>, Wrong> {
+        self.at += 1;
+        let mut items = Vec::new();
+        self.skip_space();
+        if self.peek() != Some(b']') {
+            loop {
+                items.push(self.value(depth + 1)?);
+                if self.is_last(b']')? {
+                    break;
+                }
+            }
+        }
+        self.at += 1;
+        Ok(Value::List(items))
+    }
+
+    /// Whether the list or object ends here; otherwise steps over the comma.
+    fn is_last(&mut self, end: u8) -> Result<bool, Wrong> {
+        self.skip_space();
+        match self.peek() {
+            Some(byte) if byte == end => Ok(true),
+            Some(b',') => {
+                self.at += 1;
+                Ok(false)
+            }
+            _ => {
+                let here = self.here();
+                Err(self.wrong(
+                    format!("expected `,` or `{}`, found {here}", char::from(end)),
+                    "the file may be cut off or a comma missing",
+                ))
+            }
+        }
+    }
+
+    /// A number, `true`, `false`, `null` or an infinity.
+    fn word(&mut self) -> Result<Value<'a>, Wrong> {
+        let start = self.at;
+        while let Some(b'-' | b'+' | b'.' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z') = self.peek() {
+            self.at += 1;
+        }
+        let word = &self.text[start..self.at];
+        match word {
+            "null" => Ok(Value::Null),
+            "true" | "false" => Ok(Value::Bool),
+            "Infinity" | "-Infinity" | "+Infinity" | "NaN" => Ok(Value::Number(word)),
+            _ if word.starts_with(|c: char| !c.is_ascii_alphabetic()) => Ok(Value::Number(word)),
+            _ => {
+                self.at = start;
+                Err(self.wrong(
+                    format!("`{word}` is not a value"),
+                    "texts stand in double quotes",
+                ))
+            }
+        }
+    }
+
+    fn string(&mut self) -> Result<Cow<'a, str>, Wrong> {
+        let start = self.at + 1;
+        let bytes = self.text.as_bytes();
+        let mut at = start;
+        while let Some(&byte) = bytes.get(at) {
+            match byte {
+                b'"' => {
+                    self.at = at + 1;
+                    return Ok(Cow::Borrowed(&self.text[start..at]));
+                }
+                b'\\' => return self.escaped(start, at),
+                b'\n' => break,
+                _ => at += 1,
+            }
+        }
+        Err(self.wrong("the text that begins here has no end", "add a double quote"))
+    }
+
+    /// A string with escape sequences, the first of them at `at`.
+    fn escaped(&mut self, start: usize, at: usize) -> Result<Cow<'a, str>, Wrong> {
+        let begin = self.at;
+        let mut read = self.text[start..at].to_owned();
+        let mut letters = self.text[at..].char_indices();
+        while let Some((offset, letter)) = letters.next() {
+            match letter {
+                '"' => {
+                    self.at = at + offset + 1;
+                    return Ok(Cow::Owned(read));
+                }
+                '\\' => match letters.next().map(|(_, letter)| letter) {
+                    Some('n') => read.push('\n'),
+                    Some('t') => read.push('\t'),
+                    Some('r') => read.push('\r'),
+                    Some('b') => read.push('\u{8}'),
+                    Some('f') => read.push('\u{c}'),
+                    Some(same @ ('"' | '\\' | '/')) => read.push(same),
+                    Some('u') => {
+                        let digits: String = letters.by_ref().take(4).map(|(_, c)| c).collect();
+                        let code = u32::from_str_radix(&digits, 16).ok();
+                        // Halves of a pair stay unknown: no name needs them.
+                        let letter = code.and_then(char::from_u32);
+                        read.push(letter.unwrap_or(char::REPLACEMENT_CHARACTER));
+                    }
+                    _ => {
+                        self.at = at + offset;
+                        return Err(self.wrong(
+                            "this is no escape sequence",
+                            "write two backslashes for one",
+                        ));
+                    }
+                },
+                '\n' => break,
+                _ => read.push(letter),
+            }
+        }
+        self.at = begin;
+        Err(self.wrong("the text that begins here has no end", "add a double quote"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        let mut report = Report::new(text);
+        assert!(parse(text, &mut report).is_none(), "{text}");
+        report.into_mistakes("f").to_string()
+    }
+
+    #[test]
+    fn infinities_and_numbers_stay_as_they_are_written() {
+        let text = r#"{"a": [1.50, -Infinity, Infinity, 2e3], "b": "inf", "a": null}"#;
+        let json = parse(text, &mut Report::new(text)).expect("right");
+        assert!(matches!(
+            json.member("a").expect("there").value,
+            Value::Null
+        ));
+        let Some((_, list)) = json.members().expect("an object").first() else {
+            panic!("no member");
+        };
+        let numbers: Vec<&str> = list
+            .list()
+            .expect("a list")
+            .iter()
+            .map(|item| match item.value {
+                Value::Number(number) => number,
+                _ => panic!("not a number"),
+            })
+            .collect();
+        assert_eq!(numbers, ["1.50", "-Infinity", "Infinity", "2e3"]);
+    }
+
+    #[test]
+    fn mistakes_have_places() {
+        assert!(refused("{\"a\": [1,\n 2").starts_with("f:2:3: expected `,` or `]`"));
+        assert!(refused("{\"a\" 1}").starts_with("f:1:6: expected `:`"));
+        assert!(refused("[inf]").starts_with("f:1:2: `inf` is not a value"));
+        assert!(refused("[\"a]").starts_with("f:1:2: the text that begins here has no end"));
+        assert!(refused("[] []").starts_with("f:1:4: there is more text"));
+        assert!(refused(&"[".repeat(100_000)).contains("nested too deeply"));
+        assert!(refused("").contains("the end of the text"));
+    }
+
+    #[test]
+    fn escape_sequences_are_resolved() {
+        let text = r#"["a\"b\\c\u00e9\n"]"#;
+        let json = parse(text, &mut Report::new(text)).expect("right");
+        assert_eq!(json.list().expect("a list")[0].text(), Some("a\"b\\cé\n"));
+    }
+}

@@ -1,0 +1,266 @@
+//! Which format a file is in, and reading it.
+
+mod dimacs;
+mod distribution;
+mod elbowroom;
+mod graphml;
+mod heatlab;
+mod inequalities;
+mod plain;
+mod pstn_lib;
+
+use elbowroom_num::Rational;
+
+use crate::file::NetworkFile;
+use crate::json::{self, Json, Value};
+use crate::mistake::{Mistakes, Report};
+use crate::number::Bound;
+
+/// Some editors put it before a text.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// Endings of files that describe conditional networks or more, and what these are.
+const REFUSED: [(&str, &str); 6] = [
+    ("cstn", "a conditional network (CSTN)"),
+    ("cstnu", "a conditional network with uncertainty (CSTNU)"),
+    ("cstnud", "a conditional network with decisions (CSTNUD)"),
+    (
+        "cstnpsu",
+        "a conditional network with partially shrinkable uncertainty (CSTNPSU)",
+    ),
+    (
+        "cstpsu",
+        "a conditional network with partially shrinkable uncertainty (CSTPSU)",
+    ),
+    ("pstn", "a probabilistic network of the CSTNU Tool (PSTN)"),
+];
+
+/// What to do about a network of a kind that is refused.
+const REFUSED_HELP: &str =
+    "simple networks (STN) and networks with contingent links (STNU) are read";
+
+/// Reads a file of any of the known formats; the name serves messages, and its ending counts where
+/// the text leaves the kind of network open.
+///
+/// # Errors
+/// When the bytes are no network, or one of a kind that is not supported.
+pub fn read(name: &str, bytes: &[u8]) -> Result<NetworkFile, Mistakes> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&text);
+    let mut report = Report::new(text);
+    let file = any(name, text, &mut report);
+    match file {
+        Some(mut file) if !report.is_failed() => {
+            file.remarks = report.into_remarks();
+            Ok(file)
+        }
+        _ => Err(report.into_mistakes(name)),
+    }
+}
+
+fn any(name: &str, text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+    let ending = ending(name);
+    if let Some((_, kind)) = REFUSED.iter().find(|(refused, _)| *refused == ending) {
+        report.mistake(
+            0,
+            format!("this is {kind}, which is not supported"),
+            REFUSED_HELP,
+        );
+        return None;
+    }
+    let start = text.len() - text.trim_start().len();
+    let first = text[start..].lines().next().unwrap_or_default();
+    match text[start..].chars().next() {
+        Some('<') => graphml::read(text, &ending, report),
+        Some('{' | '[') => any_json(text, report),
+        Some('#') => plain::read(text, report),
+        Some(_) if dimacs::is_line(first) => dimacs::read(text, report),
+        Some(_) if is_trace(first) => {
+            report.mistake(
+                start,
+                "these are execution traces, not a network",
+                "give the network that they come from",
+            );
+            None
+        }
+        None => {
+            report.mistake(0, "the file is empty", "give a file with a network");
+            None
+        }
+        Some(_) => {
+            report.mistake(
+                start,
+                "this is no format of networks that is known",
+                "known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, \
+                 and DIMACS text",
+            );
+            None
+        }
+    }
+}
+
+/// What stands after the last point of a file's name, in lower case.
+fn ending(name: &str) -> String {
+    let base = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    match base.rsplit_once('.') {
+        Some((_, ending)) => ending.to_ascii_lowercase(),
+        None => String::new(),
+    }
+}
+
+/// Whether a line looks like `Z=0, A=3, C(A)=7`.
+fn is_trace(line: &str) -> bool {
+    let is_event = |event: &str| {
+        let (name, time) = event.split_once('=')?;
+        let is_name = !name.trim().is_empty();
+        let is_time = Bound::parse(time).is_some();
+        (is_name && is_time).then_some(())
+    };
+    line.split(',').next().and_then(is_event).is_some()
+}
+
+fn any_json(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+    let document = json::parse(text, report)?;
+    if document.member("format").and_then(Json::text) == Some(elbowroom::FORMAT) {
+        return elbowroom::read(&document, report);
+    }
+    if document.member("nodes").is_some() {
+        return heatlab::read(&document, report);
+    }
+    if document.member("timepoints").is_some() {
+        return pstn_lib::read(&document, report);
+    }
+    if inequalities::are_in(&document) {
+        return inequalities::read(&document, report);
+    }
+    report.mistake(
+        document.at,
+        "this JSON describes no network of a known form",
+        "known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), \
+         lists of inequalities under the numbers of nodes, and `\"format\": \"elbowroom-network\"`",
+    );
+    None
+}
+
+/// The list under a name; that it is missing is a mistake.
+fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report<'_>) -> &'j [Json<'a>] {
+    let Some(member) = required(parent, name, report) else {
+        return &[];
+    };
+    let items = member.list();
+    if items.is_none() {
+        report.mistake(
+            member.at,
+            format!("`{name}` is {}, not a list", member.kind()),
+            format!("write `\"{name}\": [ … ]`"),
+        );
+    }
+    items.unwrap_or_default()
+}
+
+/// The member of that name; that it is missing is a mistake.
+fn required<'j, 'a>(
+    parent: &'j Json<'a>,
+    name: &str,
+    report: &mut Report<'_>,
+) -> Option<&'j Json<'a>> {
+    let member = parent.member(name);
+    if member.is_none() {
+        report.mistake(
+            parent.at,
+            format!("`{name}` is missing here"),
+            format!("add `\"{name}\": …`"),
+        );
+    }
+    member
+}
+
+/// A number or an infinity, as a number or a text.
+fn bound(json: &Json<'_>, report: &mut Report<'_>) -> Option<Bound> {
+    let read = match &json.value {
+        Value::Number(number) => Bound::parse(number),
+        Value::Text(text) => Bound::parse(text),
+        _ => None,
+    };
+    if read.is_none() {
+        report.mistake(
+            json.at,
+            "this is no number",
+            "write a decimal such as 12.5, a fraction such as \"25/2\", \"inf\" or \"-inf\"",
+        );
+    }
+    read
+}
+
+/// A finite number.
+fn number(json: &Json<'_>, report: &mut Report<'_>) -> Option<Rational> {
+    match bound(json, report)? {
+        Bound::Finite(number) => Some(number),
+        Bound::Infinity | Bound::NegativeInfinity => {
+            report.mistake(json.at, "this number must be finite", "write a decimal");
+            None
+        }
+    }
+}
+
+/// A bound under a name, or that one if there is none of that name.
+fn bound_or(
+    parent: &Json<'_>,
+    name: &str,
+    missing: Bound,
+    report: &mut Report<'_>,
+) -> Option<Bound> {
+    match parent.member(name) {
+        Some(json) if !matches!(json.value, Value::Null) => bound(json, report),
+        _ => Some(missing),
+    }
+}
+
+/// The name of a time point: a number or a text.
+fn point_name(json: &Json<'_>, report: &mut Report<'_>) -> Option<String> {
+    match &json.value {
+        Value::Number(number) => Some((*number).to_owned()),
+        Value::Text(text) => Some(text.clone().into_owned()),
+        _ => {
+            report.mistake(
+                json.at,
+                format!("the name of a time point cannot be {}", json.kind()),
+                "write a number or a text",
+            );
+            None
+        }
+    }
+}
+
+/// A matrix of so many rows, symmetric, with 1 in its diagonal.
+fn correlation_matrix(
+    parent: &Json<'_>,
+    name: &str,
+    size: usize,
+    report: &mut Report<'_>,
+) -> Option<Vec<Vec<Rational>>> {
+    let matrix: Vec<Vec<Rational>> = list(parent, name, report)
+        .iter()
+        .map(|row| {
+            let numbers = row.list().unwrap_or_default().iter();
+            numbers.filter_map(|json| number(json, report)).collect()
+        })
+        .collect();
+    let one = Rational::ONE;
+    let is_row = |(row, numbers): (usize, &Vec<Rational>)| {
+        let is_symmetric = numbers.iter().enumerate().all(|(column, number)| {
+            let mirrored = matrix.get(column).and_then(|other| other.get(row));
+            mirrored == Some(number) && number.abs() <= one
+        });
+        numbers.len() == size && numbers.get(row) == Some(&one) && is_symmetric
+    };
+    if matrix.len() == size && matrix.iter().enumerate().all(is_row) {
+        return Some(matrix);
+    }
+    report.mistake(
+        parent.at,
+        "this is no correlation matrix of these durations",
+        "it has a row and a column for each, is symmetric, and has 1 in its diagonal",
+    );
+    None
+}

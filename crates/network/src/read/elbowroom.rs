@@ -1,0 +1,230 @@
+//! JSON of our own: `docs/formats/network.md`. What [`crate::write`] writes.
+
+use elbowroom_num::Rational;
+use elbowroom_stn::NodeId;
+
+use super::{bound, bound_or, list, number, required};
+use crate::builder::{Builder, GivenLink};
+use crate::file::{Correlation, Duration, Format, GivenWait, NetworkFile};
+use crate::json::{Json, Value};
+use crate::mistake::Report;
+use crate::number::Bound;
+
+/// What the member `format` says.
+pub(crate) const FORMAT: &str = "elbowroom-network";
+
+pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<NetworkFile> {
+    let version = required(document, "version", report)?;
+    if number(version, report)? != Rational::ONE {
+        report.mistake(
+            version.at,
+            "this version of the format is not known",
+            "version 1 is read",
+        );
+        return None;
+    }
+    let mut builder = Builder::new(Format::Elbowroom);
+    if let Some(name) = document.member("name").and_then(Json::text) {
+        name.clone_into(&mut builder.name);
+    }
+    for point in list(document, "points", report) {
+        match point.text() {
+            Some(name) => builder.point(name, point.at, report),
+            None => report.mistake(point.at, "this is no name", "write a text"),
+        }
+    }
+    if let Some(reference) = document.member("reference").filter(|json| !is_null(json)) {
+        builder.reference = node(&builder, reference, report);
+    }
+    for requirement in list(document, "requirements", report) {
+        let ends = ends(&builder, requirement, ["from", "to"], report);
+        if let Some((ends, bounds)) = ends.zip(bounds(requirement, report)) {
+            builder.requirement(ends, bounds, requirement.at, report);
+        }
+    }
+    for link in list(document, "links", report) {
+        read_link(&mut builder, link, report);
+    }
+    if report.is_failed() {
+        return None; // the links that the rest is about may be missing
+    }
+    for wait in document
+        .member("waits")
+        .and_then(Json::list)
+        .unwrap_or_default()
+    {
+        read_wait(&mut builder, wait, report);
+    }
+    for group in document
+        .member("correlations")
+        .and_then(Json::list)
+        .unwrap_or_default()
+    {
+        read_correlation(&mut builder, group, report);
+    }
+    builder.finish(report)
+}
+
+fn is_null(json: &Json<'_>) -> bool {
+    matches!(json.value, Value::Null)
+}
+
+fn node(builder: &Builder, json: &Json<'_>, report: &mut Report<'_>) -> Option<NodeId> {
+    let Some(name) = json.text() else {
+        report.mistake(json.at, "this is no name of a time point", "write a text");
+        return None;
+    };
+    builder.named(name, json.at, report)
+}
+
+fn ends(
+    builder: &Builder,
+    json: &Json<'_>,
+    names: [&str; 2],
+    report: &mut Report<'_>,
+) -> Option<(NodeId, NodeId)> {
+    let [from, to] = names.map(|name| {
+        let end = required(json, name, report)?;
+        node(builder, end, report)
+    });
+    from.zip(to)
+}
+
+fn bounds(json: &Json<'_>, report: &mut Report<'_>) -> Option<(Bound, Bound)> {
+    let lower = bound_or(json, "lower", Bound::NegativeInfinity, report);
+    let upper = bound_or(json, "upper", Bound::Infinity, report);
+    lower.zip(upper)
+}
+
+fn read_link(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+    let ends = ends(builder, json, ["activation", "end"], report);
+    let bounds = bounds(json, report);
+    let duration = match json.member("duration").filter(|json| !is_null(json)) {
+        None => None,
+        Some(given) => match read_duration(given, report) {
+            Some(duration) => Some(duration),
+            None => return,
+        },
+    };
+    if let Some(((activation, end), (lower, upper))) = ends.zip(bounds) {
+        let at = json.at;
+        let link = GivenLink {
+            at,
+            activation,
+            end,
+            lower,
+            upper,
+            duration,
+        };
+        builder.link(link, report);
+    }
+}
+
+/// `{ "normal": { "mean": …, "deviation": … } }` and its like.
+fn read_duration(json: &Json<'_>, report: &mut Report<'_>) -> Option<Duration> {
+    let Some([(kind, numbers)]) = json.members() else {
+        report.mistake(
+            json.at,
+            "this says not how a duration is distributed",
+            "write `{ \"normal\": { \"mean\": …, \"deviation\": … } }`",
+        );
+        return None;
+    };
+    let mut part = |name| {
+        let json = required(numbers, name, report)?;
+        number(json, report)
+    };
+    let duration = match &**kind {
+        "normal" => Duration::Normal {
+            mean: part("mean")?,
+            deviation: part("deviation")?,
+        },
+        "uniform" => Duration::Uniform {
+            from: part("from")?,
+            to: part("to")?,
+        },
+        "exponential" => Duration::Exponential {
+            from: part("from")?,
+            mean: part("mean")?,
+        },
+        "gamma" => Duration::Gamma {
+            from: part("from")?,
+            shape: part("shape")?,
+            scale: part("scale")?,
+        },
+        _ => {
+            report.mistake(
+                json.at,
+                format!("the distribution `{kind}` is not known"),
+                "known are normal, uniform, exponential and gamma",
+            );
+            return None;
+        }
+    };
+    let is_sound = match &duration {
+        Duration::Normal { deviation, .. } => !deviation.is_negative(),
+        Duration::Uniform { from, to } => from <= to,
+        Duration::Exponential { mean, .. } => !mean.is_negative(),
+        Duration::Gamma { shape, scale, .. } => shape.is_positive() && scale.is_positive(),
+    };
+    if !is_sound {
+        report.mistake(
+            json.at,
+            "the numbers of this distribution make no sense",
+            "deviations and means are not negative, shapes and scales positive, and from <= to",
+        );
+        return None;
+    }
+    Some(duration)
+}
+
+fn read_wait(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+    let Some((waiting, end)) = ends(builder, json, ["point", "until"], report) else {
+        return;
+    };
+    let Some(link) = builder.link_ending_at(end) else {
+        report.mistake(
+            json.at,
+            "this wait is for no end of a contingent link",
+            "name the end of a link under `until`",
+        );
+        return;
+    };
+    let delay = match json.member("delay").filter(|json| !is_null(json)) {
+        None => None,
+        Some(given) => match bound(given, report) {
+            Some(Bound::Finite(delay)) => Some(delay),
+            Some(Bound::Infinity) => None,
+            Some(Bound::NegativeInfinity) | None => return,
+        },
+    };
+    builder.waits.push(GivenWait {
+        node: waiting,
+        link,
+        delay,
+    });
+}
+
+fn read_correlation(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+    let mut links = Vec::new();
+    for end in list(json, "ends", report) {
+        let link = node(builder, end, report).and_then(|node| builder.link_ending_at(node));
+        let is_normal = |&link: &_| {
+            matches!(builder.duration_of(link), Some(Duration::Normal { .. }))
+                && !links.contains(&link)
+        };
+        let Some(link) = link.filter(is_normal) else {
+            report.mistake(
+                end.at,
+                "no link with a normal duration ends here, or it was named before",
+                "name the ends of links with normal durations",
+            );
+            return;
+        };
+        links.push(link);
+    }
+    let matrix = super::correlation_matrix(json, "matrix", links.len(), report);
+    if let Some(matrix) = matrix {
+        builder.correlations.push(Correlation { links, matrix });
+    }
+}

@@ -1,0 +1,246 @@
+//! Sections of plain text under headings that begin with `#`.
+//!
+//! ```text
+//! # KIND OF NETWORK
+//! STNU
+//! # Num Time-Points
+//! 3
+//! # Num Ordinary Edges
+//! 1
+//! # Num Contingent Links
+//! 1
+//! # Time-Point Names
+//! A C X
+//! # Ordinary Edges
+//! X 12 C
+//! # Contingent Links
+//! A 1 3 C
+//! ```
+//!
+//! `X 12 C` says `C - X <= 12`, and `A 1 3 C` that C comes 1 to 3 after A. Names may stand in
+//! quotes.
+
+use crate::builder::{Builder, GivenLink};
+use crate::file::{Format, NetworkFile};
+use crate::mistake::Report;
+use crate::number::Bound;
+
+/// What stands under a heading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Section {
+    Kind,
+    Count(What),
+    Names,
+    Edges,
+    Links,
+}
+
+/// What is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum What {
+    Points,
+    Edges,
+    Links,
+}
+
+impl Section {
+    fn of(heading: &str) -> Option<Self> {
+        let words: Vec<String> = heading
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|word| !word.is_empty())
+            .map(str::to_ascii_lowercase)
+            .collect();
+        let has = |word: &str| words.iter().any(|other| other == word);
+        let counts = has("num") || has("number");
+        Some(match () {
+            () if has("kind") => Self::Kind,
+            () if has("points") && counts => Self::Count(What::Points),
+            () if has("edges") && counts => Self::Count(What::Edges),
+            () if has("links") && counts => Self::Count(What::Links),
+            () if has("names") => Self::Names,
+            () if has("edges") => Self::Edges,
+            () if has("links") => Self::Links,
+            () => return None,
+        })
+    }
+}
+
+/// What was read so far.
+struct Reader {
+    builder: Builder,
+    /// How many time points, edges and links the file says it has, and where it does.
+    announced: Vec<(What, usize, usize)>,
+    edges: usize,
+    links: usize,
+}
+
+pub(super) fn read(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+    let mut reader = Reader {
+        builder: Builder::new(Format::Plain),
+        announced: Vec::new(),
+        edges: 0,
+        links: 0,
+    };
+    let mut section = None;
+    let mut at = 0;
+    for line in text.split('\n') {
+        let words = words(line, at);
+        match words.first() {
+            None => {}
+            Some((place, word)) if word.starts_with('#') => {
+                section = Section::of(line);
+                if section.is_none() {
+                    report.mistake(
+                        *place,
+                        "this heading is not known",
+                        "known are the kind of network, the numbers and the names of time points, \
+                         ordinary edges and contingent links",
+                    );
+                }
+            }
+            Some(_) => reader.line(section, &words, report),
+        }
+        at += line.len() + 1;
+    }
+    reader.check_counts(report);
+    let builder = &mut reader.builder;
+    builder.reference = builder.find("Z").or_else(|| builder.find("0"));
+    reader.builder.finish(report)
+}
+
+/// The words of a line without their quotes, and where they begin.
+fn words(line: &str, begin: usize) -> Vec<(usize, &str)> {
+    let start = line.as_ptr() as usize;
+    line.split_whitespace()
+        .map(|word| {
+            let at = begin + (word.as_ptr() as usize - start);
+            let bare = ['\'', '"'].iter().find_map(|&quote| {
+                let inner = word.strip_prefix(quote)?;
+                inner.strip_suffix(quote)
+            });
+            (at, bare.unwrap_or(word))
+        })
+        .collect()
+}
+
+impl Reader {
+    fn line(&mut self, section: Option<Section>, words: &[(usize, &str)], report: &mut Report<'_>) {
+        let (at, first) = words[0];
+        match section {
+            None => {}
+            Some(Section::Kind) => {
+                let is_known = ["STN", "STNU"]
+                    .iter()
+                    .any(|kind| kind.eq_ignore_ascii_case(first));
+                if !is_known {
+                    report.mistake(
+                        at,
+                        format!("networks of the kind {first} are not supported"),
+                        super::REFUSED_HELP,
+                    );
+                }
+            }
+            Some(Section::Count(what)) => match first.parse() {
+                Ok(count) => self.announced.push((what, count, at)),
+                Err(_) => report.mistake(at, "this is no count", "write a whole number"),
+            },
+            Some(Section::Names) => {
+                for (at, name) in words {
+                    self.builder.point(name, *at, report);
+                }
+            }
+            Some(Section::Edges) => self.edge(words, report),
+            Some(Section::Links) => self.link(words, report),
+        }
+    }
+
+    fn edge(&mut self, words: &[(usize, &str)], report: &mut Report<'_>) {
+        self.edges += 1;
+        let [(from_at, from), (most_at, most), (to_at, to)] = words[..] else {
+            report.mistake(
+                words[0].0,
+                "this is no edge",
+                "write `X 12 C`: C comes at most 12 after X",
+            );
+            return;
+        };
+        let from = self.builder.named(from, from_at, report);
+        let to = self.builder.named(to, to_at, report);
+        let most = number(most, most_at, report);
+        if let (Some(from), Some(to), Some(most)) = (from, to, most) {
+            let bounds = (Bound::NegativeInfinity, most);
+            self.builder
+                .requirement((from, to), bounds, most_at, report);
+        }
+    }
+
+    fn link(&mut self, words: &[(usize, &str)], report: &mut Report<'_>) {
+        self.links += 1;
+        let [
+            (begin_at, begin),
+            (least_at, least),
+            (most_at, most),
+            (end_at, end),
+        ] = words[..]
+        else {
+            report.mistake(
+                words[0].0,
+                "this is no contingent link",
+                "write `A 1 3 C`: C comes 1 to 3 after A",
+            );
+            return;
+        };
+        let activation = self.builder.named(begin, begin_at, report);
+        let end = self.builder.named(end, end_at, report);
+        let lower = number(least, least_at, report);
+        let upper = number(most, most_at, report);
+        if let (Some(activation), Some(end), Some(lower), Some(upper)) =
+            (activation, end, lower, upper)
+        {
+            let link = GivenLink {
+                at: begin_at,
+                activation,
+                end,
+                lower,
+                upper,
+                duration: None,
+            };
+            self.builder.link(link, report);
+        }
+    }
+
+    /// That a number is not right may mean that the file is cut off, but not that it cannot be
+    /// used.
+    fn check_counts(&self, report: &mut Report<'_>) {
+        for &(what, announced, at) in &self.announced {
+            let (found, name) = match what {
+                What::Points => (self.builder.nodes().count(), "time points"),
+                What::Edges => (self.edges, "ordinary edges"),
+                What::Links => (self.links, "contingent links"),
+            };
+            if found == 0 && announced > 0 {
+                report.mistake(
+                    at,
+                    format!("the file says that there are {announced} {name}, but has none"),
+                    "the file may be cut off",
+                );
+            } else if found != announced {
+                report.remark(format!(
+                    "the file says that there are {announced} {name}, but has {found}"
+                ));
+            }
+        }
+    }
+}
+
+fn number(text: &str, at: usize, report: &mut Report<'_>) -> Option<Bound> {
+    let read = Bound::parse(text);
+    if read.is_none() {
+        report.mistake(
+            at,
+            format!("`{text}` is no number"),
+            "write a decimal such as 12.5",
+        );
+    }
+    read
+}

@@ -1,0 +1,62 @@
+//! What bounds mean, in the file's own names.
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::LinkId;
+use elbowroom_stn::{ConstraintId, NodeId};
+
+use crate::file::NetworkFile;
+
+/// Digits after the point that people get to see.
+const DIGITS: u32 = 3;
+
+/// A number in short decimals.
+pub fn number(value: &Rational) -> String {
+    value.to_decimal(DIGITS)
+}
+
+impl NetworkFile {
+    /// `to - from <= bound` in words: "C at most 12 after X", "X at least 7 after C".
+    pub fn bound_in_words(&self, from: NodeId, to: NodeId, bound: &Rational) -> String {
+        let (from, to) = (self.point(from), self.point(to));
+        if bound.is_negative() {
+            format!("{from} at least {} after {to}", number(&-bound))
+        } else if bound.is_zero() {
+            format!("{to} not after {from}")
+        } else {
+            format!("{to} at most {} after {from}", number(bound))
+        }
+    }
+
+    /// A requirement in words.
+    pub fn requirement_in_words(&self, id: ConstraintId) -> String {
+        let constraint = self.network.requirements().constraint(id);
+        self.bound_in_words(constraint.from, constraint.to, &constraint.bound)
+    }
+
+    /// That a link may end so early.
+    pub fn early_in_words(&self, id: LinkId) -> String {
+        let link = self.network.link(id);
+        let (begin, end) = (self.point(link.activation), self.point(link.end));
+        let lower = number(&link.lower);
+        format!("{end} may come as early as {lower} after {begin}")
+    }
+
+    /// That a link may end so late.
+    pub fn late_in_words(&self, id: LinkId) -> String {
+        let link = self.network.link(id);
+        let (begin, end) = (self.point(link.activation), self.point(link.end));
+        match &link.upper {
+            Some(upper) => {
+                format!("{end} may come as late as {} after {begin}", number(upper))
+            }
+            None => format!("{end} may come as late as one likes after {begin}"),
+        }
+    }
+
+    /// That a link takes so long.
+    pub fn duration_in_words(&self, id: LinkId, duration: &Rational) -> String {
+        let link = self.network.link(id);
+        let (begin, end) = (self.point(link.activation), self.point(link.end));
+        format!("{end} comes {} after {begin}", number(duration))
+    }
+}

@@ -1,0 +1,333 @@
+//! What each format says, and what is refused.
+
+mod samples;
+
+use elbowroom_network::{Duration, Format, NetworkFile, read, write_graphml, write_json};
+use elbowroom_num::Rational;
+use elbowroom_stn::NodeId;
+use elbowroom_stn::uncertain::LinkId;
+
+fn sample(name: &str) -> NetworkFile {
+    let found = samples::ALL.iter().find(|(other, _)| *other == name);
+    let (name, text) = found.expect("a sample");
+    read(name, text.as_bytes()).expect("a network")
+}
+
+fn refused(name: &str, text: &str) -> String {
+    match read(name, text.as_bytes()) {
+        Ok(_) => panic!("read: {text}"),
+        Err(mistakes) => mistakes.to_string(),
+    }
+}
+
+/// The network in words: requirements, then links.
+fn words(file: &NetworkFile) -> String {
+    let requirements = file.network.requirements();
+    let mut lines: Vec<String> = requirements
+        .constraint_ids()
+        .map(|id| file.requirement_in_words(id))
+        .collect();
+    for id in file.network.link_ids() {
+        lines.push(format!(
+            "{}, {}",
+            file.early_in_words(id),
+            file.late_in_words(id)
+        ));
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn nodes_and_constraints() {
+    let file = sample("one.json");
+    assert_eq!(file.format, Format::Heatlab);
+    assert_eq!(file.points, ["0", "1", "2", "3"]);
+    insta::assert_snapshot!(words(&file), @r"
+    0 not after 1
+    2 at most 9000.5 after 0
+    0 not after 2
+    0 not after 3
+    0 not after 1
+    3 at most 20000 after 1
+    3 at least 1 after 1
+    2 may come as early as 2000 after 1, 2 may come as late as 3000 after 1
+    3 may come as early as 0 after 2, 3 may come as late as one likes after 2
+    ");
+    let normal = Duration::Normal {
+        mean: Rational::from(4500),
+        deviation: Rational::from(500),
+    };
+    assert_eq!(file.durations, [None, Some(normal)]);
+}
+
+#[test]
+fn time_points_with_labels_that_repeat_and_correlations() {
+    let file = sample("two.json");
+    assert_eq!(file.points, ["start", "(drive a)_end", "(drive a)_end #2"]);
+    assert_eq!(file.reference, Some(NodeId(0)));
+    assert_eq!(file.correlations.len(), 1);
+    assert_eq!(file.correlations[0].links, [LinkId(0), LinkId(1)]);
+    // 1000000000 is that library's infinity.
+    insta::assert_snapshot!(words(&file), @r"
+    start not after (drive a)_end #2
+    (drive a)_end may come as early as 0 after start, (drive a)_end may come as late as one likes after start
+    (drive a)_end #2 may come as early as 0 after start, (drive a)_end #2 may come as late as one likes after start
+    ");
+}
+
+#[test]
+fn contingent_edges_with_plain_and_with_labelled_values() {
+    let file = sample("three.stnu");
+    assert_eq!(file.name, "kettle & cup");
+    assert_eq!(file.reference, Some(NodeId(0)));
+    insta::assert_snapshot!(words(&file), @r"
+    X at most 5 after D
+    X at least 1 after D
+    C may come as early as 3 after A, C may come as late as 7 after A
+    D may come as early as 1 after C, D may come as late as 2 after C
+    ");
+    assert_eq!(file.waits.len(), 1);
+    assert_eq!(file.waits[0].delay, Some(Rational::from(7)));
+}
+
+#[test]
+fn sections_of_plain_text() {
+    let file = sample("four.plainstnu");
+    insta::assert_snapshot!(words(&file), @r"
+    C at most 12.5 after X
+    C at least 7 after X
+    C may come as early as 1 after A, C may come as late as 3 after A
+    ");
+}
+
+#[test]
+fn arcs_are_read_from_the_second_node_and_refinements_count() {
+    let file = sample("five.txt");
+    insta::assert_snapshot!(words(&file), @r"
+    job_end at most 10 after job_start
+    z not after job_start
+    job_end at least 5 after job_start
+    ");
+}
+
+#[test]
+fn inequalities_count_once() {
+    let file = sample("six.json");
+    insta::assert_snapshot!(words(&file), @r"
+    1 at most 10 after 0
+    0 not after 1
+    2 at least 3 after 1
+    ");
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    for (name, _) in samples::ALL {
+        let file = sample(name);
+        let text = write_json(&file);
+        let mut again = read("again.json", text.as_bytes()).expect(&text);
+        again.format = file.format;
+        again.remarks.clone_from(&file.remarks);
+        assert_eq!(again, file, "{text}");
+        let text = write_graphml(&file).expect("all waits end");
+        let again = read("again.stnu", text.as_bytes()).expect(&text);
+        assert_eq!(again.points, file.points);
+        assert_eq!(again.network, file.network, "{text}");
+        assert_eq!(again.waits, file.waits);
+    }
+}
+
+#[test]
+fn the_dispatchable_form_is_read_back_with_its_waits() {
+    let text = r#"{ "format": "elbowroom-network", "version": 1, "points": ["A", "C", "X"],
+        "requirements": [{"from": "X", "to": "C", "lower": -1, "upper": 1}],
+        "links": [{"activation": "A", "end": "C", "lower": 2, "upper": 5}] }"#;
+    let file = read("f.json", text.as_bytes()).expect("a network");
+    let form = file.network.dynamic().expect("controllable");
+    let dispatchable = file.dispatchable(&form);
+    assert!(!dispatchable.waits.is_empty());
+    let again = read("f.json", write_json(&dispatchable).as_bytes()).expect("what was written");
+    assert_eq!(again, dispatchable);
+    let graphml = write_graphml(&dispatchable).expect("all waits end");
+    let again = read("f.stnu", graphml.as_bytes()).expect("what was written");
+    assert_eq!(
+        (again.network, again.waits),
+        (dispatchable.network, dispatchable.waits)
+    );
+}
+
+#[test]
+fn the_minimal_network_has_all_that_follows() {
+    let text = r#"{"0": [[0, 1, 3], [1, 2, 4], [2, 0, -1]], "1": [], "2": []}"#;
+    let file = read("f.json", text.as_bytes()).expect("a network");
+    let minimal = file.minimal().expect("consistent");
+    insta::assert_snapshot!(words(&minimal), @r"
+    1 at most 3 after 0
+    2 at most 7 after 0
+    0 at most 3 after 1
+    2 at most 4 after 1
+    2 at least 1 after 0
+    1 at most 2 after 2
+    ");
+}
+
+#[test]
+fn other_kinds_are_refused_by_name() {
+    let conditional = samples::GRAPHML.replace(">STNU<", ">CSTNU<");
+    let message = refused("f.stnu", &conditional);
+    assert!(
+        message.starts_with("f.stnu:5:25: a network of the type CSTNU"),
+        "{message}"
+    );
+    assert!(refused("f.cstn", samples::GRAPHML).contains("a conditional network (CSTN)"));
+    assert!(refused("f.pstn", "").contains("a probabilistic network of the CSTNU Tool (PSTN)"));
+    let observing = samples::GRAPHML.replace(
+        r#"<node id="A"/>"#,
+        r#"<node id="A"><data key="Obs">a</data></node>"#,
+    );
+    assert!(refused("f.stnu", &observing).contains("a conditional network is not supported"));
+    let labelled = samples::GRAPHML.replace(
+        r#"<data key="Value">5</data>"#,
+        r#"<data key="LabeledValues">{(5, a)}</data>"#,
+    );
+    assert!(refused("f.stnu", &labelled).contains("values for several cases"));
+    assert!(refused("0054", "Z=0, A=3, C(A)=7\n").contains("execution traces, not a network"));
+    let kind = samples::PLAIN.replace("STNU", "DTNU");
+    assert!(refused("f.txt", &kind).starts_with("f.txt:2:1: networks of the kind DTNU"));
+}
+
+#[test]
+#[allow(
+    clippy::too_many_lines,
+    reason = "a list of mistakes, and what is said of them"
+)]
+fn mistakes_say_where_and_what_to_do() {
+    let mut messages = Vec::new();
+    let mut wrong = |name: &str, text: &str, changes: &[(&str, &str)]| {
+        for (from, to) in changes {
+            assert!(text.contains(from), "{from}");
+            messages.push(refused(name, &text.replacen(from, to, 1)));
+        }
+    };
+    wrong(
+        "f.json",
+        samples::HEATLAB,
+        &[
+            (r#""stcu""#, r#""stcx""#),
+            ("N_4.5", "X_4.5"),
+            ("2000,", r#""two","#),
+            ("2000,", "4000,"),
+            (r#""node_id": 1"#, r#""node_id": 3"#),
+            (r#""second_node": 3, "min"#, r#""second_node": 7, "min"#),
+            (r#""first_node": 2"#, r#""first_node": 3"#),
+            ("0.0, ", "0.0; "),
+        ],
+    );
+    wrong(
+        "f.stnu",
+        samples::GRAPHML,
+        &[
+            (">-3<", ">three<"),
+            (">-3<", ">3<"),
+            ("UC(D):-2", "UC(D)"),
+            ("UC(C): -7", "UC(D):-7"),
+            (r#"source="C" target="D""#, r#"source="X" target="D""#),
+            ("</graph>", ""),
+        ],
+    );
+    wrong(
+        "f.plainstnu",
+        samples::PLAIN,
+        &[
+            ("X 12.5", "Y 12.5"),
+            ("12.5", "a"),
+            ("1 3 'C'", "1 'C'"),
+            ("# Ordinary Edges", "# Strange things"),
+        ],
+    );
+    wrong(
+        "f.txt",
+        samples::DIMACS,
+        &[("a 3 1", "a 4 1"), ("p sp 3 4", "c")],
+    );
+    wrong(
+        "f.json",
+        samples::PSTN_LIB,
+        &[
+            (r#""sd": 1.5"#, r#""sd": -1.5"#),
+            ("0.5], [0.5", "0.5], [0.6"),
+            (r#""ub": 1000000000"#, r#""ub": null"#),
+        ],
+    );
+    wrong(
+        "f.json",
+        samples::INEQUALITIES,
+        &[("[0, 1, 10.0]", "[0, 1]"), ("[2, 1, -3]", "[7, 1, -3]")],
+    );
+    wrong(
+        "f.json",
+        samples::ELBOWROOM,
+        &[
+            (r#""version": 1"#, r#""version": 2"#),
+            (r#""gamma""#, r#""beta""#),
+            (r#""until": "boiled""#, r#""until": "drunk""#),
+            (r#""shape": 2"#, r#""shape": 0"#),
+        ],
+    );
+    wrong(
+        "f",
+        "hello",
+        &[("hello", ""), ("hello", "goodbye"), ("hello", "{}")],
+    );
+    insta::assert_snapshot!(messages.join("\n"), @r###"
+    f.json:5:49: this type of constraint is not known; known are "stc", "stcu" and "pstc"
+    f.json:7:57: the distribution `X_4.5_0.5` is not known; known are N_mean_deviation, U_from_to, E_rate_from and G_shape_(rate,from)
+    f.json:5:73: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:5:5: the contingent link from `1` to `2` has a lower bound above its upper bound; write the smaller number first; durations are not negative
+    f.json:2:96: there are two time points `3`; give each a name of its own
+    f.json:4:38: there is no time point `1`; list it with the others, or correct the name
+    f.json:5:20: there is no time point `1`; list it with the others, or correct the name
+    f.json:8:20: there is no time point `1`; list it with the others, or correct the name
+    f.json:8:38: there is no time point `7`; list it with the others, or correct the name
+    f.json:6:5: the contingent link from `3` ends where it begins; a link leads from one time point to another
+    f.json:4:75: expected `,` or `}`, found `;`; the file may be cut off or a comma missing
+    f.stnu:10:88: this value is no number; write a number
+    f.stnu:9:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:9:1: this contingent edge and its counterpart do not say which node is the end; the value of the edge from the end back to the beginning is negative or 0
+    f.stnu:12:95: `UC(D)` is no labelled value; write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link
+    f.stnu:11:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:15:1: this wait is for no contingent link that begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
+    f.stnu:11:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:12:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:16:1: `</graphml>` stands where `</graph>` should; close elements in the order in which they nest
+    f.plainstnu:12:1: there is no time point `Y`; list it with the others, or correct the name
+    f.plainstnu:12:3: `a` is no number; write a decimal such as 12.5
+    f.plainstnu:15:1: this is no contingent link; write `A 1 3 C`: C comes 1 to 3 after A
+    f.plainstnu:11:1: this heading is not known; known are the kind of network, the numbers and the names of time points, ordinary edges and contingent links
+    f.plainstnu:6:1: the file says that there are 2 ordinary edges, but has none; the file may be cut off
+    f.txt:8:1: there is no node 4; nodes count from 1 to what the line `p sp NODES ARCS` says
+    f.txt:1:1: there is no problem line; add `p sp NODES ARCS` before the arcs
+    f.json:6:22: the deviation is negative; write it without its sign
+    f.json:13:7: this is none of the probabilistic constraints, or one that was named before; list it under `constraints` with its distribution
+    f.json:12:20: this is no correlation matrix of these durations; it has a row and a column for each, is symmetric, and has 1 in its diagonal
+    f.json:10:40: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:1:8: this is no inequality; write `[u, v, w]` for `v - u <= w`
+    f.json:1:72: there is no time point `7`; list it with the others, or correct the name
+    f.json:1:45: this version of the format is not known; version 1 is read
+    f.json:7:18: the distribution `beta` is not known; known are normal, uniform, exponential and gamma
+    f.json:9:13: this wait is for no end of a contingent link; name the end of a link under `until`
+    f.json:7:18: the numbers of this distribution make no sense; deviations and means are not negative, shapes and scales positive, and from <= to
+    f:1:1: the file is empty; give a file with a network
+    f:1:1: this is no format of networks that is known; known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, and DIMACS text
+    f:1:1: this JSON describes no network of a known form; known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), lists of inequalities under the numbers of nodes, and `"format": "elbowroom-network"`
+    "###);
+}
+
+#[test]
+fn links_that_depend_on_their_own_end_are_refused() {
+    let text = r#"{ "format": "elbowroom-network", "version": 1, "points": ["A", "B"],
+        "requirements": [],
+        "links": [{"activation": "A", "end": "B", "lower": 1, "upper": 2},
+                  {"activation": "B", "end": "A", "lower": 1, "upper": 2}] }"#;
+    assert!(refused("f", text).contains("depends on its own end"));
+}
