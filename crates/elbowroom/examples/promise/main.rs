@@ -21,6 +21,7 @@
     clippy::print_stderr,
     reason = "that is what the example does"
 )]
+#![allow(dead_code, reason = "the test uses the rest")]
 
 mod boxes;
 mod grow;
