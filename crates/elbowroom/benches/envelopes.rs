@@ -4,6 +4,9 @@
 //! `first_widening` stops when the box has grown for the first time. Without the benchmark files
 //! beside the repository these have nothing to measure.
 //!
+//! These are boxes of the weak guarantee, which the paper's are. The group `dynamic` searches the same
+//! with the dynamic one.
+//!
 //! `rounds` and `rounds_first_widening` are deliveries of our own with all durations left open, by
 //! the number of parameters.
 
@@ -53,9 +56,14 @@ fn read(name: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
 }
 
 /// Searches until `enough` widenings.
-fn search(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>, enough: usize) -> usize {
+fn search(
+    task: &Arc<Task>,
+    plan: &Arc<ParametrizedPlan>,
+    guarantee: Guarantee,
+    enough: usize,
+) -> usize {
     let mut oracle =
-        Oracle::new(task, plan, &Rational::new(1, 1000), Guarantee::Weak).expect("within reach");
+        Oracle::new(task, plan, &Rational::new(1, 1000), guarantee).expect("within reach");
     let mut widenings = 0;
     let run = irr(&mut oracle, &Settings::default(), &mut |widening| {
         widenings += usize::from(widening.is_some());
@@ -71,13 +79,13 @@ fn search(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>, enough: usize) -> usiz
 #[divan::bench(args = names(), sample_count = 20)]
 fn whole(bencher: Bencher<'_, '_>, name: &str) {
     let (task, plan) = read(name);
-    bencher.bench_local(|| search(&task, &plan, usize::MAX));
+    bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, usize::MAX));
 }
 
 #[divan::bench(args = names(), sample_count = 20)]
 fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
     let (task, plan) = read(name);
-    bencher.bench_local(|| search(&task, &plan, 1));
+    bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, 1));
 }
 
 /// A delivery with so many durations left open.
@@ -98,11 +106,35 @@ fn delivery(parameters: usize) -> (Arc<Task>, Arc<ParametrizedPlan>) {
 #[divan::bench(args = [33, 65], sample_count = 20)]
 fn rounds(bencher: Bencher<'_, '_>, parameters: usize) {
     let (task, plan) = delivery(parameters);
-    bencher.bench_local(|| search(&task, &plan, usize::MAX));
+    bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, usize::MAX));
 }
 
 #[divan::bench(args = [33, 65], sample_count = 20)]
 fn rounds_first_widening(bencher: Bencher<'_, '_>, parameters: usize) {
     let (task, plan) = delivery(parameters);
-    bencher.bench_local(|| search(&task, &plan, 1));
+    bencher.bench_local(|| search(&task, &plan, Guarantee::Weak, 1));
+}
+
+#[divan::bench_group]
+mod dynamic {
+    use divan::Bencher;
+    use elbowroom_envelope::Guarantee;
+
+    #[divan::bench(args = super::names(), sample_count = 20)]
+    fn whole(bencher: Bencher<'_, '_>, name: &str) {
+        let (task, plan) = super::read(name);
+        bencher.bench_local(|| super::search(&task, &plan, Guarantee::Dynamic, usize::MAX));
+    }
+
+    #[divan::bench(args = super::names(), sample_count = 20)]
+    fn first_widening(bencher: Bencher<'_, '_>, name: &str) {
+        let (task, plan) = super::read(name);
+        bencher.bench_local(|| super::search(&task, &plan, Guarantee::Dynamic, 1));
+    }
+
+    #[divan::bench(args = [33, 65], sample_count = 20)]
+    fn rounds(bencher: Bencher<'_, '_>, parameters: usize) {
+        let (task, plan) = super::delivery(parameters);
+        bencher.bench_local(|| super::search(&task, &plan, Guarantee::Dynamic, usize::MAX));
+    }
 }

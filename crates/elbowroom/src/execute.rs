@@ -9,6 +9,7 @@ mod likeliest;
 mod memory;
 mod planners;
 pub(crate) mod rewrite;
+mod spoiling;
 mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
@@ -17,4 +18,5 @@ pub use external::External;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
+pub use spoiling::Spoiling;
 pub use vary::check_vary;

@@ -35,6 +35,7 @@
 
 pub mod draw;
 mod model;
+mod paced;
 mod pattern;
 pub mod perturbed;
 mod sim;
@@ -44,6 +45,7 @@ pub use draw::{Distribution, Purpose};
 pub use model::{
     Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldFileError, WorldModel,
 };
+pub use paced::{Begun, Durations, Pace, Paced};
 pub use pattern::ActionPattern;
 pub use sim::SimWorld;
 pub use unreliable::Unreliable;

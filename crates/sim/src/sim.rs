@@ -1,5 +1,6 @@
 //! One trajectory of a world.
 
+mod held;
 mod world;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,118 @@
+//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use elbowroom::envelope::Guarantee;
+use elbowroom::flow;
+use elbowroom::num::Rational;
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
+
+use super::options::Options;
+use super::sources::Source;
+use super::subject::{Subject, epsilon};
+use super::trial::{Boxed, Search, boxed};
+use super::{counted, not_counted};
+
+/// One plan's boxes, weak and dynamic.
+struct Row {
+    is_different: bool,
+    widths: [Rational; 2],
+    checks: [usize; 2],
+    times: [Duration; 2],
+}
+
+pub(crate) fn main(options: &Options) -> Result<(), String> {
+    let (families, skipped) = counted(options, &|source| {
+        row(source, options).map(|row| (source.family.clone(), row))
+    });
+    println!(
+        "| family | plans | boxes differ | widths of these: weak | dynamic | share | \
+         checks: weak | dynamic | seconds: weak | dynamic |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    for (family, rows) in &families {
+        println!("| {family} {}", line(&rows.iter().collect::<Vec<_>>()));
+    }
+    let all: Vec<&Row> = families.values().flatten().collect();
+    println!("| **all** {}", line(&all));
+    print!("{}", not_counted(&skipped));
+    Ok(())
+}
+
+fn line(rows: &[&Row]) -> String {
+    let different: Vec<_> = rows.iter().filter(|row| row.is_different).collect();
+    let mut line = format!("| {} | {} |", rows.len(), different.len());
+    let mut widths = [Rational::ZERO, Rational::ZERO];
+    for row in &different {
+        for (sum, width) in widths.iter_mut().zip(&row.widths) {
+            *sum = &*sum + width;
+        }
+    }
+    let [weak, dynamic] = &widths;
+    match weak.reciprocal() {
+        Some(inverse) => {
+            let share = (dynamic * inverse * Rational::from(100)).to_decimal(1);
+            let (weak, dynamic) = (weak.to_decimal(1), dynamic.to_decimal(1));
+            let _ = write!(line, " {weak} | {dynamic} | {share} % |");
+        }
+        None => line.push_str(" | | |"),
+    }
+    for guarantee in 0..2 {
+        let checks: usize = rows.iter().map(|row| row.checks[guarantee]).sum();
+        let _ = write!(line, " {checks} |");
+    }
+    for guarantee in 0..2 {
+        let time: Duration = rows.iter().map(|row| row.times[guarantee]).sum();
+        let _ = write!(line, " {:.3} |", time.as_secs_f64());
+    }
+    line
+}
+
+fn row(source: &Source, options: &Options) -> Result<Row, String> {
+    let subject = Subject::of_source(source, &options.planning)?;
+    let open = flow::open(&subject.task, subject.freed.clone(), &[], &epsilon());
+    let open = Arc::new(open.map_err(|_| "durations cannot be left open")?);
+    let (weak, weak_time) = timed(&subject, &open, Guarantee::Weak, options)?;
+    let (dynamic, dynamic_time) = timed(&subject, &open, Guarantee::Dynamic, options)?;
+    if !weak.is_finished || !dynamic.is_finished {
+        return Err("a box that was still growing when the time was up".to_owned());
+    }
+    Ok(Row {
+        is_different: weak.envelope != dynamic.envelope,
+        widths: [&weak, &dynamic].map(|own| width(&own.envelope, &open)),
+        checks: [weak.checks, dynamic.checks],
+        times: [weak_time, dynamic_time],
+    })
+}
+
+#[allow(clippy::disallowed_methods, reason = "it is about time")]
+fn timed(
+    subject: &Subject,
+    plan: &Arc<ParametrizedPlan>,
+    guarantee: Guarantee,
+    options: &Options,
+) -> Result<(Boxed, Duration), String> {
+    let begin = Instant::now();
+    let goes_on = || begin.elapsed() < options.widening;
+    let search = Search {
+        most_checks: usize::MAX,
+        goes_on: &goes_on,
+    };
+    let boxed = boxed(&subject.task, plan, guarantee, search)?;
+    Ok((boxed, begin.elapsed()))
+}
+
+/// The sum of the widths, upper ends cut at ten times the nominal value.
+fn width(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Rational {
+    let mut sum = Rational::ZERO;
+    for (interval, parameter) in envelope.intervals.iter().zip(&plan.parameters) {
+        let lower = interval.lower.value().cloned().unwrap_or_default();
+        let most = &parameter.nominal * Rational::from(10);
+        let upper = interval.upper.value().min(Some(&most));
+        let upper = upper.unwrap_or(&most).max(&lower).clone();
+        sum = &sum + (upper - lower);
+    }
+    sum
+}

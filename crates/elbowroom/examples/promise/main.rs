@@ -1,0 +1,139 @@
+//! Whether what an envelope promises is kept: over every plan of a folder of benchmarks.
+//!
+//! ```text
+//! promise plan    [--data FOLDER] [--plans FOLDER] [--states N] [--seconds S]
+//! promise nominal [--data FOLDER] [--plans FOLDER]
+//! promise runs    [--data FOLDER] [--plans FOLDER] [--runs N]
+//! promise grow    [--data FOLDER] [--plans FOLDER]
+//! promise boxes   [--data FOLDER] [--plans FOLDER]
+//! ```
+//!
+//! `plan` has the embedded planner make a plan for each temporal problem and keeps them as text in
+//! the folder `--plans`; the others use them, and make those that are missing (`--seconds 0`: they
+//! do not). `nominal` executes every valid plan where nothing deviates. `runs` executes them in
+//! worlds in which every duration is somewhere in its interval. `grow` widens boxes that cannot be
+//! widened. `boxes` compares boxes of the weak and the dynamic guarantee.
+//!
+//! `--only TEXT` (also several) keeps the plans in whose family or name the text is, `--jobs` is
+//! the number of threads, `--widening` the number of seconds after which a box is wide enough.
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "that is what the example does"
+)]
+#![allow(dead_code, reason = "the test uses the rest")]
+
+mod boxes;
+mod grow;
+mod nominal;
+mod options;
+mod planning;
+mod runs;
+mod sources;
+mod subject;
+mod tally;
+mod trial;
+mod worlds;
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use options::Options;
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use sources::{Origin, Source};
+use subject::Subject;
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
+    let outcome = Options::read(&rest).and_then(|options| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs);
+        let pool = threads.build().map_err(|error| error.to_string())?;
+        pool.install(|| match command.as_str() {
+            "plan" => plan(&options),
+            "nominal" => nominal::main(&options),
+            "runs" => runs::main(&options),
+            "grow" => grow::main(&options),
+            "boxes" => boxes::main(&options),
+            _ => Err("the first word says what to do; the source says what there is".to_owned()),
+        })
+    });
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The sources that are asked for.
+fn wanted(options: &Options) -> Vec<Source> {
+    let mut sources = sources::sources(&options.data);
+    let only = &options.only;
+    sources.retain(|source| {
+        let name = format!("{} {}", source.family, source.name);
+        only.is_empty() || only.iter().any(|text| name.contains(text.as_str()))
+    });
+    sources
+}
+
+/// What there is to say of each plan, by family; and why others do not count, and how many.
+fn counted<T: Send>(
+    options: &Options,
+    say: &(dyn Fn(&Source) -> Result<(String, T), String> + Sync),
+) -> (BTreeMap<String, Vec<T>>, BTreeMap<String, usize>) {
+    let sources = wanted(options);
+    let done = AtomicUsize::new(0);
+    let said: Vec<_> = sources
+        .par_iter()
+        .with_max_len(1)
+        .map(|source| {
+            let said = say(source);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if done.is_multiple_of(20) {
+                eprintln!("{done}/{}", sources.len());
+            }
+            said
+        })
+        .collect();
+    let mut families: BTreeMap<String, Vec<T>> = BTreeMap::new();
+    let mut skipped = BTreeMap::new();
+    for said in said {
+        match said {
+            Ok((family, said)) => families.entry(family).or_default().push(said),
+            Err(why) => *skipped.entry(why).or_default() += 1,
+        }
+    }
+    (families, skipped)
+}
+
+/// A table of plans that do not count.
+fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
+    let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
+    for (why, count) in skipped {
+        text.push_str(&format!("| {why} | {count} |\n"));
+    }
+    text
+}
+
+/// Makes plans, and keeps them.
+fn plan(options: &Options) -> Result<(), String> {
+    let mut sources = wanted(options);
+    sources.retain(|source| source.origin == Origin::Planned);
+    let done = AtomicUsize::new(0);
+    sources.par_iter().for_each(|source| {
+        let made = Subject::of_source(source, &options.planning);
+        let said = made.map_or_else(|why| why, |_| "a plan".to_owned());
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        eprintln!(
+            "{done}/{} {} {}: {said}",
+            sources.len(),
+            source.family,
+            source.name
+        );
+    });
+    Ok(())
+}

@@ -1,0 +1,107 @@
+//! Every plan where nothing deviates: no executor may fail.
+
+use std::time::Instant;
+
+use super::options::Options;
+use super::sources::Source;
+use super::subject::Subject;
+use super::trial::{Ready, Search};
+use super::{counted, not_counted};
+
+/// Those that keep the promise, and two for comparison.
+const EXECUTORS: [&str; 5] = ["guarded", "live", "stn", "fixed:60", "esterel"];
+
+/// Of these none may fail, in whatever order lines stand.
+const KEEP: usize = 3;
+
+/// What came of one plan.
+struct Row {
+    /// Whether each executor failed.
+    failed: [bool; EXECUTORS.len()],
+    /// Whether one failed whose lines stood in another order.
+    is_order_missed: bool,
+}
+
+pub(crate) fn main(options: &Options) -> Result<(), String> {
+    let (families, skipped) = counted(options, &|source| {
+        row(source, options).map(|row| (source.family.clone(), row))
+    });
+    println!(
+        "| family | plans | {} | lines in another order |",
+        EXECUTORS.join(" | ")
+    );
+    println!("|---|--:|{}--:|", "--:|".repeat(EXECUTORS.len()));
+    for (family, rows) in &families {
+        println!("| {family} {}", line(&rows.iter().collect::<Vec<_>>()));
+    }
+    let all: Vec<&Row> = families.values().flatten().collect();
+    println!("| **all** {}", line(&all));
+    print!("{}", not_counted(&skipped));
+    Ok(())
+}
+
+fn line(rows: &[&Row]) -> String {
+    let mut line = format!("| {} |", rows.len());
+    for executor in 0..EXECUTORS.len() {
+        let failed = rows.iter().filter(|row| row.failed[executor]).count();
+        line.push_str(&format!(" {failed} |"));
+    }
+    let missed = rows.iter().filter(|row| row.is_order_missed).count();
+    format!("{line} {missed} |")
+}
+
+#[allow(
+    clippy::disallowed_methods,
+    reason = "boxes are widened for a limited time"
+)]
+fn row(source: &Source, options: &Options) -> Result<Row, String> {
+    let subject = Subject::of_source(source, &options.planning)?;
+    let label = format!("{} {}", subject.family, subject.name);
+    let begin = Instant::now();
+    let goes_on = || begin.elapsed() < options.widening;
+    let search = Search {
+        most_checks: usize::MAX,
+        goes_on: &goes_on,
+    };
+    let ready = Ready::new(&subject, search).inspect_err(|why| eprintln!("{label}: {why}"))?;
+    let failed = EXECUTORS.map(|executor| {
+        let outcome = ready.run_as_planned(executor);
+        let is_failed = outcome.failure.is_some();
+        if let Some(failure) = outcome.failure
+            && EXECUTORS[..KEEP].contains(&executor)
+        {
+            eprintln!("{label}: {executor}: {failure}: {}", outcome.why);
+        }
+        is_failed
+    });
+    let mut is_order_missed = false;
+    if let Some(turned) = subject.turned_round() {
+        let begin = Instant::now();
+        let goes_on = || begin.elapsed() < options.widening;
+        let search = Search {
+            most_checks: 20,
+            goes_on: &goes_on,
+        };
+        let failures = match &turned {
+            Ok(turned) => match Ready::new(turned, search) {
+                Ok(ready) => EXECUTORS[..KEEP]
+                    .iter()
+                    .filter_map(|executor| {
+                        let outcome = ready.run_as_planned(executor);
+                        Some(format!("{executor}: {}: {}", outcome.failure?, outcome.why))
+                    })
+                    .collect(),
+                Err(why) => vec![why],
+            },
+            Err(why) => vec![why.clone()],
+        };
+        for failure in &failures {
+            eprintln!("{label}, in another order: {failure}");
+        }
+        is_order_missed = !failures.is_empty();
+    }
+    Ok(Row {
+        failed,
+        is_order_missed,
+    })
+}

@@ -1,0 +1,67 @@
+//! What the command line says.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::subject::Planning;
+
+/// What to do with which plans.
+#[derive(Clone, Debug)]
+pub(crate) struct Options {
+    pub(crate) data: PathBuf,
+    pub(crate) planning: Planning,
+    /// Only plans whose family or name has this in it.
+    pub(crate) only: Vec<String>,
+    /// How many runs altogether.
+    pub(crate) runs: u64,
+    /// For how long to widen a box at most.
+    pub(crate) widening: Duration,
+    /// Threads.
+    pub(crate) jobs: usize,
+}
+
+impl Options {
+    pub(crate) fn read(arguments: &[String]) -> Result<Self, String> {
+        let mut options = Self {
+            data: PathBuf::from("../shared/data"),
+            planning: Planning {
+                cache: None,
+                states: 20_000,
+                time: Some(Duration::from_secs(5)),
+            },
+            only: Vec::new(),
+            runs: 1_000_000,
+            widening: Duration::from_secs(20),
+            jobs: 2,
+        };
+        let mut arguments = arguments.iter();
+        while let Some(option) = arguments.next() {
+            let value = arguments
+                .next()
+                .ok_or_else(|| format!("{option} takes a value"))?;
+            let number = || {
+                let number: Result<u64, _> = value.parse();
+                number.map_err(|_| format!("{option} takes a number, not {value}"))
+            };
+            match option.as_str() {
+                "--data" => options.data = PathBuf::from(value),
+                "--plans" => options.planning.cache = Some(PathBuf::from(value)),
+                "--states" => options.planning.states = number()?,
+                "--seconds" => {
+                    let time = Duration::from_secs(number()?);
+                    options.planning.time = (!time.is_zero()).then_some(time);
+                }
+                "--only" => options.only.push(value.clone()),
+                "--runs" => options.runs = number()?,
+                "--widening" => options.widening = Duration::from_secs(number()?),
+                "--jobs" => options.jobs = usize::try_from(number()?.max(1)).unwrap_or(1),
+                _ => return Err(format!("unknown option {option}")),
+            }
+        }
+        if let Some(folder) = &options.planning.cache {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| format!("{}: {error}", folder.display()))?;
+        }
+        Ok(options)
+    }
+}

@@ -1,0 +1,89 @@
+//! Every plan in worlds in which every duration is somewhere in its interval of the dynamic box:
+//! no failure, no new plan, and the judge accepts what was done.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use super::options::Options;
+use super::sources::Source;
+use super::subject::Subject;
+use super::tally::{Tally, run};
+use super::trial::{Ready, Search};
+
+use super::worlds::{Kind, Worlds};
+use super::{counted, not_counted, wanted};
+
+#[allow(clippy::disallowed_methods, reason = "runs are timed")]
+pub(crate) fn main(options: &Options) -> Result<(), String> {
+    let begin = Instant::now();
+    let total = AtomicU64::new(0);
+    let most = 4 * options.runs.div_ceil(wanted(options).len().max(1) as u64);
+    let (families, skipped) = counted(options, &|source| tally(source, options, &total, most));
+    let kinds = Kind::ALL.map(Kind::name).join(" | ");
+    println!("| family | plans | {kinds} | failures |\n|---|--:|--:|--:|--:|--:|");
+    for (family, tallies) in &families {
+        println!("| {family} {}", line(&tallies.iter().collect::<Vec<_>>()));
+    }
+    let all: Vec<&Tally> = families.values().flatten().collect();
+    println!("| **all** {}", line(&all));
+    print!("{}", not_counted(&skipped));
+    let seconds = begin.elapsed().as_secs();
+    let runs: u64 = all.iter().map(|tally| tally.runs()).sum();
+    println!("\n{runs} runs, {seconds} s.");
+    Ok(())
+}
+
+fn line(tallies: &[&Tally]) -> String {
+    let mut line = format!("| {} |", tallies.len());
+    let mut failed = 0;
+    for kind in Kind::ALL {
+        let counts = tallies.iter().filter_map(|tally| tally.counts.get(&kind));
+        let (mut runs, mut own) = (0, 0);
+        for count in counts {
+            runs += count.runs;
+            own += count.failed;
+        }
+        failed += own;
+        let _ = write!(line, " {runs} |");
+    }
+    let _ = write!(line, " {failed} |");
+    line
+}
+
+#[allow(
+    clippy::disallowed_methods,
+    reason = "boxes and runs have a limited time"
+)]
+fn tally(
+    source: &Source,
+    options: &Options,
+    total: &AtomicU64,
+    most: u64,
+) -> Result<(String, Tally), String> {
+    /// For the runs of one plan.
+    const TIME: Duration = Duration::from_secs(10);
+    let subject = Subject::of_source(source, &options.planning)?;
+    let begin = Instant::now();
+    let goes_on = || begin.elapsed() < options.widening;
+    let search = Search {
+        most_checks: usize::MAX,
+        goes_on: &goes_on,
+    };
+    let ready = Ready::new(&subject, search)?;
+    let worlds = Worlds::new(&subject.task, &ready.open, ready.envelope());
+    let mut tally = Tally::default();
+    let begin = Instant::now();
+    for number in 0..most {
+        if begin.elapsed() > TIME || total.fetch_add(1, Ordering::Relaxed) >= options.runs {
+            break;
+        }
+        run(&ready, &worlds, number, &mut tally);
+    }
+    let label = format!("{} {}", subject.family, subject.name);
+    match &tally.failure {
+        Some(failure) => eprintln!("{label}: {failure}"),
+        None => eprintln!("{label}: {} runs", tally.runs()),
+    }
+    Ok((subject.family.clone(), tally))
+}

@@ -1,0 +1,142 @@
+//! A plan that is valid, read and freed of the order that it does not need.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::flow::{self, Freed};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, read_problem};
+use elbowroom::plan::format;
+use elbowroom::plan::{NodeId, network_node};
+use elbowroom::{PlanKind, stn};
+
+use super::planning;
+use super::sources::{Origin, Source};
+
+/// The least separation of interfering happenings (ε).
+pub(crate) fn epsilon() -> Rational {
+    Rational::new(1, 1000)
+}
+
+/// A problem with a valid plan.
+pub(crate) struct Subject {
+    pub(crate) family: String,
+    pub(crate) name: String,
+    pub(crate) task: Arc<Task>,
+    pub(crate) plan: TimeTriggeredPlan,
+    pub(crate) freed: Freed,
+}
+
+/// How to come by plans.
+#[derive(Clone, Debug)]
+pub(crate) struct Planning {
+    /// Where plans made earlier are kept, and new ones are put.
+    pub(crate) cache: Option<PathBuf>,
+    /// How many states to look at.
+    pub(crate) states: u64,
+    /// How long to look for a plan that is not there; `None` for no plan at all.
+    pub(crate) time: Option<Duration>,
+}
+
+impl Subject {
+    /// A problem and a plan as texts.
+    ///
+    /// # Errors
+    /// Why the plan does not count.
+    pub(crate) fn of_texts(
+        [family, name]: [&str; 2],
+        [domain, problem, plan]: [&str; 3],
+    ) -> Result<Self, String> {
+        let text = |what: &str, text: &str| pddl::Source::new(what, text);
+        let read = read_problem(&text("domain", domain), &text("problem", problem));
+        let (problem, _) = read.map_err(|_| "refused by the reader of problems".to_owned())?;
+        let task = Task::new(problem);
+        Self::of_bytes([family, name], task, plan.as_bytes())
+    }
+
+    /// What files say, or a planner finds.
+    ///
+    /// # Errors
+    /// Why it does not count.
+    pub(crate) fn of_source(source: &Source, how: &Planning) -> Result<Self, String> {
+        let mut task = task(&source.domain, &source.problem)?;
+        let bytes = match &source.origin {
+            Origin::File(path) => read(path)?,
+            Origin::Planned => planning::plan(source, &mut task, how)?.into_bytes(),
+        };
+        Self::of_bytes([&source.family, &source.name], task, &bytes)
+    }
+
+    fn of_bytes([family, name]: [&str; 2], mut task: Task, bytes: &[u8]) -> Result<Self, String> {
+        let plan = match PlanKind::of_text(&String::from_utf8_lossy(bytes)) {
+            PlanKind::TimeTriggered => {
+                let read = pddl::read_plan(&pddl::Source::from_bytes("plan", bytes), &mut task);
+                read.map_err(|_| "refused by the reader of plans")?.0
+            }
+            PlanKind::Stn => scheduled(bytes, &mut task)?,
+        };
+        if plan.steps.is_empty() {
+            return Err("an empty plan".to_owned());
+        }
+        let freed = flow::free(&task, &plan, &epsilon()).map_err(|error| match error {
+            flow::FlowError::Invalid(_) => "the judge rejects the plan".to_owned(),
+            _ => "the plan cannot be freed".to_owned(),
+        })?;
+        Ok(Self {
+            family: family.to_owned(),
+            name: name.to_owned(),
+            task: Arc::new(task),
+            plan,
+            freed,
+        })
+    }
+
+    /// The same plan, whose steps that start together stand in the opposite order.
+    pub(crate) fn turned_round(&self) -> Option<Result<Self, String>> {
+        let mut plan = self.plan.clone();
+        plan.steps.reverse();
+        plan.steps.sort_by(|one, other| one.start.cmp(&other.start));
+        if plan == self.plan {
+            return None;
+        }
+        let freed = flow::free(&self.task, &plan, &epsilon());
+        Some(match freed {
+            Ok(freed) => Ok(Self {
+                family: self.family.clone(),
+                name: self.name.clone(),
+                task: Arc::clone(&self.task),
+                plan,
+                freed,
+            }),
+            Err(error) => Err(error.to_string()),
+        })
+    }
+}
+
+/// The earliest schedule of an STN plan file at its nominal values.
+fn scheduled(bytes: &[u8], task: &mut Task) -> Result<TimeTriggeredPlan, String> {
+    let plan = format::read(bytes, task).map_err(|_| "refused by the reader of STN plans")?;
+    let plan = plan.plan.at(&plan.nominal());
+    let network = stn::ConsistentNetwork::try_from(plan.network(&[]));
+    let network = network.map_err(|_| "an STN plan without a schedule")?;
+    let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
+    Ok(plan.scheduled(&schedule.times().to_vec()))
+}
+
+/// The task of two files.
+pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
+    let source = |path: &Path| {
+        let bytes = read(path)?;
+        Ok::<_, String>(pddl::Source::from_bytes(path.display().to_string(), &bytes))
+    };
+    let read = read_problem(&source(domain)?, &source(problem)?);
+    let (problem, _) = read.map_err(|_| "refused by the reader of problems".to_owned())?;
+    Ok(Task::new(problem))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    fs::read(path).map_err(|_| "a file that is not there".to_owned())
+}

@@ -1,0 +1,232 @@
+//! Runs of one plan, without a planner: it works, or it does not.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
+use elbowroom::execute::{Analyst, WholeRegion};
+use elbowroom::execution::executors::{ExecutorSpec, Means};
+use elbowroom::execution::run::{
+    self, Patience, PlanningTime, Ports, Report, RunSettings, Verdict,
+};
+use elbowroom::execution::{Need, NoPlanner, NoRecord, Prepared, Preparer, World};
+use elbowroom::flow;
+use elbowroom::model::validate::{self, validate};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::plan::DecoupledEnvelope;
+use elbowroom::sim::{SimWorld, WorldModel};
+
+use super::subject::{Subject, epsilon};
+
+/// A plan made ready for every executor.
+pub(crate) struct Ready<'a> {
+    pub(crate) subject: &'a Subject,
+    /// For `stn` and `fixed`.
+    pub(crate) network: Prepared,
+    /// With all durations left open, and the box.
+    pub(crate) open: Prepared,
+    /// For `esterel`.
+    orderings: Result<Prepared, String>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Outcome {
+    /// What was wrong with it, in one word; `None` if nothing was.
+    pub(crate) failure: Option<&'static str>,
+    /// What there is to say about that.
+    pub(crate) why: String,
+}
+
+/// How far to widen boxes.
+#[derive(Clone, Copy)]
+pub(crate) struct Search<'a> {
+    pub(crate) most_checks: usize,
+    /// Whether to go on.
+    pub(crate) goes_on: &'a dyn Fn() -> bool,
+}
+
+/// The box of a plan with all durations open, and what it took.
+pub(crate) struct Boxed {
+    pub(crate) envelope: DecoupledEnvelope,
+    pub(crate) checks: usize,
+    /// Whether the search came to its end.
+    pub(crate) is_finished: bool,
+}
+
+impl<'a> Ready<'a> {
+    /// Prepares a plan as `elbowroom run` does, with the dynamic guarantee.
+    ///
+    /// # Errors
+    /// Why it cannot be.
+    pub(crate) fn new(subject: &'a Subject, search: Search<'_>) -> Result<Self, String> {
+        let (task, epsilon) = (&subject.task, epsilon());
+        let nominal = subject.freed.deordered.nominal.clone();
+        let open = flow::open(task, subject.freed.clone(), &[], &epsilon)
+            .map_err(|_| "durations cannot be left open".to_owned())?;
+        let closed = flow::closed(task, subject.freed.clone(), &epsilon);
+        let open = Arc::new(open);
+        let boxed = boxed(task, &open, Guarantee::Dynamic, search)?;
+        let mut analyst = Analyst::new(flow::Settings::default());
+        Ok(Self {
+            subject,
+            network: Prepared {
+                plan: closed,
+                nominal: nominal.clone(),
+                envelope: None,
+            },
+            open: Prepared {
+                plan: Arc::unwrap_or_clone(open),
+                nominal,
+                envelope: Some(boxed.envelope),
+            },
+            orderings: analyst.prepare(task, &subject.plan, Need::Orderings),
+        })
+    }
+
+    /// The same plan, with that box.
+    pub(crate) fn with_open(&self, open: Prepared) -> Self {
+        Self {
+            subject: self.subject,
+            network: self.network.clone(),
+            open,
+            orderings: self.orderings.clone(),
+        }
+    }
+
+    /// The dynamic box.
+    pub(crate) fn envelope(&self) -> &DecoupledEnvelope {
+        let envelope = self.open.envelope.as_ref();
+        envelope.expect("it was made with one")
+    }
+
+    /// Runs with an executor in the world where everything happens as planned.
+    pub(crate) fn run_as_planned(&self, executor: &str) -> Outcome {
+        let model = WorldModel::as_planned();
+        let mut world = SimWorld::new(Arc::clone(&self.subject.task), &model, 0);
+        self.run(executor, &mut world)
+    }
+
+    /// Runs with an executor in any world.
+    pub(crate) fn run(&self, executor: &str, world: &mut dyn World) -> Outcome {
+        let report = self.report(executor, world);
+        self.outcome(&report)
+    }
+
+    pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {
+        let spec: ExecutorSpec = executor.parse().expect("an executor that there is");
+        let region = Box::new(WholeRegion { epsilon: epsilon() });
+        let mut decider = spec.build(Means::from(region));
+        // What may go on without end is waited for.
+        let patience = Patience {
+            at_least: Rational::from(1_000_000_000_000_i64),
+            ..Patience::default()
+        };
+        let settings = RunSettings {
+            patience,
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            time_limit: Rational::from(1_000_000_000_000_i64),
+            ..RunSettings::default()
+        };
+        let mut preparer = Remembered(self);
+        run::run(
+            Arc::clone(&self.subject.task),
+            Some(&self.subject.plan),
+            &settings,
+            Ports {
+                world,
+                planner: &mut NoPlanner,
+                preparer: &mut preparer,
+                executor: decider.as_mut(),
+                need: spec.registered.need,
+                recorder: &mut NoRecord,
+            },
+        )
+    }
+
+    fn outcome(&self, report: &Report) -> Outcome {
+        let failed = |failure, why| Outcome {
+            failure: Some(failure),
+            why,
+        };
+        if let Some(reason) = report.reasons.first() {
+            return failed("replans", reason.to_string());
+        }
+        if report.verdict != Verdict::GoalReached {
+            return failed(report.verdict.name(), format!("{:?}", report.verdict));
+        }
+        let verdict = self.judged(report);
+        if let validate::Verdict::Invalid(violation) = verdict {
+            return failed("not valid", violation.to_string());
+        }
+        Outcome {
+            failure: None,
+            why: String::new(),
+        }
+    }
+
+    /// What the judge says of what was done.
+    fn judged(&self, report: &Report) -> validate::Verdict {
+        let steps = report.executed.iter().map(|executed| executed.step.clone());
+        let plan = TimeTriggeredPlan {
+            steps: steps.collect(),
+        };
+        let settings = validate::Settings {
+            epsilon: Some(epsilon()),
+            ..validate::Settings::default()
+        };
+        validate(&self.subject.task, &plan, &settings)
+    }
+}
+
+/// Has the answer to the only question that is asked.
+struct Remembered<'a>(&'a Ready<'a>);
+
+impl Preparer for Remembered<'_> {
+    fn prepare(
+        &mut self,
+        _task: &Arc<Task>,
+        _plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String> {
+        match need {
+            Need::Orderings => self.0.orderings.clone(),
+            Need::Network => Ok(self.0.network.clone()),
+            Need::OpenNetwork | Need::Envelope => Ok(self.0.open.clone()),
+        }
+    }
+}
+
+/// The box of a plan with that guarantee.
+///
+/// # Errors
+/// Why there is none.
+pub(crate) fn boxed(
+    task: &Arc<Task>,
+    plan: &Arc<elbowroom::plan::ParametrizedPlan>,
+    guarantee: Guarantee,
+    search: Search<'_>,
+) -> Result<Boxed, String> {
+    let beyond = |_| "beyond exact analysis".to_owned();
+    let mut oracle = Oracle::new(task, plan, &epsilon(), guarantee).map_err(beyond)?;
+    let settings = elbowroom::envelope::Settings {
+        most_checks: Some(search.most_checks),
+        ..elbowroom::envelope::Settings::default()
+    };
+    let run = irr(&mut oracle, &settings, &mut |_| {
+        if (search.goes_on)() {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    });
+    let run = run.map_err(beyond)?;
+    let envelope = run.envelope;
+    Ok(Boxed {
+        is_finished: run.stop == StopReason::Converged,
+        envelope: envelope
+            .map_err(|objection| format!("not guaranteed even as planned ({objection})"))?,
+        checks: run.checks,
+    })
+}

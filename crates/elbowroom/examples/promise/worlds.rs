@@ -1,0 +1,146 @@
+//! Worlds in which every duration is somewhere in its interval of a box.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom::execute::Spoiling;
+use elbowroom::execution::Prepared;
+use elbowroom::model::Task;
+use elbowroom::num::{End, Interval, Rational};
+use elbowroom::plan::uncertain::PlanNetwork;
+use elbowroom::plan::{DecoupledEnvelope, InstanceId, ParameterId, ParameterKind};
+use elbowroom::sim::{Durations, Paced, SimWorld, WorldModel};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// How durations come about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    /// Anywhere in the interval, all values alike.
+    Uniform,
+    /// At one of the two ends of the interval.
+    Corner,
+    /// As spiteful as what has happened so far allows.
+    Spoiler,
+}
+
+impl Kind {
+    pub(crate) const ALL: [Self; 3] = [Self::Uniform, Self::Corner, Self::Spoiler];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Corner => "corners",
+            Self::Spoiler => "spoiler",
+        }
+    }
+}
+
+/// All worlds inside a box of a plan.
+pub(crate) struct Worlds<'a> {
+    task: Arc<Task>,
+    model: WorldModel,
+    prepared: &'a Prepared,
+    envelope: &'a DecoupledEnvelope,
+    /// For each action's name, its instances in the order in which they start as planned, with
+    /// what is left open of their durations.
+    instances: BTreeMap<String, Vec<(InstanceId, Option<ParameterId>)>>,
+    network: Option<PlanNetwork>,
+}
+
+impl<'a> Worlds<'a> {
+    pub(crate) fn new(
+        task: &Arc<Task>,
+        prepared: &'a Prepared,
+        envelope: &'a DecoupledEnvelope,
+    ) -> Self {
+        let plan = &prepared.plan.plan;
+        let mut open: BTreeMap<InstanceId, ParameterId> = BTreeMap::new();
+        for (index, parameter) in prepared.plan.parameters.iter().enumerate() {
+            if let ParameterKind::Duration(instance) = parameter.kind {
+                open.insert(instance, ParameterId::from(index));
+            }
+        }
+        let mut order: Vec<InstanceId> = (0..plan.instances.len()).map(InstanceId::from).collect();
+        order.sort_by_key(|id| (&prepared.nominal[plan.start(*id).index()], *id));
+        let mut instances: BTreeMap<String, Vec<_>> = BTreeMap::new();
+        for id in order {
+            let name = plan.instance(id).action.name.clone();
+            let list = instances.entry(name).or_default();
+            list.push((id, open.get(&id).copied()));
+        }
+        Self {
+            task: Arc::clone(task),
+            model: WorldModel::as_planned(),
+            network: prepared.plan.uncertain_network(envelope).ok(),
+            prepared,
+            envelope,
+            instances,
+        }
+    }
+
+    fn sim(&self) -> SimWorld<'_> {
+        SimWorld::new(Arc::clone(&self.task), &self.model, 0)
+    }
+
+    /// The world in which durations are drawn so, with that seed.
+    pub(crate) fn drawn(&self, kind: Kind, seed: u64) -> Paced<'_, Durations> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut durations = BTreeMap::new();
+        for (name, instances) in &self.instances {
+            let values = instances.iter().map(|(id, parameter)| match parameter {
+                Some(parameter) => drawn(
+                    self.envelope.interval(*parameter),
+                    &self.prepared.plan.parameter(*parameter).nominal,
+                    kind,
+                    &mut rng,
+                ),
+                None => self.nominal(*id),
+            });
+            durations.insert(name.clone(), values.collect());
+        }
+        Paced::new(self.sim(), Durations::new(durations))
+    }
+
+    fn nominal(&self, id: InstanceId) -> Rational {
+        let plan = &self.prepared.plan.plan;
+        let time = |node: elbowroom::plan::NodeId| &self.prepared.nominal[node.index()];
+        time(plan.end(id)) - time(plan.start(id))
+    }
+
+    /// The world that plays the durations as spitefully as the box allows.
+    pub(crate) fn spoiled(&self) -> Option<Paced<'_, Spoiling>> {
+        let network = self.network.as_ref()?;
+        let plan = &self.prepared.plan.plan;
+        let spoiling = Spoiling::new(plan, network, &self.prepared.nominal);
+        Some(Paced::new(self.sim(), spoiling))
+    }
+}
+
+/// A value in an interval. Where that is infinite, up to three times the nominal value, and
+/// sometimes fifty times.
+fn drawn(interval: &Interval, nominal: &Rational, kind: Kind, rng: &mut ChaCha8Rng) -> Rational {
+    let thousandth = Rational::new(1, 1000);
+    let lower = match &interval.lower {
+        End::Closed(value) => value.clone(),
+        End::Open(value) => value + &thousandth,
+        End::Infinite => Rational::ZERO,
+    };
+    let upper = match &interval.upper {
+        End::Closed(value) => value.clone(),
+        End::Open(value) => value - &thousandth,
+        End::Infinite => {
+            let times = if rng.random_bool(0.1) { 50 } else { 3 };
+            let least = nominal.max(&Rational::ONE).max(&lower).clone();
+            least * Rational::from(times)
+        }
+    };
+    if kind == Kind::Corner {
+        return if rng.random_bool(0.5) { lower } else { upper };
+    }
+    let share = Rational::new(rng.random_range(0..=1000_i64), 1000);
+    let value = &lower + (&upper - &lower) * share;
+    // Few decimals, where there is room for that.
+    let rounded = (value * Rational::from(1000)).floor() * thousandth;
+    rounded.max(lower)
+}

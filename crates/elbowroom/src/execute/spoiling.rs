@@ -1,0 +1,155 @@
+//! A world that plays the durations of a plan's actions as spitefully as a box allows.
+
+use std::collections::BTreeMap;
+
+use elbowroom_execution::Ticket;
+use elbowroom_num::Rational;
+use elbowroom_plan::uncertain::PlanNetwork;
+use elbowroom_plan::{InstanceId, Node, NodeId, Schedule, StnPlan, network_node};
+use elbowroom_sim::{Begun, Pace};
+use elbowroom_stn::uncertain::{Spoiler, UncertainNetwork};
+
+/// A [`Spoiler`] behind the port of [`sim`](crate::sim): sees what is started, and says when it
+/// ends.
+///
+/// Durations that the box does not leave open, and actions that are not in the plan, last as long
+/// as planned. What the box lets go on without end comes to an end all the same, but late: patience
+/// with silent actions ([`Patience`](elbowroom_execution::run::Patience)) can end before.
+#[derive(Clone, Debug)]
+pub struct Spoiling {
+    spoiler: Spoiler,
+    plan: StnPlan,
+    /// For each action's name, its instances, in the order in which they start if nothing
+    /// deviates.
+    instances: BTreeMap<String, Vec<InstanceId>>,
+    /// When each node happened.
+    happened: Vec<Option<Rational>>,
+    /// Timed initials, with their times.
+    timed: Vec<(NodeId, Rational)>,
+    /// What is under way.
+    running: BTreeMap<Ticket, InstanceId>,
+    /// When that ends on which the spoiler does not decide.
+    ends: BTreeMap<Ticket, Rational>,
+}
+
+impl Spoiling {
+    /// Spoils a plan whose network, with what the world decides in it, is that one
+    /// ([`ParametrizedPlan::uncertain_network`](elbowroom_plan::ParametrizedPlan::uncertain_network)).
+    /// `nominal` says when everything happens if nothing deviates.
+    pub fn new(plan: &StnPlan, network: &PlanNetwork, nominal: &Schedule) -> Self {
+        let time = |node: NodeId| &nominal[node.index()];
+        let mut order: Vec<InstanceId> = (0..plan.instances.len()).map(InstanceId::from).collect();
+        order.sort_by_key(|id| (time(plan.start(*id)), *id));
+        let mut instances: BTreeMap<String, Vec<InstanceId>> = BTreeMap::new();
+        for id in order {
+            let name = plan.instance(id).action.name.clone();
+            instances.entry(name).or_default().push(id);
+        }
+        let timed = plan
+            .nodes()
+            .filter(|(_, what)| matches!(what, Node::Timed(_)));
+        let mut happened = vec![None; plan.nodes.len()];
+        happened[NodeId::ZERO.index()] = Some(Rational::ZERO);
+        Self {
+            spoiler: Spoiler::new(in_the_end(&network.network), network_node(NodeId::ZERO)),
+            timed: timed.map(|(node, _)| (node, time(node).clone())).collect(),
+            plan: plan.clone(),
+            instances,
+            happened,
+            running: BTreeMap::new(),
+            ends: BTreeMap::new(),
+        }
+    }
+
+    fn instance(&self, begun: &Begun<'_>) -> Option<InstanceId> {
+        let place = usize::try_from(begun.occurrence).ok()?;
+        self.instances.get(&begun.action.name)?.get(place).copied()
+    }
+
+    fn end_of(&self, instance: InstanceId) -> NodeId {
+        self.plan.end(instance)
+    }
+}
+
+/// The same network, in which everything ends at some time: what the world may draw out without
+/// end lasts at most longer than all other bounds together. No conflict needs more.
+fn in_the_end(network: &UncertainNetwork) -> UncertainNetwork {
+    let mut longest = Rational::ONE;
+    for constraint in network.requirements().constraints() {
+        longest = &longest + &constraint.bound.abs();
+    }
+    for link in network.links() {
+        longest = &longest + &link.lower;
+        longest = link.upper.iter().fold(longest, |sum, upper| &sum + upper);
+    }
+    let mut links = network.links().to_vec();
+    for link in &mut links {
+        link.upper.get_or_insert_with(|| longest.clone());
+    }
+    UncertainNetwork::new(network.requirements().clone(), links)
+        .expect("the links are those of a network, and none has become empty")
+}
+
+impl Pace for Spoiling {
+    fn begun(&mut self, now: &Rational, begun: &Begun<'_>) {
+        let instance = self.instance(begun);
+        if let Some(instance) = instance {
+            let start = self.plan.start(instance);
+            self.happened[start.index()] = Some(now.clone());
+            self.running.insert(begun.ticket, instance);
+        }
+        let is_spoiled = instance.is_some_and(|instance| {
+            let end = network_node(self.end_of(instance));
+            self.spoiler.network().is_contingent(end)
+        });
+        if let Some(planned) = begun.planned.filter(|_| begun.is_open && !is_spoiled) {
+            self.ends.insert(begun.ticket, now + planned);
+        }
+    }
+
+    fn over(&mut self, now: &Rational, ticket: Ticket) {
+        self.ends.remove(&ticket);
+        if let Some(instance) = self.running.remove(&ticket) {
+            let end = self.end_of(instance);
+            self.happened[end.index()] = Some(now.clone());
+        }
+    }
+
+    fn ends_now(&mut self, now: &Rational) -> Vec<Ticket> {
+        self.timed.retain(|(node, time)| {
+            let is_past = time <= now;
+            if is_past {
+                self.happened[node.index()] = Some(time.clone());
+            }
+            !is_past
+        });
+        let due = self.ends.iter().filter(|(_, end)| *end <= now);
+        let mut ending: Vec<Ticket> = due.map(|(ticket, _)| *ticket).collect();
+        for ticket in &ending {
+            self.ends.remove(ticket);
+        }
+        if self.running.is_empty() {
+            return ending;
+        }
+        let links = self.spoiler.ends_now(now, &self.happened);
+        for (ticket, instance) in &self.running {
+            let end = network_node(self.end_of(*instance));
+            let link = self.spoiler.network().ending_at(end);
+            if link.is_some_and(|link| links.contains(&link)) {
+                ending.push(*ticket);
+            }
+        }
+        ending
+    }
+
+    fn next_look(&self, now: &Rational) -> Option<Rational> {
+        let timed = self.timed.iter().map(|(_, time)| time.clone());
+        let ends = self.ends.values().cloned();
+        let look = self.spoiler.next_look(now, &self.happened);
+        timed
+            .chain(ends)
+            .chain(look)
+            .filter(|time| time > now)
+            .min()
+    }
+}

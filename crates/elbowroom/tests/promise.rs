@@ -1,0 +1,237 @@
+//! What an envelope promises is kept: in the world where nothing deviates, and in worlds in which
+//! every duration is somewhere in its interval, drawn or chosen by a spoiler.
+//!
+//! Plans of our own and the cases; where the benchmarks are beside the repository, a slice of
+//! those. `cargo run --release --example promise` is the whole of it.
+
+#![allow(clippy::print_stdout, reason = "counts are worth seeing")]
+#![allow(dead_code, reason = "the program uses the rest")]
+
+#[path = "../examples/promise/own.rs"]
+mod own;
+#[path = "../examples/promise/planning.rs"]
+mod planning;
+mod shared;
+#[path = "../examples/promise/sources.rs"]
+mod sources;
+#[path = "../examples/promise/subject.rs"]
+mod subject;
+#[path = "../examples/promise/tally.rs"]
+mod tally;
+#[path = "../examples/promise/trial.rs"]
+mod trial;
+#[path = "../examples/promise/worlds.rs"]
+mod worlds;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use elbowroom::plan::{BoxEnd, Side};
+use sources::Origin;
+use subject::{Planning, Subject};
+use tally::Tally;
+use trial::{Ready, Search};
+use worlds::Worlds;
+
+const KEEP: [&str; 3] = ["guarded", "live", "stn"];
+
+/// Boxes as they are after so many checks: the test has to be quick.
+const SEARCH: Search<'static> = Search {
+    most_checks: 60,
+    goes_on: &|| true,
+};
+
+/// The plans of our own, and those of the cases.
+fn own_subjects() -> Vec<Subject> {
+    let mut subjects: Vec<Subject> = own::OWN
+        .iter()
+        .map(|[name, domain, problem, plan]| {
+            let subject = Subject::of_texts(["own", name], [domain, problem, plan]);
+            subject.unwrap_or_else(|why| panic!("{name}: {why}"))
+        })
+        .collect();
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
+    let mut folders: Vec<_> = std::fs::read_dir(&cases)
+        .expect("the cases")
+        .map(|entry| entry.expect("a readable folder").path())
+        .filter(|folder| folder.join("plan.plan").is_file())
+        .collect();
+    folders.sort();
+    for folder in folders {
+        let file = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
+        let name = folder.display().to_string();
+        let texts = [
+            &file("domain.pddl")[..],
+            &file("problem.pddl"),
+            &file("plan.plan"),
+        ];
+        let subject = Subject::of_texts(["cases", &name], texts);
+        subjects.push(subject.unwrap_or_else(|why| panic!("{name}: {why}")));
+    }
+    subjects
+}
+
+/// A few plans of each family of the benchmarks: those that somebody else made.
+fn slice() -> Vec<Subject> {
+    let Some(data) = shared::data() else {
+        return Vec::new();
+    };
+    let how = Planning {
+        cache: None,
+        states: 0,
+        time: None,
+    };
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    let mut sources = sources::sources(&data);
+    sources.retain(|source| source.origin != Origin::Planned);
+    let mut subjects = Vec::new();
+    for source in &sources {
+        let count = counts.entry(source.family.clone()).or_default();
+        if *count >= 2 {
+            continue;
+        }
+        if let Ok(subject) = Subject::of_source(source, &how)
+            && subject.plan.steps.len() <= 30
+        {
+            *count += 1;
+            subjects.push(subject);
+        }
+    }
+    subjects
+}
+
+/// What goes wrong with a plan where nothing deviates.
+fn failures_as_planned(subject: &Subject) -> Vec<String> {
+    let label = format!("{} {}", subject.family, subject.name);
+    let ready = match Ready::new(subject, SEARCH) {
+        Ok(ready) => ready,
+        Err(why) => return vec![format!("{label}: {why}")],
+    };
+    let failed = KEEP.iter().filter_map(|executor| {
+        let outcome = ready.run_as_planned(executor);
+        let failure = outcome.failure?;
+        Some(format!("{label}: {executor}: {failure}: {}", outcome.why))
+    });
+    failed.collect()
+}
+
+fn assert_kept_as_planned(subjects: &[Subject]) {
+    let mut failures = Vec::new();
+    for subject in subjects {
+        failures.extend(failures_as_planned(subject));
+        if let Some(turned) = subject.turned_round() {
+            let turned = turned.expect("the same plan");
+            failures.extend(failures_as_planned(&turned));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Runs each plan so many times in worlds inside its box.
+fn assert_kept_inside(subjects: &[Subject], runs: u64) {
+    let mut failures = Vec::new();
+    let mut total = 0;
+    for subject in subjects {
+        let Ok(ready) = Ready::new(subject, SEARCH) else {
+            continue;
+        };
+        let worlds = Worlds::new(&subject.task, &ready.open, ready.envelope());
+        let mut tally = Tally::default();
+        for number in 0..runs {
+            tally::run(&ready, &worlds, number, &mut tally);
+        }
+        total += tally.runs();
+        if let Some(failure) = tally.failure {
+            failures.push(format!("{} {}: {failure}", subject.family, subject.name));
+        }
+    }
+    println!("{total} runs of {} plans", subjects.len());
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn our_own_plans_work_where_nothing_deviates_whatever_the_order_of_lines() {
+    assert_kept_as_planned(&own_subjects());
+}
+
+#[test]
+fn our_own_plans_work_wherever_durations_are_in_their_intervals() {
+    assert_kept_inside(&own_subjects(), 200);
+}
+
+#[test]
+fn a_slice_of_the_benchmarks_works_where_nothing_deviates() {
+    assert_kept_as_planned(&slice());
+}
+
+#[test]
+fn a_slice_of_the_benchmarks_works_wherever_durations_are_in_their_intervals() {
+    assert_kept_inside(&slice(), 40);
+}
+
+/// The plan of a name in [`own::OWN`].
+fn own_plan(name: &str) -> Subject {
+    let found = own::OWN.iter().find(|own| own[0] == name);
+    let [name, domain, problem, plan] = found.expect("a plan of that name");
+    Subject::of_texts(["own", name], [domain, problem, plan]).expect("a correct test")
+}
+
+#[test]
+fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
+    use elbowroom::envelope::Guarantee;
+    use elbowroom::num::Rational;
+    use elbowroom::plan::{DecoupledEnvelope, ParameterId};
+
+    let subject = own_plan("an end that needs another end, which must not have come at the start");
+    let ready = Ready::new(&subject, SEARCH).expect("a box");
+    // Brooding may take 8 to 12, filming 5 at least: 12 - 8 is less than 5, and can be kept.
+    // From 6 to 12 on it cannot.
+    let plan = &ready.open.plan;
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let brood = BoxEnd {
+        parameter: ParameterId::from(0),
+        side: Side::Lower,
+    };
+    let wide = |lower: i64, upper: i64| {
+        let envelope = brood.with_reach(&point, Some(Rational::from(-lower)));
+        let later = BoxEnd {
+            side: Side::Upper,
+            ..brood
+        };
+        later.with_reach(&envelope, Some(Rational::from(upper)))
+    };
+    let kept = wide(8, 12);
+    let broken = wide(6, 12);
+    let plan = std::sync::Arc::new(plan.clone());
+    let mut oracle = elbowroom::envelope::Oracle::new(
+        &subject.task,
+        &plan,
+        &subject::epsilon(),
+        Guarantee::Dynamic,
+    )
+    .expect("within reach");
+    assert_eq!(oracle.objection(&kept), Ok(None));
+    assert!(matches!(
+        oracle.objection(&broken),
+        Ok(Some(elbowroom::envelope::Objection::Uncontrollable(_)))
+    ));
+    for (envelope, is_won) in [(kept, true), (broken, false)] {
+        let worlds = Worlds::new(&subject.task, &ready.open, &envelope);
+        let mut prepared = ready.open.clone();
+        prepared.envelope = Some(envelope.clone());
+        let nominal = ready.with_open(prepared);
+        for executor in ["guarded", "live", "stn", "fixed:60", "esterel"] {
+            // In the box that can be kept, only those that promise anything do.
+            if is_won && !["guarded", "live"].contains(&executor) {
+                continue;
+            }
+            let mut world = worlds.spoiled().expect("a network");
+            let outcome = nominal.run(executor, &mut world);
+            assert_eq!(
+                outcome.failure.is_none(),
+                is_won,
+                "{executor} in {envelope:?}: {outcome:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Worlds in which somebody else decides how long actions take, as they go.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_execution::{Command, Event, Observation, Passage, Ticket, World, WorldError};
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, FactId, FluentId};
+use elbowroom_num::Rational;
+
+use crate::sim::SimWorld;
+
+/// Decides when actions end that are under way.
+pub trait Pace {
+    /// An action has started.
+    fn begun(&mut self, now: &Rational, begun: &Begun<'_>);
+
+    /// An action has ended, whether it was told to or has failed or been cancelled.
+    fn over(&mut self, now: &Rational, ticket: Ticket);
+
+    /// Which actions end now. It is asked each time that something has happened, and at each
+    /// [look](Self::next_look).
+    fn ends_now(&mut self, now: &Rational) -> Vec<Ticket>;
+
+    /// When to ask again if nothing happens before; later than `now`.
+    fn next_look(&self, now: &Rational) -> Option<Rational>;
+}
+
+/// An action that has started.
+#[derive(Clone, Copy, Debug)]
+pub struct Begun<'a> {
+    /// Which start it is.
+    pub ticket: Ticket,
+    /// What is done.
+    pub action: &'a Action,
+    /// How many of that name had been told to start before.
+    pub occurrence: u64,
+    /// How long it is planned to take; `None` if it takes no time.
+    pub planned: Option<&'a Rational>,
+    /// Whether it ends when the [`Pace`] says; if not, it takes no time or is going to fail.
+    pub is_open: bool,
+}
+
+/// A simulated world whose actions take as long as a [`Pace`] says.
+///
+/// All else is the world's: conditions, failures, delays, reports.
+#[derive(Debug)]
+pub struct Paced<'a, P> {
+    world: SimWorld<'a>,
+    pace: P,
+    now: Rational,
+    /// What was told to start and has not, with its number among those of its name.
+    ordered: BTreeMap<Ticket, Ordered>,
+    occurrences: BTreeMap<String, u64>,
+}
+
+#[derive(Debug)]
+struct Ordered {
+    action: Arc<Action>,
+    occurrence: u64,
+    planned: Option<Rational>,
+}
+
+impl<'a, P: Pace> Paced<'a, P> {
+    /// That world at that pace.
+    pub fn new(world: SimWorld<'a>, pace: P) -> Self {
+        Self {
+            world,
+            pace,
+            now: Rational::ZERO,
+            ordered: BTreeMap::new(),
+            occurrences: BTreeMap::new(),
+        }
+    }
+
+    /// The world.
+    pub fn world(&self) -> &SimWorld<'a> {
+        &self.world
+    }
+
+    /// Its pace.
+    pub fn pace(&self) -> &P {
+        &self.pace
+    }
+
+    /// An action that was told to start has started.
+    fn begin(&mut self, ticket: Ticket, time: &Rational, is_open: bool) {
+        if let Some(ordered) = self.ordered.remove(&ticket) {
+            let begun = Begun {
+                ticket,
+                action: &ordered.action,
+                occurrence: ordered.occurrence,
+                planned: ordered.planned.as_ref(),
+                is_open,
+            };
+            self.pace.begun(time, &begun);
+        }
+    }
+
+    fn take_note(&mut self, observations: &[Observation]) {
+        for observation in observations {
+            match &observation.event {
+                Event::Started { ticket, .. } => {
+                    let is_open = self.world.hold(*ticket);
+                    self.begin(*ticket, &observation.time, is_open);
+                }
+                Event::Ended { ticket, .. } => self.pace.over(&observation.time, *ticket),
+                _ => {}
+            }
+        }
+    }
+}
+
+impl<P: Pace> World for Paced<'_, P> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.now.clone_from(now);
+        let Command::Start {
+            ticket,
+            action,
+            duration,
+        } = command
+        else {
+            return self.world.command(now, command);
+        };
+        let count = self.occurrences.entry(action.name.clone()).or_default();
+        let ordered = Ordered {
+            action: Arc::clone(action),
+            occurrence: *count,
+            planned: duration.clone(),
+        };
+        *count += 1;
+        self.ordered.insert(*ticket, ordered);
+        self.world.command(now, command)?;
+        // Before time passes: it might have been planned to take none.
+        if self.world.hold(*ticket) {
+            self.begin(*ticket, now, true);
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        loop {
+            for ticket in self.pace.ends_now(&self.now) {
+                self.world.let_go(ticket);
+            }
+            let look = self.pace.next_look(&self.now);
+            let stop = look.into_iter().chain([until.clone()]).min();
+            let passage = self.world.wait(&stop.unwrap_or_default())?;
+            self.now.clone_from(&passage.now);
+            self.take_note(&passage.observations);
+            if !passage.observations.is_empty() || passage.now >= *until {
+                return Ok(passage);
+            }
+        }
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.world.look(facts, fluents)
+    }
+
+    fn know(&mut self, task: &Arc<Task>) {
+        self.world.know(task);
+    }
+
+    fn grown(&mut self) -> Option<Arc<Task>> {
+        self.world.grown()
+    }
+}
+
+/// Actions take as long as was decided beforehand, each time that they are started.
+#[derive(Clone, Debug, Default)]
+pub struct Durations {
+    /// For each action's name, how long it takes the first time, the second time, …
+    durations: BTreeMap<String, Vec<Rational>>,
+    /// When each action under way ends.
+    ends: BTreeMap<Ticket, Rational>,
+}
+
+impl Durations {
+    /// For each action's name, how long it takes the first time, the second time, …; after
+    /// that, as long as planned.
+    pub fn new(durations: BTreeMap<String, Vec<Rational>>) -> Self {
+        let ends = BTreeMap::new();
+        Self { durations, ends }
+    }
+}
+
+impl Pace for Durations {
+    fn begun(&mut self, now: &Rational, begun: &Begun<'_>) {
+        if !begun.is_open {
+            return;
+        }
+        let known = self.durations.get(&begun.action.name);
+        let place = usize::try_from(begun.occurrence).unwrap_or(usize::MAX);
+        let duration = known.and_then(|known| known.get(place));
+        if let Some(duration) = duration.or(begun.planned) {
+            self.ends.insert(begun.ticket, now + duration);
+        }
+    }
+
+    fn over(&mut self, _now: &Rational, ticket: Ticket) {
+        self.ends.remove(&ticket);
+    }
+
+    fn ends_now(&mut self, now: &Rational) -> Vec<Ticket> {
+        let due = self.ends.iter().filter(|(_, end)| *end <= now);
+        let due: Vec<Ticket> = due.map(|(ticket, _)| *ticket).collect();
+        for ticket in &due {
+            self.ends.remove(ticket);
+        }
+        due
+    }
+
+    fn next_look(&self, _now: &Rational) -> Option<Rational> {
+        self.ends.values().min().cloned()
+    }
+}
