@@ -29,6 +29,7 @@ mod reasons;
 mod relaxed;
 mod run;
 mod search;
+mod spans;
 mod state;
 mod symbolic;
 mod symmetry;

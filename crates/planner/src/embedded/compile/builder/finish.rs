@@ -13,10 +13,17 @@ use super::super::interference::{Access, Stamps, TimedWishes, Wishes};
 use super::super::metric::only_grows;
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
-use super::super::{Compiled, NONE, Rule, Timed, eager, gaps};
+use super::super::{Compiled, NONE, Rule, Snap, Timed, eager, gaps};
 use super::{Builder, narrow};
+use crate::embedded::formula::Literal;
 use crate::embedded::state::State;
-use crate::embedded::time::Scale;
+use crate::embedded::time::{Scale, Ticks};
+
+/// The longest distance that some snap keeps from some stamp.
+fn longest_distance(snaps: &[Snap]) -> Ticks {
+    let distances = snaps.iter().flat_map(|snap| &snap.after);
+    distances.map(|&(_, distance)| distance).max().unwrap_or(0)
+}
 
 impl Builder<'_> {
     #[allow(
@@ -126,7 +133,7 @@ impl Builder<'_> {
                     &self.snaps[action.start as usize],
                     &self.snaps[action.end as usize],
                 );
-                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
                 // What changes continuously is there to be read meanwhile.
                 if action.flows.is_empty() {
                     self.actions[number].eagerness = eagerness(start, end, &offers);
@@ -158,6 +165,7 @@ impl Builder<'_> {
         let mut compiled = Compiled {
             scale,
             epsilon,
+            longest_distance: longest_distance(&self.snaps),
             now: now.0,
             fact_stamps: self
                 .symbols

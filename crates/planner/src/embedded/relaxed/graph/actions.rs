@@ -3,7 +3,7 @@
 use super::super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
 use super::super::super::time::{NEVER, Ticks};
 use super::super::numbers;
-use super::{Graph, Kind};
+use super::{Gain, Graph, Kind};
 
 /// An operator before it enters the graph.
 pub(super) struct Draft<'a> {
@@ -128,13 +128,13 @@ impl Graph {
         operator
     }
 
-    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, f64)> {
-        let mut gains: Vec<(u32, f64)> = Vec::new();
+    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, Gain)> {
+        let mut gains: Vec<(u32, Gain)> = Vec::new();
         for update in updates {
             for &test in &self.tests_of_fluent[update.fluent as usize] {
                 if gains.iter().all(|(known, _)| *known != test) {
                     let gain = numbers::gain(compiled, test, updates);
-                    if gain.abs() > 0.0 {
+                    if gain != Gain::Adds(0.0) {
                         gains.push((test, gain));
                     }
                 }
@@ -144,10 +144,10 @@ impl Graph {
     }
 
     /// Whatever is tested of the fluent may come about.
-    pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, f64)>) {
+    pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, Gain)>) {
         for &test in &self.tests_of_fluent[fluent as usize] {
             gains.retain(|(known, _)| *known != test);
-            gains.push((test, f64::INFINITY));
+            gains.push((test, Gain::Reaches(0)));
         }
     }
 }
