@@ -214,6 +214,9 @@ impl<'a> Relaxed<'a> {
     /// that was looked at.
     fn prepare(&mut self, state: &State) -> bool {
         let mut is_in_time = true;
+        let spans = self
+            .is_chronological
+            .then(|| Spans::of(self.compiled, state));
         self.cost.fill(UNREACHED);
         self.missing.clone_from(&self.graph.precondition_counts);
         for (cost, operator) in self.operator_cost.iter_mut().zip(&self.graph.operators) {
@@ -229,9 +232,6 @@ impl<'a> Relaxed<'a> {
             |open: &Open| open.most < NEVER && (open.node == SETTLED || self.is_chronological);
         if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
         {
-            let spans = self
-                .is_chronological
-                .then(|| Spans::of(self.compiled, state));
             is_in_time = self.deadlines.exclude_late(
                 self.compiled,
                 &self.graph,
@@ -270,6 +270,11 @@ impl<'a> Relaxed<'a> {
                 reach(self.graph.test(test), cost, buckets);
             } else {
                 *gap = numbers::gap(self.compiled, test, state);
+            }
+        }
+        for stay in &graph.stays {
+            if stay.holds(state, spans.as_ref()) {
+                reach(stay.proposition, cost, buckets);
             }
         }
         for open in &state.open {

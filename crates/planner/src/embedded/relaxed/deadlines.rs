@@ -109,6 +109,11 @@ impl Deadlines {
                 self.lower(graph, graph.test(number) as usize, now);
             }
         }
+        for stay in &graph.stays {
+            if stay.holds(state, spans) {
+                self.lower(graph, stay.proposition as usize, now);
+            }
+        }
         for (place, open) in state.open.iter().enumerate() {
             let running = graph.running(open.action) as usize;
             if let Some(spans) = spans {

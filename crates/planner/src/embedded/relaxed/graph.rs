@@ -1,6 +1,7 @@
 //! The relaxed problem: propositions and operators without deletions.
 
 mod actions;
+mod envelopes;
 mod exclusions;
 mod timetables;
 
@@ -11,6 +12,7 @@ use super::super::formula::Formula;
 use super::super::guide::Guide;
 use super::super::time::Ticks;
 pub(crate) use super::numbers::Gain;
+use envelopes::{Stay, Stays};
 pub(crate) use timetables::Window;
 
 /// What an operator stands for.
@@ -62,6 +64,8 @@ pub(crate) struct Graph {
     /// Operators without preconditions.
     pub(crate) sources: Vec<u32>,
     pub(crate) goal: Vec<u32>,
+    /// See [`Stay`].
+    pub(crate) stays: Vec<Stay>,
     /// For each action the operators that can come neither while it is under way, nor after it.
     pub(crate) kept_out: Vec<Vec<u32>>,
     /// For each action its end's operator.
@@ -100,13 +104,16 @@ impl Graph {
             ..Self::default()
         };
         graph.add_timetables(compiled);
-        for (number, action) in compiled.actions.iter().enumerate() {
-            graph.add_action(compiled, narrow(number), action, haste);
+        let stays = Stays::of(compiled, narrow(graph.proposition_count));
+        graph.proposition_count += stays.list.len();
+        for number in 0..compiled.actions.len() {
+            graph.add_action(compiled, &stays, narrow(number), haste);
         }
         graph.add_rules(compiled);
         graph.add_timed(compiled);
         graph.goal = graph.propositions(&compiled.goal);
         graph.follow_up_assignments(compiled.tests.len());
+        graph.stays = stays.list;
         graph.index();
         graph.kept_out = graph.find_kept_out(compiled);
         graph
