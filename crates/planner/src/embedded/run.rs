@@ -30,7 +30,7 @@ const REPORT_SYMBOLIC_TURNS: u64 = 8;
 const REPORT_TURNS: u64 = 256;
 
 /// How many states the hasty search may look at before the complete one gets its first turns.
-const HASTE: u64 = 20_000;
+const HASTE: u64 = 8_192;
 
 /// The same where hasty searches that count resources, and others that do not, take turns.
 const HASTE_WITH_RESOURCES: u64 = 2_048;
@@ -159,6 +159,9 @@ impl Planner<'_> {
                 styles.push(Style::hasty(haste).filling_up());
             }
             styles.push(Style::hasty(haste));
+        }
+        if !self.compiled.is_symbolic {
+            styles.push(Style::hasty(Eagerness::Lends).seeking_novelty());
         }
         if self.needs_concurrency() {
             styles.push(Style::CHRONOLOGICAL);

@@ -11,6 +11,7 @@ mod doubt;
 mod goals;
 mod known;
 mod limit;
+mod novelty;
 mod queue;
 mod style;
 mod successors;
@@ -28,11 +29,15 @@ use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 use doubt::Doubt;
 pub(crate) use limit::Limit;
+use novelty::Novelty;
 use queue::Queue;
 pub(crate) use style::{Aim, Style};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
+
+/// What a chronological search keeps of a state at most: it remembers a distance for each pair.
+const MOST_UNSETTLED: u64 = 96;
 
 /// Each turn of that number goes to the successor that has waited longest, in a complete search. So
 /// it does not lose itself where an estimate is good, and endlessly many states are no goal.
@@ -65,6 +70,8 @@ pub(crate) struct Search<'a> {
     best_steps: u32,
     /// The estimate of the first state.
     first_estimate: u32,
+    /// What was seen before, if new states come first.
+    novelty: Option<Novelty>,
     /// What is used up and not filled up, if it is to be spared.
     stocks: Vec<Stock>,
     /// Whether times are irrelevant but for their distances.
@@ -161,6 +168,7 @@ impl<'a> Search<'a> {
             turns: [0, 0],
             best_steps: u32::MAX,
             first_estimate: 0,
+            novelty: style.seeks_novelty.then(|| Novelty::new(compiled)),
             stocks: if style.is_sparing {
                 stocks(compiled)
             } else {
@@ -279,7 +287,10 @@ impl<'a> Search<'a> {
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let unsettled = state.network.node_count() as u64;
-        self.price += unsettled * unsettled / (4 * (1 + self.size()));
+        self.price += unsettled * unsettled / (8 * (1 + self.size()));
+        if self.style.is_chronological && unsettled > MOST_UNSETTLED {
+            return Turn::Nothing;
+        }
         let latest_end = self.latest_end(&state);
         let is_in_time = latest_end.is_some_and(|latest| state.earliest_end() <= latest);
         if !is_in_time || !self.looks_no_later_than(latest_end) {

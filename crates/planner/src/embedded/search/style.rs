@@ -13,6 +13,8 @@ pub(crate) struct Style {
     /// Whether what is chosen later also happens later, or at the same time. Then it is known, of
     /// what is under way, by when it must be over. Some plans are lost.
     pub(crate) is_chronological: bool,
+    /// Whether what is new comes first, and then what has more of the goal.
+    pub(crate) seeks_novelty: bool,
     /// Whether what is used up and never filled up is spared.
     pub(crate) is_sparing: bool,
     /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
@@ -42,6 +44,7 @@ impl Style {
         variants: usize::MAX,
         is_chronological: false,
         is_sparing: false,
+        seeks_novelty: false,
         fills_up: false,
         aim: Aim::Goal,
     };
@@ -53,6 +56,7 @@ impl Style {
             variants: 4,
             is_chronological: false,
             is_sparing: false,
+            seeks_novelty: false,
             fills_up: false,
             aim: Aim::Goal,
         }
@@ -64,6 +68,7 @@ impl Style {
         variants: 32,
         is_chronological: true,
         is_sparing: false,
+        seeks_novelty: false,
         fills_up: false,
         aim: Aim::Goal,
     };
@@ -78,6 +83,14 @@ impl Style {
     pub(crate) fn filling_up(self) -> Self {
         Self {
             fills_up: true,
+            ..self
+        }
+    }
+
+    /// The same, what is new coming first.
+    pub(crate) fn seeking_novelty(self) -> Self {
+        Self {
+            seeks_novelty: true,
             ..self
         }
     }

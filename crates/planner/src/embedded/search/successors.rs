@@ -4,6 +4,7 @@ use super::super::apply::Step;
 use super::super::compile::NONE;
 use super::super::relaxed::Estimate;
 use super::super::state::State;
+use super::novelty::goals_left;
 use super::{Aim, BOOST, Search};
 
 impl Search<'_> {
@@ -48,7 +49,14 @@ impl Search<'_> {
     }
 
     /// When the successors of a state have their turn; lower ranks are earlier.
-    fn rank(&self, number: u32, estimate: u32) -> i64 {
+    fn rank(&mut self, number: u32, estimate: u32) -> i64 {
+        if let Some(novelty) = &mut self.novelty {
+            let state = &self.nodes[number as usize].state;
+            let left = goals_left(self.compiled, state);
+            let (novelty, memory) = novelty.of(self.compiled, state, (left, estimate));
+            self.memory += memory;
+            return novelty << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
+        }
         let estimate = i64::from(estimate) + self.penalty(number);
         let (Aim::CheapWhole(factor), Some(guide)) = (self.style.aim, &self.guide) else {
             return estimate;

@@ -19,6 +19,9 @@ use crate::embedded::formula::Literal;
 use crate::embedded::state::State;
 use crate::embedded::time::{Scale, Ticks};
 
+/// How many happenings get their stamps between two questions whether to go on.
+const SNAPS_PER_QUESTION: usize = 1024;
+
 /// The longest distance that some snap keeps from some stamp.
 fn longest_distance(snaps: &[Snap]) -> Ticks {
     let distances = snaps.iter().flat_map(|snap| &snap.after);
@@ -35,7 +38,8 @@ impl Builder<'_> {
         grounding: &Grounding,
         situation: &Situation,
         scale: Scale,
-    ) -> Compiled {
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Option<Compiled> {
         let goal = self.symbols.formula(&grounding.goal);
         let mut rules: Vec<Rule> = Vec::new();
         for rule in &grounding.rules {
@@ -59,7 +63,10 @@ impl Builder<'_> {
             .collect();
         let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
         let waiting = TimedWishes::of(&timed_wishes);
-        for (snap, wishes) in self.snaps.iter_mut().zip(&self.wishes) {
+        for (number, (snap, wishes)) in self.snaps.iter_mut().zip(&self.wishes).enumerate() {
+            if number % SNAPS_PER_QUESTION == 0 && !goes_on() {
+                return None;
+            }
             snap.after = stamps.after(wishes);
             snap.marks = stamps.marks(wishes);
             snap.before_timed = waiting.before(&wishes.makes);
@@ -108,6 +115,9 @@ impl Builder<'_> {
                 timed
             })
             .collect();
+        if !goes_on() {
+            return None;
+        }
         let ends = eager::Ends::of(&self.actions, &self.snaps, &timed, self.symbols.facts.len());
         for number in 0..self.actions.len() {
             let action = &self.actions[number];
@@ -191,6 +201,9 @@ impl Builder<'_> {
             relaxed_gap: None,
             is_symbolic: false,
         };
+        if !goes_on() {
+            return None;
+        }
         compiled.is_symbolic = is_symbolic(&compiled, situation);
         let fact_count = compiled.facts.len();
         compiled.relaxed_gap = gaps::among_facts(&compiled.actions, &compiled.snaps, fact_count);
@@ -205,6 +218,6 @@ impl Builder<'_> {
         }
         compiled.initial = initial(&mut compiled, situation);
         compiled.initial.cost = initial_cost;
-        compiled
+        Some(compiled)
     }
 }
