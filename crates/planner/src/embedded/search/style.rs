@@ -4,6 +4,10 @@ use super::super::compile::Eagerness;
 
 /// How a search goes about it.
 #[derive(Clone, Copy, Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is one way to go about it, and any of them may be combined"
+)]
 pub(crate) struct Style {
     /// If present, actions that are at least so eager end at once, and states are compared
     /// roughly. Some plans are lost.
