@@ -30,13 +30,13 @@ const REPORT_SYMBOLIC_TURNS: u64 = 8;
 const REPORT_TURNS: u64 = 256;
 
 /// How many states the hasty search may look at before the complete one gets its first turns.
-const HASTE: u64 = 8_192;
+const HASTE: u64 = 20_000;
 
 /// The same where hasty searches that count resources, and others that do not, take turns.
 const HASTE_WITH_RESOURCES: u64 = 2_048;
 
 /// The same where hasty searches and chronological ones take turns.
-const HASTE_WITH_CONCURRENCY: u64 = 1_024;
+const HASTE_WITH_CONCURRENCY: u64 = 4_096;
 
 /// How many turns the hasty search gets for each one of the complete search.
 const COMPLETE_SHARE: u64 = 8;
@@ -160,14 +160,14 @@ impl Planner<'_> {
             }
             styles.push(Style::hasty(haste));
         }
-        if !self.compiled.is_symbolic {
-            styles.push(Style::hasty(Eagerness::Lends).seeking_novelty());
-        }
         if self.needs_concurrency() {
             styles.push(Style::CHRONOLOGICAL);
             if !relaxed::stocks(self.compiled).is_empty() {
                 styles.push(Style::CHRONOLOGICAL.sparing());
             }
+        }
+        if !self.compiled.is_symbolic {
+            styles.push(Style::hasty(Eagerness::Lends).seeking_novelty());
         }
         styles.push(Style::COMPLETE);
         styles
