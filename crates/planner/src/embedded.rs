@@ -27,8 +27,10 @@ mod network;
 mod pairs;
 mod reasons;
 mod relaxed;
+mod relevance;
 mod run;
 mod search;
+mod spans;
 mod state;
 mod symbolic;
 mod symmetry;
@@ -76,7 +78,7 @@ pub fn plan(
         is_stopped = observe(&progress).is_break();
         !is_stopped
     };
-    let grounding = match reachability::ground_while(grounded, &limits, &mut goes_on) {
+    let mut grounding = match reachability::ground_while(grounded, &limits, &mut goes_on) {
         reachability::Answer::Complete(grounding) => grounding,
         reachability::Answer::LimitReached if is_stopped => {
             return none_found(Stopped::Interrupted, progress.counts);
@@ -92,6 +94,8 @@ pub fn plan(
             counts: progress.counts,
         };
     }
+    relevance::keep_relevant(grounded, &mut grounding, situation);
+    progress.counts.actions = grounding.actions.len() as u64;
     let mut goes_on = || observe(&progress).is_continue();
     let wanted = Wanted {
         situation,

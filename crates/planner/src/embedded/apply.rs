@@ -16,7 +16,7 @@ use super::state::{Open, State};
 use super::symbolic::{self, Form, Moment};
 use super::time::{NEVER, Ticks};
 use durations::demand_duration;
-use places::{insert, reach_foreseen_end, settle};
+use places::{forget_past, insert, reach_foreseen_end, reach_timed, settle};
 
 /// A choice of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -42,6 +42,8 @@ pub(crate) struct Stepper<'a> {
     /// If present, all happenings stay in the network, to be read off at the end, and what is
     /// needed to compute their times exactly is noted here.
     pub(crate) log: Option<Log>,
+    /// Whether what is chosen later happens no earlier.
+    pub(crate) is_chronological: bool,
     /// Whether a duration had to be rounded to a tick, so that nothing is proved.
     pub(crate) has_rounded: bool,
 }
@@ -61,6 +63,7 @@ impl<'a> Stepper<'a> {
             horizon: NEVER,
             limit: None,
             log: None,
+            is_chronological: false,
             has_rounded: false,
         }
     }
@@ -99,6 +102,9 @@ impl<'a> Stepper<'a> {
             Step::End(place) => self.end(state, place as usize)?,
             Step::Timed => self.timed(state)?,
         }
+        if self.settles(state) && self.is_chronological {
+            forget_past(state, self.compiled.longest_distance);
+        }
         self.keeps_conditions(state)?;
         let is_in_time = state.earliest_end() <= self.horizon;
         let metric = self.compiled.metric.as_ref();
@@ -119,6 +125,7 @@ impl<'a> Stepper<'a> {
         if action.end == NONE {
             let place = self.place(state, snap);
             let node = insert(state, self.settles(state), snap, &place, false)?;
+            self.note_last(state, node, &place)?;
             let moment = moment(state, || (Form::node(node), None));
             self.demand(state, &snap.condition, None, &moment)?;
             self.take_effect(state, snap, u64::MAX, None, &moment)?;
@@ -133,6 +140,7 @@ impl<'a> Stepper<'a> {
             place.latest = place.latest.min(time - least);
         }
         let node = insert(state, self.settles(state), snap, &place, true)?;
+        self.note_last(state, node, &place)?;
         let mut end = SETTLED;
         if state.symbolic.is_some() {
             let after = [(node, least)];
@@ -179,6 +187,7 @@ impl<'a> Stepper<'a> {
             flows,
         };
         self.watch_all(state, &open, &moment)?;
+        self.nest(state, &open)?;
         let place = state.open.partition_point(|other| other.action <= number);
         state.open.insert(place, open);
         Some(place)
@@ -215,6 +224,7 @@ impl<'a> Stepper<'a> {
             }
             node
         };
+        self.note_last(state, node, &when)?;
         if open.node != SETTLED {
             self.note_end(&open, node);
         }
@@ -240,7 +250,7 @@ impl<'a> Stepper<'a> {
         for (fluent, rate) in &open.flows {
             symbolic::flow(state, *fluent, &-rate, &moment.time)?;
         }
-        if self.settles(state) {
+        if self.settles(state) && !self.is_chronological {
             settle(state);
         }
         Some(())
@@ -262,6 +272,9 @@ impl<'a> Stepper<'a> {
     fn timed(&mut self, state: &mut State) -> Option<()> {
         let timed = self.compiled.timed.get(state.timed as usize)?;
         state.timed += 1;
+        if self.is_chronological {
+            reach_timed(state, timed.time)?;
+        }
         for &fact in &timed.deletes {
             set(&mut state.facts, fact, false);
         }

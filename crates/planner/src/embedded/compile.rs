@@ -42,6 +42,8 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Compiled {
     pub(crate) scale: Scale,
     pub(crate) epsilon: Ticks,
+    /// The longest distance from any stamp.
+    pub(crate) longest_distance: Ticks,
     /// When the situation is; nothing new happens earlier.
     pub(crate) now: Ticks,
     /// The facts that some condition reads.

@@ -21,7 +21,13 @@ pub(crate) const SETTLED: NodeId = NodeId::MAX;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Network {
     nodes: Vec<Node>,
+    /// The constraints that are not in the matrix.
     edges: Vec<Edge>,
+    /// All distances, row by row, among the nodes that there were when it was made; see
+    /// [`project`](Network::project). Otherwise empty.
+    matrix: Vec<Ticks>,
+    /// How many rows the matrix has.
+    closed: usize,
     /// Stamps that unsettled happenings have set.
     pub(crate) marks: Vec<(u32, NodeId)>,
 }
@@ -126,6 +132,13 @@ impl Network {
             for edge in self.edges.iter().filter(|edge| edge.from == node) {
                 waiting.push((edge.to, time + edge.distance));
             }
+            if (node as usize) < self.closed {
+                for (to, &distance) in (0..).zip(self.row(node)) {
+                    if distance > -NEVER && to != node {
+                        waiting.push((to, time + distance));
+                    }
+                }
+            }
         }
         Ok(())
     }
@@ -161,6 +174,14 @@ impl Network {
         self.marks.push((stamp, node));
     }
 
+    /// Lets everything happen at its earliest time, and leave the network.
+    pub(crate) fn settle_all(&mut self, settle: &mut dyn FnMut(u32, Ticks)) {
+        for &(stamp, node) in &self.marks {
+            settle(stamp, self.nodes[node as usize].earliest);
+        }
+        *self = Self::default();
+    }
+
     /// Keeps only what the nodes `open` can still push. Hands the stamps and times of what is
     /// settled to `settle`, and returns the new names of the nodes.
     pub(crate) fn settle(
@@ -168,6 +189,7 @@ impl Network {
         open: impl Iterator<Item = NodeId>,
         settle: &mut dyn FnMut(u32, Ticks),
     ) -> Vec<NodeId> {
+        debug_assert_eq!(self.closed, 0, "a matrix is projected");
         let mut names = vec![SETTLED; self.nodes.len()];
         let mut waiting: Vec<NodeId> = open.collect();
         let mut is_kept = vec![false; self.nodes.len()];
@@ -207,8 +229,111 @@ impl Network {
         names
     }
 
+    /// The distances from a node to those in the matrix.
+    fn row(&self, node: NodeId) -> &[Ticks] {
+        let begin = node as usize * self.closed;
+        &self.matrix[begin..begin + self.closed]
+    }
+
+    /// Keeps only some nodes, with all distances that follow among them: what the network allows
+    /// these nodes stays the same. Returns the new names of the nodes; none of the others may be
+    /// marked.
+    pub(crate) fn project(&mut self, kept: &[NodeId]) -> Vec<NodeId> {
+        let all = self.all_distances();
+        let count = self.nodes.len();
+        let mut names = vec![SETTLED; count];
+        for (&node, name) in kept.iter().zip(0..) {
+            names[node as usize] = name;
+        }
+        let mut nodes = Vec::with_capacity(kept.len());
+        self.matrix.clear();
+        for &from in kept {
+            let row = &all[from as usize * count..][..count];
+            let time = self.earliest(from);
+            nodes.push(Node {
+                floor: time,
+                earliest: time,
+                latest: self.latest_given(row),
+            });
+            self.matrix.extend(kept.iter().map(|&to| row[to as usize]));
+        }
+        self.nodes = nodes;
+        self.closed = kept.len();
+        self.edges.clear();
+        for (_, node) in &mut self.marks {
+            *node = names[*node as usize];
+        }
+        names
+    }
+
+    /// The distances between all nodes, row by row: those of the matrix, and what new nodes and
+    /// their edges add to them.
+    fn all_distances(&self) -> Vec<Ticks> {
+        let count = self.nodes.len();
+        let mut all = vec![-NEVER; count * count];
+        for from in 0..self.closed {
+            all[from * count..][..self.closed]
+                .copy_from_slice(&self.matrix[from * self.closed..][..self.closed]);
+        }
+        for node in 0..count {
+            all[node * count + node] = 0;
+        }
+        let raise = |place: &mut Ticks, first: Ticks, second: Ticks| {
+            if first > -NEVER && second > -NEVER {
+                *place = (*place).max(first + second);
+            }
+        };
+        for new in self.closed..count {
+            let edges = self.edges.iter().map(|edge| {
+                let (from, to) = (edge.from as usize, edge.to as usize);
+                (from, to, edge.distance)
+            });
+            for (from, to, distance) in edges {
+                for other in 0..new {
+                    if to == new && from < new {
+                        let reached = all[other * count + from];
+                        raise(&mut all[other * count + new], reached, distance);
+                    }
+                    if from == new && to < new {
+                        let reached = all[to * count + other];
+                        raise(&mut all[new * count + other], distance, reached);
+                    }
+                }
+            }
+            for from in 0..new {
+                let to_new = all[from * count + new];
+                if to_new == -NEVER {
+                    continue;
+                }
+                for to in 0..new {
+                    let from_new = all[new * count + to];
+                    raise(&mut all[from * count + to], to_new, from_new);
+                }
+            }
+        }
+        // Edges between nodes of the matrix.
+        let is_old = |edge: &&Edge| (edge.from.max(edge.to) as usize) < self.closed;
+        for edge in self.edges.iter().filter(is_old) {
+            for from in 0..count {
+                let reached = all[from * count + edge.from as usize];
+                if reached == -NEVER {
+                    continue;
+                }
+                for to in 0..count {
+                    let rest = all[edge.to as usize * count + to];
+                    raise(&mut all[from * count + to], reached + edge.distance, rest);
+                }
+            }
+        }
+        all
+    }
+
     /// For each node, the least time it must come after `origin`; `-NEVER` if it need not.
     pub(crate) fn distances_from(&self, origin: NodeId) -> Vec<Ticks> {
+        if self.is_closed() && self.closed > 0 {
+            return self.row(origin).to_vec();
+        }
+        debug_assert_eq!(self.closed, 0, "a matrix is asked when it is complete");
         let mut distances = vec![-NEVER; self.nodes.len()];
         distances[origin as usize] = 0;
         // Edges stand in the order of happenings, so that few rounds are needed.
@@ -225,6 +350,17 @@ impl Network {
             }
         }
         distances
+    }
+
+    /// The least time by which one node must come after another, where all distances are known;
+    /// `-NEVER` if it need not.
+    pub(crate) fn distance(&self, from: NodeId, to: NodeId) -> Ticks {
+        self.matrix[from as usize * self.closed + to as usize]
+    }
+
+    /// Whether all distances are known.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.edges.is_empty() && self.closed == self.nodes.len()
     }
 
     /// How late a node can be so that nothing it pushes is too late.
@@ -254,6 +390,7 @@ impl Network {
     pub(crate) fn size(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()
             + self.edges.capacity() * size_of::<Edge>()
+            + self.matrix.capacity() * size_of::<Ticks>()
             + self.marks.capacity() * size_of::<(u32, NodeId)>()
     }
 }

@@ -13,13 +13,15 @@ mod graph;
 mod numbers;
 mod plan;
 mod resources;
+mod stocks;
 
 use super::apply::Step;
 use super::compile::{Compiled, Eagerness};
 use super::formula::Literal;
 use super::guide::Guide;
 use super::network::SETTLED;
-use super::state::State;
+use super::spans::Spans;
+use super::state::{Open, State};
 use super::time::{NEVER, Ticks};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
@@ -27,6 +29,8 @@ pub(crate) use graph::Graph;
 use graph::Kind;
 use resources::Resources;
 pub(crate) use resources::floors;
+use stocks::Stocks;
+pub(crate) use stocks::{Stock, stocks};
 
 /// Beyond this, costs are all alike.
 const MOST: u32 = 1 << 15;
@@ -75,8 +79,11 @@ pub(crate) struct Relaxed<'a> {
     applicable: Vec<u32>,
     deadlines: Deadlines,
     resources: Resources,
+    stocks: Stocks,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
+    /// Whether what happens next happens no earlier than what was chosen last.
+    pub(crate) is_chronological: bool,
 }
 
 impl<'a> Relaxed<'a> {
@@ -87,6 +94,7 @@ impl<'a> Relaxed<'a> {
         Self {
             compiled,
             resources: Resources::default(),
+            stocks: Stocks::default(),
             cost: vec![UNREACHED; propositions],
             achiever: vec![NO_OPERATOR; propositions],
             repetitions: vec![1; propositions],
@@ -99,6 +107,7 @@ impl<'a> Relaxed<'a> {
             applicable: Vec::new(),
             deadlines: Deadlines::default(),
             horizon: NEVER,
+            is_chronological: false,
             graph,
         }
     }
@@ -111,6 +120,11 @@ impl<'a> Relaxed<'a> {
     /// From now on, what a relaxed plan uses up is counted, and filled up.
     pub(crate) fn count_resources(&mut self) {
         self.resources = Resources::of(self.compiled, &self.graph);
+    }
+
+    /// From now on, a relaxed plan draws on what is never filled up.
+    pub(crate) fn draw_on_stocks(&mut self) {
+        self.stocks = Stocks::of(self.compiled, &self.graph);
     }
 
     /// The number of operators.
@@ -168,7 +182,10 @@ impl<'a> Relaxed<'a> {
 
     /// The estimate, or `None` if even the relaxed goal is out of reach.
     pub(crate) fn evaluate(&mut self, state: &State) -> Option<Estimate> {
-        self.prepare(state);
+        if !self.prepare(state) {
+            self.buckets.iter_mut().for_each(Vec::clear);
+            return None;
+        }
         self.spread(state);
         let mut estimate = Estimate::default();
         for open in &state.open {
@@ -186,30 +203,41 @@ impl<'a> Relaxed<'a> {
             return None;
         }
         self.extract(state, &mut estimate);
+        if !self.compiled.goal_timed.is_empty() {
+            self.await_timed(state, &mut estimate);
+        }
         self.list_applicable(state, &mut estimate);
         Some(estimate)
     }
 
-    /// Costs of what holds in the state.
-    fn prepare(&mut self, state: &State) {
+    /// Costs of what holds in the state. Whether all that is under way may end in time, as far as
+    /// that was looked at.
+    fn prepare(&mut self, state: &State) -> bool {
+        let mut is_in_time = true;
+        let spans = self
+            .is_chronological
+            .then(|| Spans::of(self.compiled, state));
         self.cost.fill(UNREACHED);
         self.missing.clone_from(&self.graph.precondition_counts);
         for (cost, operator) in self.operator_cost.iter_mut().zip(&self.graph.operators) {
             *cost = operator.cost;
         }
         self.applicable.clear();
-        if self.horizon < NEVER
-            || !self.graph.windows.is_empty()
-            || state
-                .open
-                .iter()
-                .any(|open| open.node == SETTLED && open.most < NEVER)
+        for open in &state.open {
+            for &operator in &self.graph.kept_out[open.action as usize] {
+                self.missing[operator as usize] += 1;
+            }
+        }
+        let outlasts =
+            |open: &Open| open.most < NEVER && (open.node == SETTLED || self.is_chronological);
+        if self.horizon < NEVER || !self.graph.windows.is_empty() || state.open.iter().any(outlasts)
         {
-            self.deadlines.exclude_late(
+            is_in_time = self.deadlines.exclude_late(
                 self.compiled,
                 &self.graph,
                 state,
                 self.horizon,
+                spans.as_ref(),
                 &mut self.missing,
             );
         }
@@ -244,9 +272,15 @@ impl<'a> Relaxed<'a> {
                 *gap = numbers::gap(self.compiled, test, state);
             }
         }
+        for stay in &graph.stays {
+            if stay.holds(state, spans.as_ref()) {
+                reach(stay.proposition, cost, buckets);
+            }
+        }
         for open in &state.open {
             reach(self.graph.running(open.action), cost, buckets);
         }
+        is_in_time
     }
 
     /// Dijkstra's algorithm from what holds.
@@ -306,8 +340,9 @@ impl<'a> Relaxed<'a> {
         }
         for position in data.gains.clone() {
             let (test, gain) = self.graph.gains[position];
-            let times = numbers::repetitions(self.gaps[test as usize], gain);
-            let Some(times) = times else { continue };
+            let Some(times) = gain.repetitions(self.gaps[test as usize]) else {
+                continue;
+            };
             let total = cost
                 .saturating_add((times - 1).saturating_mul(data.cost))
                 .min(MOST);

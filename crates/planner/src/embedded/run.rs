@@ -11,7 +11,9 @@ use super::answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Se
 use super::apply::Step;
 use super::compile::{self, Compiled, Eagerness};
 use super::extract;
+use super::formula::Literal;
 use super::reasons::{self, Names};
+use super::relaxed;
 use super::search::{Aim, Limit, PATIENCE, Search, Style, Turn};
 use super::symmetry::Symmetry;
 
@@ -32,6 +34,9 @@ const HASTE: u64 = 20_000;
 
 /// The same where hasty searches that count resources, and others that do not, take turns.
 const HASTE_WITH_RESOURCES: u64 = 2_048;
+
+/// The same where hasty searches and chronological ones take turns.
+const HASTE_WITH_CONCURRENCY: u64 = 4_096;
 
 /// How many turns the hasty search gets for each one of the complete search.
 const COMPLETE_SHARE: u64 = 8;
@@ -80,7 +85,9 @@ impl Planner<'_> {
             let counts = self.progress.counts;
             return Answer::Unsolvable { proof, counts };
         }
-        let mut budget = if self.has_resources {
+        let mut budget = if self.needs_concurrency() {
+            HASTE_WITH_CONCURRENCY
+        } else if self.has_resources {
             HASTE_WITH_RESOURCES
         } else {
             HASTE
@@ -138,7 +145,8 @@ impl Planner<'_> {
     }
 
     /// The searches that take turns, the complete one last. Where something is used up and filled
-    /// up, estimates that count it find most plans sooner, but not all.
+    /// up, estimates that count it find most plans sooner, but not all. Where actions offer
+    /// something while they run, some searches choose happenings in the order of time.
     fn styles(&self) -> Vec<Style> {
         let mut hastes = vec![Eagerness::Lends];
         let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
@@ -152,8 +160,46 @@ impl Planner<'_> {
             }
             styles.push(Style::hasty(haste));
         }
+        if self.needs_concurrency() {
+            styles.push(Style::CHRONOLOGICAL);
+            if !relaxed::stocks(self.compiled).is_empty() {
+                styles.push(Style::CHRONOLOGICAL.sparing());
+            }
+        }
+        if !self.compiled.is_symbolic {
+            styles.push(Style::hasty(Eagerness::Lends).seeking_novelty());
+        }
         styles.push(Style::COMPLETE);
         styles
+    }
+
+    /// Whether things may have to happen at the same time: some action offers to others what they
+    /// need only while it runs, or waits for others before it can end.
+    fn needs_concurrency(&self) -> bool {
+        let compiled = self.compiled;
+        let needs = |action: &compile::Action| {
+            if action.start == compile::NONE || action.end == compile::NONE {
+                return false;
+            }
+            let (start, end) = (compiled.snap(action.start), compiled.snap(action.end));
+            let is_kept = |literal: &Literal| {
+                let own = if literal.truth() {
+                    &start.adds
+                } else {
+                    &start.deletes
+                };
+                action.over_all.literals.contains(literal)
+                    || start.condition.literals.contains(literal)
+                    || own.contains(&literal.fact())
+            };
+            let waits = end
+                .condition
+                .literals
+                .iter()
+                .any(|literal| !is_kept(literal));
+            waits || action.eagerness == Eagerness::Offers && action.flows.is_empty()
+        };
+        !compiled.is_symbolic && compiled.actions.iter().any(needs)
     }
 
     /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.
@@ -187,8 +233,12 @@ impl Planner<'_> {
         };
         let report_every = (REPORT_WORK / (1 + search.size())).clamp(1, most_turns);
         let mut reported = (0, search.lookups());
-        for turn in 1..=budget {
-            match search.turn() {
+        let (mut turn, mut spent) = (0, 0);
+        while spent < budget {
+            turn += 1;
+            let result = search.turn();
+            spent += search.price();
+            match result {
                 Turn::Over => {
                     self.count(&before, search);
                     return Outcome::Over;

@@ -11,6 +11,7 @@ mod doubt;
 mod goals;
 mod known;
 mod limit;
+mod novelty;
 mod queue;
 mod style;
 mod successors;
@@ -22,17 +23,21 @@ use super::apply::{Step, Stepper};
 use super::compile::Compiled;
 use super::guide::Guide;
 use super::hash::Map;
-use super::relaxed::Relaxed;
+use super::relaxed::{Relaxed, Stock, stocks};
 use super::state::{Outlook, State};
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
 use doubt::Doubt;
 pub(crate) use limit::Limit;
+use novelty::Novelty;
 use queue::Queue;
 pub(crate) use style::{Aim, Style};
 
 /// How many turns the preferred successors get for a better estimate.
 const BOOST: i64 = 1000;
+
+/// What a chronological search keeps of a state at most: it remembers a distance for each pair.
+const MOST_UNSETTLED: u64 = 96;
 
 /// Each turn of that number goes to the successor that has waited longest, in a complete search. So
 /// it does not lose itself where an estimate is good, and endlessly many states are no goal.
@@ -63,6 +68,12 @@ pub(crate) struct Search<'a> {
     oldest: VecDeque<(u32, Step)>,
     turns: [i64; 2],
     best_steps: u32,
+    /// The estimate of the first state.
+    first_estimate: u32,
+    /// What was seen before, if new states come first.
+    novelty: Option<Novelty>,
+    /// What is used up and not filled up, if it is to be spared.
+    stocks: Vec<Stock>,
     /// Whether times are irrelevant but for their distances.
     is_timeless: bool,
     /// What steps cost, in a search for a better metric.
@@ -73,6 +84,8 @@ pub(crate) struct Search<'a> {
     horizon: Ticks,
     /// Whether something was dropped that could have led to a plan.
     pub(crate) has_lost: bool,
+    /// How much the last turn counts for.
+    price: u64,
     /// How many successors had their turn.
     drawn: u64,
     pub(crate) expanded: u64,
@@ -120,6 +133,12 @@ impl<'a> Search<'a> {
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
         let guide = metric.map(|metric| Guide::of(compiled, metric));
         let mut relaxed = Relaxed::new(compiled, style.haste);
+        relaxed.is_chronological = style.is_chronological;
+        if style.is_chronological && !style.is_sparing {
+            relaxed.draw_on_stocks();
+        }
+        let mut stepper = Stepper::new(compiled);
+        stepper.is_chronological = style.is_chronological;
         if style.fills_up {
             relaxed.count_resources();
         }
@@ -137,7 +156,7 @@ impl<'a> Search<'a> {
             compiled,
             symmetry,
             style,
-            stepper: Stepper::new(compiled),
+            stepper,
             doubt: Doubt::new(compiled, relaxed.size()),
             relaxed,
             has_begun: false,
@@ -148,11 +167,19 @@ impl<'a> Search<'a> {
             oldest: VecDeque::new(),
             turns: [0, 0],
             best_steps: u32::MAX,
+            first_estimate: 0,
+            novelty: style.seeks_novelty.then(|| Novelty::new(compiled)),
+            stocks: if style.is_sparing {
+                stocks(compiled)
+            } else {
+                Vec::new()
+            },
             is_timeless,
             guide,
             limit: None,
             horizon: NEVER,
-            has_lost: false,
+            has_lost: style.is_chronological,
+            price: 1,
             drawn: 0,
             expanded: 0,
             generated: 0,
@@ -182,7 +209,7 @@ impl<'a> Search<'a> {
 
     /// Whether it loses plans for the sake of speed.
     pub(crate) fn is_hasty(&self) -> bool {
-        self.style.haste.is_some()
+        !self.style.is_complete()
     }
 
     /// What it looks for.
@@ -206,6 +233,11 @@ impl<'a> Search<'a> {
         self.relaxed.size()
     }
 
+    /// How many turns the last one counts for: more where much is unsettled.
+    pub(crate) fn price(&self) -> u64 {
+        self.price
+    }
+
     /// How many pairs the stronger bound has looked up.
     pub(crate) fn lookups(&self) -> u64 {
         self.doubt.lookups()
@@ -213,6 +245,7 @@ impl<'a> Search<'a> {
 
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
+        self.price = 1;
         if !std::mem::replace(&mut self.has_begun, true) {
             let initial = self.compiled.initial.clone();
             if initial.earliest_end() > self.horizon {
@@ -253,6 +286,11 @@ impl<'a> Search<'a> {
     }
 
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
+        let unsettled = state.network.node_count() as u64;
+        self.price += unsettled * unsettled / (8 * (1 + self.size()));
+        if self.style.is_chronological && unsettled > MOST_UNSETTLED {
+            return Turn::Nothing;
+        }
         let latest_end = self.latest_end(&state);
         let is_in_time = latest_end.is_some_and(|latest| state.earliest_end() <= latest);
         if !is_in_time || !self.looks_no_later_than(latest_end) {

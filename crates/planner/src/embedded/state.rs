@@ -32,10 +32,40 @@ pub(crate) struct State {
     /// How many of the timed initials have happened.
     pub(crate) timed: u32,
     pub(crate) network: Network,
+    /// What was chosen last, where choices come in the order of time.
+    pub(crate) last: Last,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
     /// The numbers that depend on times, in a problem that has such.
     pub(crate) symbolic: Option<Box<Symbolic>>,
+}
+
+/// The happening that was chosen last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Last {
+    /// Its node, or [`SETTLED`].
+    pub(crate) node: NodeId,
+    /// When it happened, if that is settled; what follows does not happen earlier.
+    pub(crate) floor: Ticks,
+}
+
+impl Default for Last {
+    fn default() -> Self {
+        Self {
+            node: SETTLED,
+            floor: -NEVER,
+        }
+    }
+}
+
+impl Last {
+    /// Its earliest time.
+    pub(crate) fn earliest(self, network: &Network) -> Ticks {
+        match self.node {
+            SETTLED => self.floor,
+            node => self.floor.max(network.earliest(node)),
+        }
+    }
 }
 
 /// An action under way.
@@ -195,9 +225,13 @@ impl State {
 
     /// What matters of the unsettled past: all that what follows can push, and how far.
     pub(crate) fn outlook(&self) -> Outlook {
-        let unsettled = || self.open.iter().filter(|open| open.node != SETTLED);
-        let rows = unsettled().map(|open| {
-            let distances = self.network.distances_from(open.node);
+        let open = self.open.iter().map(|open| open.node);
+        let open: Vec<NodeId> = open
+            .chain([self.last.node])
+            .filter(|&node| node != SETTLED)
+            .collect();
+        let rows = open.iter().map(|&node| {
+            let distances = self.network.distances_from(node);
             let mut to_stamps: Vec<(u32, Ticks)> = self
                 .network
                 .marks
@@ -208,9 +242,9 @@ impl State {
             to_stamps.sort_unstable_by_key(|&(stamp, distance)| (stamp, -distance));
             to_stamps.dedup_by_key(|&mut (stamp, _)| stamp);
             Row {
-                earliest: self.network.earliest(open.node),
+                earliest: self.network.earliest(node),
                 latest: self.network.latest_given(&distances),
-                to_open: unsettled().map(|o| distances[o.node as usize]).collect(),
+                to_open: open.iter().map(|&o| distances[o as usize]).collect(),
                 to_stamps,
             }
         });
@@ -268,7 +302,8 @@ struct Row {
     earliest: Ticks,
     /// How late it can be.
     latest: Ticks,
-    /// The least distances to the starts under way.
+    /// The least distances to the starts under way, and to what was chosen last where choices come
+    /// in the order of time.
     to_open: Vec<Ticks>,
     /// The least distances to the stamps, by stamp.
     to_stamps: Vec<(u32, Ticks)>,

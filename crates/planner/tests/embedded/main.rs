@@ -8,6 +8,7 @@
 )]
 
 mod cancellation;
+mod concurrency;
 mod features;
 mod metric;
 mod resources;

@@ -2,8 +2,8 @@
 
 use super::super::compile::Snap;
 use super::super::network::{NodeId, SETTLED};
-use super::super::state::State;
-use super::super::time::Ticks;
+use super::super::state::{Open, State};
+use super::super::time::{NEVER, Ticks};
 use super::Stepper;
 
 /// When a happening may be.
@@ -29,6 +29,12 @@ impl Stepper<'_> {
                 place.after.push((node, snap.after[found].1));
             }
         }
+        if self.is_chronological {
+            place.earliest = place.earliest.max(state.last.floor);
+            if state.last.node != SETTLED {
+                place.after.push((state.last.node, 0));
+            }
+        }
         for &(timed, distance) in &snap.before_timed {
             if timed >= state.timed {
                 let time = self.compiled.timed[timed as usize].time;
@@ -37,6 +43,71 @@ impl Stepper<'_> {
         }
         place
     }
+
+    /// Notes what was chosen last, where choices come in the order of time: what is under way ends
+    /// no earlier.
+    pub(super) fn note_last(&self, state: &mut State, node: NodeId, place: &Place) -> Option<()> {
+        if !self.is_chronological {
+            return Some(());
+        }
+        state.last.node = node;
+        if node == SETTLED {
+            state.last.floor = place.earliest;
+            return Some(());
+        }
+        let State { network, open, .. } = state;
+        for open in open.iter().filter(|open| open.most < NEVER) {
+            if open.node == SETTLED {
+                network.hurry(node, open.start + open.most).ok()?;
+            } else {
+                network.add_edge(node, open.node, -open.most).ok()?;
+            }
+        }
+        Some(())
+    }
+
+    /// Puts the new one among those under way: where the end of one breaks the over-all condition
+    /// of another, that one must be over by then.
+    pub(super) fn nest(&self, state: &mut State, new: &Open) -> Option<()> {
+        let State { network, open, .. } = state;
+        for other in open.iter() {
+            for (inner, outer) in [(new, other), (other, new)] {
+                let is_bounded = inner.node != SETTLED && outer.node != SETTLED;
+                if is_bounded && outer.most < NEVER && self.breaks(outer.action, inner.action) {
+                    let distance = inner.least - outer.most;
+                    network.add_edge(inner.node, outer.node, distance).ok()?;
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// Whether the end of one action makes the over-all condition of another false.
+    fn breaks(&self, ending: u32, running: u32) -> bool {
+        let end = self.compiled.snap(self.compiled.action(ending).end);
+        let over_all = &self.compiled.action(running).over_all.literals;
+        over_all.iter().any(|literal| {
+            let breaking = if literal.truth() {
+                &end.deletes
+            } else {
+                &end.adds
+            };
+            breaking.contains(&literal.fact())
+        })
+    }
+}
+
+/// Lets a timed initial happen after what was chosen last, and before what follows.
+pub(super) fn reach_timed(state: &mut State, time: Ticks) -> Option<()> {
+    if state.last.node == SETTLED {
+        if state.last.floor > time {
+            return None;
+        }
+    } else {
+        state.network.hurry(state.last.node, time).ok()?;
+    }
+    state.last.floor = time;
+    Some(())
 }
 
 /// Gives the happening its place in time. It is settled if nothing can push it and nothing
@@ -85,6 +156,53 @@ pub(super) fn reach_foreseen_end(
         state.network.mark(stamp, end);
     }
     Some(())
+}
+
+/// Takes out of the network what nothing that follows can tell from what was chosen last, where
+/// choices come in the order of time. Nobody needs to keep away from a happening that is so much
+/// earlier than the last one.
+pub(super) fn forget_past(state: &mut State, longest_distance: Ticks) {
+    let last = state.last.node;
+    if last == SETTLED || state.open.iter().all(|open| open.node == SETTLED) {
+        return settle_all(state);
+    }
+    let mut kept = vec![last];
+    let others = state.open.iter().map(|open| open.node);
+    kept.extend(others.filter(|&node| node != SETTLED && node != last));
+    for &(_, node) in &state.network.marks {
+        if !kept.contains(&node) {
+            kept.push(node);
+        }
+    }
+    let network = &mut state.network;
+    let rename = |node: NodeId, names: &[NodeId]| match node {
+        SETTLED => SETTLED,
+        node => names[node as usize],
+    };
+    let names = network.project(&kept);
+    state.last.node = rename(last, &names);
+    for open in &mut state.open {
+        open.node = rename(open.node, &names);
+    }
+    let last = state.last.node;
+    let marks = std::mem::take(&mut network.marks);
+    let is_near = |node: NodeId| network.distance(node, last) < longest_distance;
+    network.marks = marks.into_iter().filter(|mark| is_near(mark.1)).collect();
+}
+
+/// Lets all that was chosen happen at its earliest time.
+fn settle_all(state: &mut State) {
+    if state.network.is_empty() {
+        return;
+    }
+    state.settled_end = state.settled_end.max(state.network.earliest_end());
+    state.last.floor = state.last.earliest(&state.network);
+    state.last.node = SETTLED;
+    let stamps = &mut state.stamps;
+    state.network.settle_all(&mut |stamp, time| {
+        let stamp = &mut stamps[stamp as usize];
+        *stamp = (*stamp).max(time);
+    });
 }
 
 /// Takes what nothing can push any more out of the network.

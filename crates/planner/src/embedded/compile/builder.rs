@@ -56,7 +56,7 @@ pub(crate) fn compile(
     let Wanted {
         situation, epsilon, ..
     } = wanted;
-    let mut full = full_actions(task, grounding);
+    let mut full = full_actions(task, grounding, goes_on).ok_or(Failure::Stopped)?;
     if !goes_on() {
         return Err(Failure::Stopped);
     }
@@ -71,9 +71,12 @@ pub(crate) fn compile(
         check(&running.action).map_err(Failure::Unsupported)?;
         builder.links_of(&running.action);
     }
-    for action in &grounding.actions {
+    for (number, action) in grounding.actions.iter().enumerate() {
         check(action).map_err(Failure::Unsupported)?;
         builder.links_of(action);
+        if number % ACTIONS_PER_QUESTION == ACTIONS_PER_QUESTION - 1 && !goes_on() {
+            return Err(Failure::Stopped);
+        }
     }
     let scale = scale_of(task, grounding, situation, epsilon);
     builder.epsilon = scale.ceil(epsilon).0.max(1);
@@ -87,7 +90,9 @@ pub(crate) fn compile(
             return Err(Failure::Stopped);
         }
     }
-    Ok(builder.finish(grounding, situation, scale))
+    builder
+        .finish(grounding, situation, scale, goes_on)
+        .ok_or(Failure::Stopped)
 }
 
 struct Builder<'a> {

@@ -1,9 +1,9 @@
 //! What is lost if an action ends before anything else happens, in the order of happenings.
 
 use super::{Action, Change, Eagerness, Snap};
-use crate::embedded::formula::Formula;
+use crate::embedded::formula::{Formula, Literal};
 
-/// Which actions need a fact to be true.
+/// Which actions need a literal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Readers {
     None,
@@ -25,15 +25,13 @@ impl Readers {
     }
 }
 
-/// For each fact, who needs it to be true.
+/// For each literal, who needs it.
 pub(super) fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<Readers> {
-    let mut readers = vec![Readers::None; count];
+    let mut readers = vec![Readers::None; 2 * count];
     for (number, action) in (0..).zip(actions) {
         let mut note = |formula: &Formula| {
             formula.visit_literals(&mut |literal| {
-                if literal.truth() {
-                    readers[literal.fact() as usize].note(number);
-                }
+                readers[literal.index()].note(number);
             });
         };
         note(&action.over_all);
@@ -50,7 +48,7 @@ pub(super) fn readers(actions: &[Action], snaps: &[Snap], count: usize) -> Vec<R
 pub(super) fn eagerness(
     start: &Snap,
     end: &Snap,
-    is_read_by_others: &dyn Fn(u32) -> bool,
+    is_read_by_others: &dyn Fn(Literal) -> bool,
 ) -> Eagerness {
     let conditional = end
         .conditional
@@ -60,7 +58,12 @@ pub(super) fn eagerness(
             _ => None,
         });
     let mut withdrawn = end.deletes.iter().copied().chain(conditional);
-    let offers = withdrawn.any(|fact| start.adds.contains(&fact) && is_read_by_others(fact));
+    let mut given_back = end.adds.iter();
+    let offers = withdrawn
+        .any(|fact| start.adds.contains(&fact) && is_read_by_others(Literal::new(fact, true)))
+        || given_back.any(|fact| {
+            start.deletes.contains(fact) && is_read_by_others(Literal::new(*fact, false))
+        });
     let lends = end.updates.iter().any(|back| {
         back.operator.is_additive()
             && start

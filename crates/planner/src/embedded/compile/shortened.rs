@@ -7,20 +7,28 @@ use elbowroom_model::{ground, problem};
 /// In full, as the judge sees them, the actions of which grounding may have dropped something that
 /// reads or writes a changing fact: a conditional effect that never happens, or a part of a
 /// disjunction that other parts decide. These interfere all the same.
-pub(super) fn full_actions(task: &mut Task, grounding: &Grounding) -> Vec<Option<ground::Action>> {
+///
+/// `None` if `goes_on` says that it shall end.
+pub(super) fn full_actions(
+    task: &mut Task,
+    grounding: &Grounding,
+    goes_on: &mut dyn FnMut() -> bool,
+) -> Option<Vec<Option<ground::Action>>> {
     let schemas = &task.problem().schemas;
     let is_shortened: Vec<bool> = schemas.iter().map(may_be_shortened).collect();
     if !is_shortened.contains(&true) {
-        return Vec::new();
+        return Some(Vec::new());
     }
     grounding
         .actions
         .iter()
         .map(|action| {
             if !is_shortened[action.schema.index()] {
-                return None;
+                return Some(None);
             }
-            task.instantiate(action.schema, &action.arguments).ok()
+            // One with quantifiers can take a millisecond.
+            let full = task.instantiate(action.schema, &action.arguments).ok();
+            goes_on().then_some(full)
         })
         .collect()
 }

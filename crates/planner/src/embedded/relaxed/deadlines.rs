@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use super::super::compile::{Compiled, NONE};
 use super::super::network::SETTLED;
+use super::super::spans::Spans;
 use super::super::state::State;
 use super::super::time::{NEVER, Ticks};
 use super::graph::{Graph, Kind, Operator};
@@ -24,21 +25,26 @@ impl Deadlines {
     /// Makes operators that come too late wait for ever: those whose conditions cannot be true in
     /// time, when nothing that was reached is ever lost and everything happens as early as it can
     /// (`h_max`, Haslum & Geffner, ECP 2001, with the windows of timed initials).
+    ///
+    /// Where choices come in the order of time, `spans` says how long what is under way can wait.
+    /// Whether all of that may still end in time.
     pub(super) fn exclude_late(
         &mut self,
         compiled: &Compiled,
         graph: &Graph,
         state: &State,
         horizon: Ticks,
+        spans: Option<&Spans>,
         waiting: &mut [u32],
-    ) {
+    ) -> bool {
         self.time.clear();
         self.time.resize(graph.proposition_count, NEVER);
         self.missing.clone_from(&graph.precondition_counts);
         self.begin.clear();
-        self.begin.resize(graph.operators.len(), compiled.now);
+        let now = spans.map_or(compiled.now, |spans| spans.now);
+        self.begin.resize(graph.operators.len(), now);
         self.queue.clear();
-        self.reach_what_holds(compiled, graph, state);
+        self.reach_what_holds(compiled, graph, state, spans);
         for &operator in &graph.sources {
             self.fire(compiled, graph, state, operator, horizon);
         }
@@ -61,14 +67,31 @@ impl Deadlines {
                 *waiting += 1;
             }
         }
+        spans.is_none_or(|spans| self.all_end_in_time(graph, state, spans))
     }
 
-    fn reach_what_holds(&mut self, compiled: &Compiled, graph: &Graph, state: &State) {
+    /// Whether each action under way may find the condition of its end true before it has to end.
+    fn all_end_in_time(&self, graph: &Graph, state: &State, spans: &Spans) -> bool {
+        let mut ends = state.open.iter().zip(&spans.ends);
+        ends.all(|(open, &(_, latest))| {
+            let end = graph.end_of[open.action as usize] as usize;
+            self.missing[end] == 0 && self.begin[end] <= latest
+        })
+    }
+
+    fn reach_what_holds(
+        &mut self,
+        compiled: &Compiled,
+        graph: &Graph,
+        state: &State,
+        spans: Option<&Spans>,
+    ) {
+        let now = spans.map_or(compiled.now, |spans| spans.now);
         for (fact, stamps) in compiled.fact_stamps.iter().enumerate() {
             let is_true = state.facts[fact / 64] >> (fact % 64) & 1 == 1;
             let stamp = stamps[usize::from(!is_true)];
-            let mut time = compiled.now;
-            if stamp != NONE {
+            let mut time = now;
+            if stamp != NONE && spans.is_none() {
                 time = time.max(state.stamps[stamp as usize]);
                 for &(marked, node) in &state.network.marks {
                     if marked == stamp {
@@ -83,20 +106,26 @@ impl Deadlines {
             let is_free =
                 graph.is_free_test[test] || super::depends_on_times(compiled, number, state);
             if is_free || state.passes(compiled, number, None) {
-                self.lower(graph, graph.test(number) as usize, compiled.now);
+                self.lower(graph, graph.test(number) as usize, now);
             }
         }
-        for open in &state.open {
+        for stay in &graph.stays {
+            if stay.holds(state, spans) {
+                self.lower(graph, stay.proposition as usize, now);
+            }
+        }
+        for (place, open) in state.open.iter().enumerate() {
+            let running = graph.running(open.action) as usize;
+            if let Some(spans) = spans {
+                self.lower(graph, running, spans.ends[place].0);
+                continue;
+            }
             let start = if open.node == SETTLED {
                 open.start
             } else {
                 state.network.earliest(open.node)
             };
-            self.lower(
-                graph,
-                graph.running(open.action) as usize,
-                start + open.least,
-            );
+            self.lower(graph, running, start + open.least);
         }
     }
 

@@ -1,6 +1,8 @@
 //! The relaxed problem: propositions and operators without deletions.
 
 mod actions;
+mod envelopes;
+mod exclusions;
 mod timetables;
 
 use std::ops::Range;
@@ -9,6 +11,8 @@ use super::super::compile::{Compiled, Eagerness, NONE};
 use super::super::formula::Formula;
 use super::super::guide::Guide;
 use super::super::time::Ticks;
+pub(crate) use super::numbers::Gain;
+use envelopes::{Stay, Stays};
 pub(crate) use timetables::Window;
 
 /// What an operator stands for.
@@ -56,10 +60,14 @@ pub(crate) struct Graph {
     /// The timetable of each literal; [`NONE`] if it has none.
     timetable_of: Vec<u32>,
     /// Tests, and what an operator adds to their difference.
-    pub(crate) gains: Vec<(u32, f64)>,
+    pub(crate) gains: Vec<(u32, Gain)>,
     /// Operators without preconditions.
     pub(crate) sources: Vec<u32>,
     pub(crate) goal: Vec<u32>,
+    /// See [`Stay`].
+    pub(crate) stays: Vec<Stay>,
+    /// For each action the operators that can come neither while it is under way, nor after it.
+    pub(crate) kept_out: Vec<Vec<u32>>,
     /// For each action its end's operator.
     pub(crate) end_of: Vec<u32>,
     /// For each action the operator of its start, or of the whole.
@@ -96,13 +104,18 @@ impl Graph {
             ..Self::default()
         };
         graph.add_timetables(compiled);
-        for (number, action) in compiled.actions.iter().enumerate() {
-            graph.add_action(compiled, narrow(number), action, haste);
+        let stays = Stays::of(compiled, narrow(graph.proposition_count));
+        graph.proposition_count += stays.list.len();
+        for number in 0..compiled.actions.len() {
+            graph.add_action(compiled, &stays, narrow(number), haste);
         }
         graph.add_rules(compiled);
         graph.add_timed(compiled);
         graph.goal = graph.propositions(&compiled.goal);
+        graph.follow_up_assignments(compiled.tests.len());
+        graph.stays = stays.list;
         graph.index();
+        graph.kept_out = graph.find_kept_out(compiled);
         graph
     }
 
@@ -118,9 +131,26 @@ impl Graph {
         }
     }
 
+    /// What one more of an operator counts for: an end needs another start.
+    pub(crate) fn cost_of_repetition(&self, operator: u32) -> u32 {
+        let data = &self.operators[operator as usize];
+        let start = match data.kind {
+            Kind::End(action) => self.start_of[action as usize],
+            _ => NONE,
+        };
+        let start = self.operators.get(start as usize);
+        data.cost + start.map_or(0, |start| start.cost)
+    }
+
     /// The proposition that a test is passed.
     pub(crate) fn test(&self, test: u32) -> u32 {
         self.first_test + test
+    }
+
+    /// The test that the proposition is passed for, if it is one.
+    pub(crate) fn test_of(&self, proposition: u32) -> Option<u32> {
+        let is_test = (self.first_test..self.first_running).contains(&proposition);
+        is_test.then(|| proposition - self.first_test)
     }
 
     /// The proposition that an instance of the action is under way.
@@ -166,7 +196,7 @@ impl Graph {
         cost: u32,
         mut needs: Vec<u32>,
         effects: &[(u32, Ticks)],
-        gains: Vec<(u32, f64)>,
+        gains: Vec<(u32, Gain)>,
     ) -> u32 {
         needs.sort_unstable();
         needs.dedup();
@@ -215,6 +245,36 @@ impl Graph {
             }
             let kind = Kind::Timed(narrow(number));
             self.add(kind, 1, Vec::new(), &effects, gains);
+        }
+    }
+
+    /// After an assignment that does not pass a test, others that add to the difference may.
+    fn follow_up_assignments(&mut self, test_count: usize) {
+        // For each test the greatest gains upwards and downwards; also what may do anything.
+        let mut best = vec![[0.0_f64; 2]; test_count];
+        for &(test, gain) in &self.gains {
+            let best = &mut best[test as usize];
+            match gain {
+                Gain::Adds(gain) => {
+                    let direction = usize::from(gain < 0.0);
+                    best[direction] = best[direction].max(gain.abs());
+                }
+                Gain::Reaches(_) => *best = [f64::INFINITY; 2],
+                Gain::Sets(_) => {}
+            }
+        }
+        for (test, gain) in &mut self.gains {
+            let Gain::Sets(gap) = *gain else { continue };
+            let best = best[*test as usize][usize::from(gap < 0.0)];
+            if best > 0.0 {
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "clamped to a small positive range"
+                )]
+                let more = (gap.abs() / best).ceil().clamp(1.0, 1000.0) as u32;
+                *gain = Gain::Reaches(more);
+            }
         }
     }
 

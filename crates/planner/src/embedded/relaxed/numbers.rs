@@ -13,23 +13,12 @@ pub(super) fn gap(compiled: &Compiled, test: u32, state: &State) -> f64 {
     let test = &compiled.tests[test as usize];
     match test.difference.value(&state.values, None) {
         None => f64::NAN,
-        // A strict test asks for a little more than the gap.
-        Some(value) => {
-            let strict = match test.comparison {
-                Comparison::Greater => 1e-9,
-                Comparison::Less => -1e-9,
-                _ => 0.0,
-            };
-            strict - value.to_f64()
-        }
+        Some(value) => strictly(test.comparison) - value.to_f64(),
     }
 }
 
 /// How often a change must happen to close a gap; `None` if it never will.
-pub(super) fn repetitions(gap: f64, gain: f64) -> Option<u32> {
-    if gain.is_infinite() {
-        return Some(1);
-    }
+fn repetitions(gap: f64, gain: f64) -> Option<u32> {
     if gap.is_nan() || (gap > 0.0) != (gain > 0.0) {
         return None;
     }
@@ -42,9 +31,80 @@ pub(super) fn repetitions(gap: f64, gain: f64) -> Option<u32> {
     Some(times)
 }
 
-/// What the updates of one happening do to a test: the constant that they add to its difference,
-/// or infinity if they may do anything.
-pub(super) fn gain(compiled: &Compiled, test: u32, updates: &[&Update]) -> f64 {
+/// What a happening does to a test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Gain {
+    /// It adds a constant to the test's difference.
+    Adds(f64),
+    /// It sets the difference to a constant, which does not pass: so much is missing then.
+    Sets(f64),
+    /// It passes the test if so many more happenings follow, or may pass it if none must.
+    Reaches(u32),
+}
+
+impl Gain {
+    /// How often the happening, or something after it, must happen to close a gap; `None` if it
+    /// never will.
+    pub(super) fn repetitions(self, gap: f64) -> Option<u32> {
+        match self {
+            Self::Adds(gain) => repetitions(gap, gain),
+            Self::Sets(_) => None,
+            Self::Reaches(more) => Some(1 + more),
+        }
+    }
+}
+
+/// What the updates of one happening do to a test.
+pub(super) fn gain(compiled: &Compiled, test: u32, updates: &[&Update]) -> Gain {
+    if let Some(gap) = gap_after(compiled, test, updates) {
+        return if gap == 0.0 {
+            Gain::Reaches(0)
+        } else {
+            Gain::Sets(gap)
+        };
+    }
+    match added(compiled, test, updates) {
+        gain if gain.is_infinite() => Gain::Reaches(0),
+        gain => Gain::Adds(gain),
+    }
+}
+
+/// What is missing after a happening that assigns a constant to the only fluent that the test
+/// reads: 0 if nothing is.
+fn gap_after(compiled: &Compiled, test: u32, updates: &[&Update]) -> Option<f64> {
+    let test = &compiled.tests[test as usize];
+    let Numeric::Linear(linear) = &test.difference else {
+        return None;
+    };
+    let [(fluent, coefficient)] = &linear.terms[..] else {
+        return None;
+    };
+    let mut updates = updates.iter().filter(|update| update.fluent == *fluent);
+    let (update, None) = (updates.next()?, updates.next()) else {
+        return None;
+    };
+    if update.operator != UpdateOperator::Assign || !linear.duration.is_zero() {
+        return None;
+    }
+    let difference = coefficient * update.value.as_constant()? + &linear.constant;
+    if test.comparison.holds(&difference, &Rational::ZERO) {
+        return Some(0.0);
+    }
+    Some(strictly(test.comparison) - difference.to_f64())
+}
+
+/// A strict test asks for a little more than the gap.
+fn strictly(comparison: Comparison) -> f64 {
+    match comparison {
+        Comparison::Greater => 1e-9,
+        Comparison::Less => -1e-9,
+        _ => 0.0,
+    }
+}
+
+/// The constant that the updates of one happening add to a test's difference, or infinity if they
+/// may do anything.
+fn added(compiled: &Compiled, test: u32, updates: &[&Update]) -> f64 {
     let test = &compiled.tests[test as usize];
     let Numeric::Linear(linear) = &test.difference else {
         let mut touches = false;

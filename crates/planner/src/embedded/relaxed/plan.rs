@@ -2,9 +2,13 @@
 
 use super::super::apply::Step;
 use super::super::compile::NONE;
+use super::super::formula::Literal;
 use super::super::state::State;
 use super::graph::Kind;
 use super::{Estimate, Relaxed};
+
+/// What a relaxed plan counts for, besides, that takes what is not there.
+const OVERDRAWN: u32 = 1 << 20;
 
 impl Relaxed<'_> {
     /// Counts the steps of a relaxed plan, and notes its first steps.
@@ -18,7 +22,13 @@ impl Relaxed<'_> {
             let needs = self.graph.operators[end as usize].preconditions.clone();
             wanted.extend_from_slice(&self.graph.preconditions[needs]);
         }
+        if !self.stocks.is_empty() {
+            self.stocks.begin(state);
+        }
         self.collect(&mut wanted, &mut used, &mut touched, estimate);
+        if !self.stocks.is_empty() && self.stocks.are_overdrawn() {
+            estimate.steps += OVERDRAWN;
+        }
         if !self.resources.is_empty() {
             self.fill_up(state, &mut wanted, &mut used, &mut touched, estimate);
         }
@@ -52,24 +62,92 @@ impl Relaxed<'_> {
                 continue;
             }
             touched.push(proposition);
-            let operator = self.achiever[index];
-            let data = &self.graph.operators[operator as usize];
-            estimate.steps += (self.repetitions[index] - 1) * data.cost;
-            if Self::use_operator(&mut self.is_used, used, operator) {
-                wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
-                if let Kind::Start(action) = data.kind {
-                    // What starts must end.
-                    let end = self.graph.end_of[action as usize];
-                    if end != NONE
-                        && self.missing[end as usize] == 0
-                        && Self::use_operator(&mut self.is_used, used, end)
-                    {
-                        let needs = self.graph.operators[end as usize].preconditions.clone();
-                        wanted.extend_from_slice(&self.graph.preconditions[needs]);
-                    }
-                }
+            if self.stocks.is_empty() || !self.add_up(proposition, wanted, used, estimate) {
+                let operator = self.achiever[index];
+                self.use_with_needs(operator, wanted, used);
+                let more = self.repetitions[index] - 1;
+                estimate.steps += more * self.graph.cost_of_repetition(operator);
             }
         }
+    }
+
+    /// Uses an operator, if it is not used yet, and wants what it needs. Whether it is new.
+    fn use_with_needs(
+        &mut self,
+        operator: u32,
+        wanted: &mut Vec<u32>,
+        used: &mut Vec<u32>,
+    ) -> bool {
+        if !Self::use_operator(&mut self.is_used, used, operator) {
+            return false;
+        }
+        self.stocks.draw(operator, 1);
+        let data = &self.graph.operators[operator as usize];
+        wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
+        if let Kind::Start(action) = data.kind {
+            // What starts must end.
+            let end = self.graph.end_of[action as usize];
+            if end != NONE && self.missing[end as usize] == 0 {
+                self.use_with_needs(end, wanted, used);
+            }
+        }
+        true
+    }
+
+    /// Closes the gap of a test by steps that add to its difference, each as often as the stocks
+    /// allow, beginning with the cheapest. Whether it is such a test.
+    fn add_up(
+        &mut self,
+        proposition: u32,
+        wanted: &mut Vec<u32>,
+        used: &mut Vec<u32>,
+        estimate: &mut Estimate,
+    ) -> bool {
+        let achiever = self.achiever[proposition as usize];
+        let Some(test) = self.graph.test_of(proposition) else {
+            return false;
+        };
+        let adders = self.stocks.adders(test);
+        let Some(&(_, sign)) = adders.iter().find(|adder| adder.0 == achiever) else {
+            return false;
+        };
+        let mut candidates: Vec<(bool, u32, u32, f64)> = adders
+            .iter()
+            .filter(|&&(step, gain)| {
+                self.missing[step as usize] == 0 && (gain > 0.0) == (sign > 0.0)
+            })
+            .map(|&(step, gain)| {
+                let cost = self.operator_cost[step as usize];
+                (step != achiever, cost, step, gain.abs())
+            })
+            .collect();
+        candidates.sort_unstable_by_key(|&(is_other, cost, step, _)| (is_other, cost, step));
+        let mut gap = self.gaps[test as usize].abs();
+        for (_, _, step, gain) in candidates {
+            if gap < 1e-12 {
+                break;
+            }
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "clamped to a small positive range"
+            )]
+            let needed = (gap / gain).ceil().clamp(1.0, 1000.0) as u32;
+            // One is in the plan already.
+            let had = u32::from(self.is_used[step as usize]);
+            let times = self.stocks.times(step, needed - had);
+            if times > 0 {
+                let more = times - u32::from(self.use_with_needs(step, wanted, used));
+                self.stocks.draw(step, more);
+                estimate.steps += more * self.graph.cost_of_repetition(step);
+            }
+            gap -= gain * f64::from(had + times);
+        }
+        if gap >= 1e-12 {
+            self.use_with_needs(achiever, wanted, used);
+            estimate.steps += OVERDRAWN;
+        }
+        true
     }
 
     /// Adds what fills up the resources that the relaxed plan uses up.
@@ -109,6 +187,34 @@ impl Relaxed<'_> {
             used.push(operator);
         }
         is_new
+    }
+
+    /// Counts the timed initials that must happen before the plan can end, because what was chosen
+    /// ends no earlier, and what they will take from the goal. So it does not seem reached before
+    /// they have happened.
+    pub(super) fn await_timed(&self, state: &State, estimate: &mut Estimate) {
+        let compiled = self.compiled;
+        let end = state.earliest_end();
+        let timed = compiled.goal_timed.iter();
+        let is_due =
+            |timed: u32| timed >= state.timed && compiled.timed[timed as usize].time <= end;
+        let Some(&last) = timed.rev().find(|&&timed| is_due(timed)) else {
+            return;
+        };
+        let due = &compiled.timed[state.timed as usize..=last as usize];
+        let is_lost = |literal: &&Literal| {
+            let fact = literal.fact();
+            let writes = due.iter().rev().find_map(|timed| {
+                let adds = timed.adds.contains(&fact);
+                (adds || timed.deletes.contains(&fact)).then_some(adds)
+            });
+            literal.holds(&state.facts) && writes.is_some_and(|truth| truth != literal.truth())
+        };
+        let undone = compiled.goal.literals.iter().filter(is_lost).count();
+        estimate.steps += u32::try_from(due.len() + undone).unwrap_or(u32::MAX >> 8);
+        if !estimate.preferred.contains(&Step::Timed) {
+            estimate.preferred.push(Step::Timed);
+        }
     }
 
     /// Lists the steps whose conditions hold in the state.

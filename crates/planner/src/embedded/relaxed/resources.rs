@@ -134,7 +134,7 @@ impl Resources {
     }
 }
 
-fn snaps_of(compiled: &Compiled, kind: Kind) -> Vec<&Snap> {
+pub(super) fn snaps_of(compiled: &Compiled, kind: Kind) -> Vec<&Snap> {
     let numbers = match kind {
         Kind::Start(action) => vec![compiled.action(action).start],
         Kind::End(action) => vec![compiled.action(action).end],
@@ -148,7 +148,7 @@ fn snaps_of(compiled: &Compiled, kind: Kind) -> Vec<&Snap> {
 }
 
 /// The constants that a happening adds to fluents.
-fn amounts(snap: &Snap) -> impl Iterator<Item = (u32, f64)> + '_ {
+pub(super) fn amounts(snap: &Snap) -> impl Iterator<Item = (u32, f64)> + '_ {
     snap.updates.iter().filter_map(|update| {
         let amount = update.value.as_constant()?.to_f64();
         match update.operator {
@@ -183,7 +183,7 @@ pub(crate) fn floors(compiled: &Compiled) -> Vec<(u32, f64)> {
 
 /// Notes what has to be left of the fluents that the action uses up: the least that some action
 /// leaves.
-fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Option<f64>]) {
+pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Option<f64>]) {
     for number in [action.start, action.end] {
         if number == NONE {
             continue;
@@ -216,7 +216,12 @@ fn least(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
         };
         let is_lower = matches!(test.comparison, Comparison::AtLeast | Comparison::Greater);
         let applies = *read == fluent && is_lower && coefficient.is_positive();
-        applies.then(|| -linear.constant.to_f64() / coefficient.to_f64())
+        // What is more than a bound is a little more.
+        let strictly = match test.comparison {
+            Comparison::Greater => 1e-6,
+            _ => 0.0,
+        };
+        applies.then(|| strictly - linear.constant.to_f64() / coefficient.to_f64())
     });
     bounds.max_by(f64::total_cmp)
 }

@@ -18,7 +18,8 @@ impl Search<'_> {
                 is_no_later &= self.guide.is_none() || other.cost <= state.cost;
                 if self.style.haste.is_some() {
                     self.has_lost |= is_no_later && !state.network.is_empty();
-                } else if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
+                }
+                if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
                 }
                 // A goal that waits for a timed initial needs a happening so late.

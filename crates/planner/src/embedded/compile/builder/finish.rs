@@ -13,10 +13,20 @@ use super::super::interference::{Access, Stamps, TimedWishes, Wishes};
 use super::super::metric::only_grows;
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
-use super::super::{Compiled, NONE, Rule, Timed, eager, gaps};
+use super::super::{Compiled, NONE, Rule, Snap, Timed, eager, gaps};
 use super::{Builder, narrow};
+use crate::embedded::formula::Literal;
 use crate::embedded::state::State;
-use crate::embedded::time::Scale;
+use crate::embedded::time::{Scale, Ticks};
+
+/// How many happenings get their stamps between two questions whether to go on.
+const SNAPS_PER_QUESTION: usize = 1024;
+
+/// The longest distance that some snap keeps from some stamp.
+fn longest_distance(snaps: &[Snap]) -> Ticks {
+    let distances = snaps.iter().flat_map(|snap| &snap.after);
+    distances.map(|&(_, distance)| distance).max().unwrap_or(0)
+}
 
 impl Builder<'_> {
     #[allow(
@@ -28,7 +38,8 @@ impl Builder<'_> {
         grounding: &Grounding,
         situation: &Situation,
         scale: Scale,
-    ) -> Compiled {
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Option<Compiled> {
         let goal = self.symbols.formula(&grounding.goal);
         let mut rules: Vec<Rule> = Vec::new();
         for rule in &grounding.rules {
@@ -52,7 +63,10 @@ impl Builder<'_> {
             .collect();
         let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
         let waiting = TimedWishes::of(&timed_wishes);
-        for (snap, wishes) in self.snaps.iter_mut().zip(&self.wishes) {
+        for (number, (snap, wishes)) in self.snaps.iter_mut().zip(&self.wishes).enumerate() {
+            if number % SNAPS_PER_QUESTION == 0 && !goes_on() {
+                return None;
+            }
             snap.after = stamps.after(wishes);
             snap.marks = stamps.marks(wishes);
             snap.before_timed = waiting.before(&wishes.makes);
@@ -101,6 +115,9 @@ impl Builder<'_> {
                 timed
             })
             .collect();
+        if !goes_on() {
+            return None;
+        }
         let ends = eager::Ends::of(&self.actions, &self.snaps, &timed, self.symbols.facts.len());
         for number in 0..self.actions.len() {
             let action = &self.actions[number];
@@ -126,7 +143,7 @@ impl Builder<'_> {
                     &self.snaps[action.start as usize],
                     &self.snaps[action.end as usize],
                 );
-                let offers = |fact: u32| readers[fact as usize].has_other_than(narrow(number));
+                let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
                 // What changes continuously is there to be read meanwhile.
                 if action.flows.is_empty() {
                     self.actions[number].eagerness = eagerness(start, end, &offers);
@@ -158,6 +175,7 @@ impl Builder<'_> {
         let mut compiled = Compiled {
             scale,
             epsilon,
+            longest_distance: longest_distance(&self.snaps),
             now: now.0,
             fact_stamps: self
                 .symbols
@@ -183,6 +201,9 @@ impl Builder<'_> {
             relaxed_gap: None,
             is_symbolic: false,
         };
+        if !goes_on() {
+            return None;
+        }
         compiled.is_symbolic = is_symbolic(&compiled, situation);
         let fact_count = compiled.facts.len();
         compiled.relaxed_gap = gaps::among_facts(&compiled.actions, &compiled.snaps, fact_count);
@@ -197,6 +218,6 @@ impl Builder<'_> {
         }
         compiled.initial = initial(&mut compiled, situation);
         compiled.initial.cost = initial_cost;
-        compiled
+        Some(compiled)
     }
 }

@@ -3,13 +3,15 @@
 use super::super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
 use super::super::super::time::{NEVER, Ticks};
 use super::super::numbers;
-use super::{Graph, Kind};
+use super::{Gain, Graph, Kind, Stays};
 
 /// An operator before it enters the graph.
 pub(super) struct Draft<'a> {
     pub(super) kind: Kind,
     pub(super) needs: Vec<u32>,
     pub(super) is_running: Option<u32>,
+    /// Stays that it begins.
+    pub(super) offers: Vec<u32>,
     pub(super) action: &'a Action,
     pub(super) snaps: &'a [&'a Snap],
 }
@@ -19,10 +21,11 @@ impl Graph {
     pub(super) fn add_action(
         &mut self,
         compiled: &Compiled,
+        stays: &Stays,
         number: u32,
-        action: &Action,
         haste: Option<Eagerness>,
     ) {
+        let action = compiled.action(number);
         if action.end == NONE {
             let snap = compiled.snap(action.start);
             let needs = self.propositions(&snap.condition);
@@ -32,6 +35,7 @@ impl Graph {
                     kind: Kind::Start(number),
                     needs,
                     is_running: None,
+                    offers: Vec::new(),
                     action,
                     snaps: &[snap],
                 },
@@ -55,6 +59,7 @@ impl Graph {
                     .iter()
                     .filter(|need| !gained.contains(need) && !tests.contains(need)),
             );
+            needs.extend(stays.needs(compiled, action));
             let is_whole = haste.is_some_and(|haste| action.eagerness >= haste)
                 && end_needs
                     .iter()
@@ -70,6 +75,7 @@ impl Graph {
                     kind,
                     needs,
                     is_running: (!is_whole).then_some(running),
+                    offers: stays.offers(compiled, number).collect(),
                     action,
                     snaps: &snaps,
                 },
@@ -82,6 +88,7 @@ impl Graph {
                 kind: Kind::End(number),
                 needs: end_needs,
                 is_running: None,
+                offers: Vec::new(),
                 action,
                 snaps: &[end],
             },
@@ -93,6 +100,7 @@ impl Graph {
         let least = least_ticks(compiled, draft.action);
         let mut effects: Vec<(u32, Ticks)> = Vec::new();
         effects.extend(draft.is_running.map(|running| (running, least)));
+        effects.extend(draft.offers.iter().map(|&stay| (stay, 0)));
         for (snap, delay) in draft.snaps.iter().zip([0, least]) {
             effects.extend(effects_of(snap).map(|effect| (effect, delay)));
         }
@@ -128,13 +136,13 @@ impl Graph {
         operator
     }
 
-    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, f64)> {
-        let mut gains: Vec<(u32, f64)> = Vec::new();
+    fn gains_of(&self, compiled: &Compiled, updates: &[&Update]) -> Vec<(u32, Gain)> {
+        let mut gains: Vec<(u32, Gain)> = Vec::new();
         for update in updates {
             for &test in &self.tests_of_fluent[update.fluent as usize] {
                 if gains.iter().all(|(known, _)| *known != test) {
                     let gain = numbers::gain(compiled, test, updates);
-                    if gain.abs() > 0.0 {
+                    if gain != Gain::Adds(0.0) {
                         gains.push((test, gain));
                     }
                 }
@@ -144,10 +152,10 @@ impl Graph {
     }
 
     /// Whatever is tested of the fluent may come about.
-    pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, f64)>) {
+    pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, Gain)>) {
         for &test in &self.tests_of_fluent[fluent as usize] {
             gains.retain(|(known, _)| *known != test);
-            gains.push((test, f64::INFINITY));
+            gains.push((test, Gain::Reaches(0)));
         }
     }
 }

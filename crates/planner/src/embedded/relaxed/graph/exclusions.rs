@@ -1,0 +1,45 @@
+//! What an action under way rules out for good.
+
+use super::super::super::compile::{Compiled, NONE};
+use super::super::super::formula::Literal;
+use super::Graph;
+
+impl Graph {
+    /// For each action the operators that can come neither while it is under way, because they
+    /// need what contradicts its over-all condition, nor afterwards, because they need what its end
+    /// destroys for ever. So who packs a bottle that is still to be filled is seen to have lost
+    /// already at the start.
+    pub(super) fn find_kept_out(&self, compiled: &Compiled) -> Vec<Vec<u32>> {
+        let mut is_achieved = vec![false; self.proposition_count];
+        for &effect in &self.effects {
+            is_achieved[effect as usize] = true;
+        }
+        let needing = |literal: Literal| {
+            let operators = self.needing(literal.0);
+            self.needing_list[operators].iter().copied()
+        };
+        let kept_out = compiled.actions.iter().map(|action| {
+            if action.end == NONE || action.over_all.literals.is_empty() {
+                return Vec::new();
+            }
+            let end = compiled.snap(action.end);
+            let adds = end.adds.iter().map(|&fact| Literal::new(fact, false));
+            let deletes = end.deletes.iter().map(|&fact| Literal::new(fact, true));
+            let lost = adds
+                .chain(deletes)
+                .filter(|lost| !is_achieved[lost.index()]);
+            let mut after: Vec<u32> = lost.flat_map(needing).collect();
+            after.sort_unstable();
+            let over_all = action.over_all.literals.iter();
+            let broken = over_all.map(|held| Literal::new(held.fact(), !held.truth()));
+            let mut kept_out: Vec<u32> = broken
+                .flat_map(needing)
+                .filter(|operator| after.binary_search(operator).is_ok())
+                .collect();
+            kept_out.sort_unstable();
+            kept_out.dedup();
+            kept_out
+        });
+        kept_out.collect()
+    }
+}

@@ -1,0 +1,53 @@
+//! When what is under way can end, seen from what was chosen last, where choices come in the order
+//! of time.
+
+use super::compile::Compiled;
+use super::network::SETTLED;
+use super::state::State;
+use super::time::{NEVER, Ticks};
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(crate) struct Spans {
+    /// The earliest time of what was chosen last; nothing new happens before.
+    pub(crate) now: Ticks,
+    /// For each action under way, its earliest and its latest end if what was chosen last happens
+    /// at [`now`](Self::now). What happens later than that moves them all alike.
+    pub(crate) ends: Vec<(Ticks, Ticks)>,
+}
+
+impl Spans {
+    pub(crate) fn of(compiled: &Compiled, state: &State) -> Self {
+        let now = state.last.earliest(&state.network).max(compiled.now);
+        let newest = state.last.node;
+        let has_timed = (state.timed as usize) < compiled.timed.len();
+        let network = &state.network;
+        let is_closed = network.is_closed();
+        let ends = state.open.iter().map(|open| {
+            if open.node == SETTLED {
+                let end = if open.most < NEVER {
+                    open.start + open.most
+                } else {
+                    NEVER
+                };
+                return (now.max(open.start + open.least), end);
+            }
+            if newest == SETTLED || !is_closed {
+                return (now, NEVER);
+            }
+            // The start comes at most so long before the last one, and at least so long.
+            let shortest = match network.distance(newest, open.node) {
+                back if back > -NEVER => (back + open.least).max(0),
+                _ => 0,
+            };
+            // Timed initials do not move along.
+            if has_timed || open.most >= NEVER {
+                return (now + shortest, NEVER);
+            }
+            let since = network.distance(open.node, newest).max(0);
+            (now + shortest, now + open.most - since)
+        });
+        let ends = ends.collect();
+        Self { now, ends }
+    }
+}

@@ -1,0 +1,168 @@
+//! Plans in which things must happen at the same time, and for long enough.
+
+use elbowroom_planner::{Answer, Counts};
+
+use crate::world::{answer, describe};
+
+/// The counts of a search that found a plan.
+fn counts(answer: &Answer) -> Counts {
+    match answer {
+        Answer::Plan { counts, .. } => *counts,
+        _ => panic!("{}", describe(answer)),
+    }
+}
+
+fn names(letter: char, count: usize) -> Vec<String> {
+    (0..count).map(|n| format!("{letter}{n}")).collect()
+}
+
+fn each(names: &[String], text: impl Fn(&str) -> String) -> String {
+    names.iter().map(|name| text(name)).collect()
+}
+
+/// Sheets are pressed one at a time. A sheet is handed over hot, within a moment, and cools for
+/// five minutes; before it is cold the same press must have begun to emboss it.
+fn embossing(sheets: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions) (:types sheet)
+        (:predicates (free) (blank ?s - sheet) (handed ?s - sheet) (pressed ?s - sheet)
+          (cooling ?s - sheet) (begun ?s - sheet) (embossed ?s - sheet))
+        (:durative-action press :parameters (?s - sheet) :duration (= ?duration 4)
+          :condition (and (at start (free)) (at start (blank ?s)) (at end (handed ?s)))
+          :effect (and (at start (not (free))) (at start (not (blank ?s)))
+                       (at end (free)) (at end (pressed ?s))))
+        (:durative-action hand :parameters (?s - sheet) :duration (= ?duration 0.01)
+          :condition (and (over all (handed ?s)) (at end (pressed ?s)) (at end (cooling ?s)))
+          :effect (and (at start (handed ?s)) (at end (not (handed ?s)))))
+        (:durative-action cool :parameters (?s - sheet) :duration (= ?duration 5)
+          :condition (and (at start (handed ?s)) (at end (begun ?s)))
+          :effect (at start (cooling ?s)))
+        (:durative-action emboss :parameters (?s - sheet) :duration (= ?duration 4)
+          :condition (and (at start (free)) (at start (pressed ?s)))
+          :effect (and (at start (not (free))) (at start (begun ?s))
+                       (at end (free)) (at end (embossed ?s))))";
+    let sheets = names('s', sheets);
+    let problem = format!(
+        "(:objects {} - sheet) (:init (free) {}) (:goal (and {}))",
+        sheets.join(" "),
+        each(&sheets, |s| format!("(blank {s})")),
+        each(&sheets, |s| format!("(embossed {s})")),
+    );
+    (domain.to_owned(), problem)
+}
+
+#[test]
+fn what_must_follow_before_something_is_cold_is_not_put_off() {
+    let (domain, problem) = embossing(9);
+    let answer = answer(&domain, &problem);
+    let evaluated = counts(&answer).evaluated;
+    assert!(evaluated < 4_000, "{evaluated} states");
+}
+
+/// Pots are glazed while they are fired; some take longer than the small fire burns. Two pots are
+/// joined into a jug, any two, but few jugs are asked for.
+fn pottery(pots: usize) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions) (:types pot)
+        (:predicates (hot) (firing ?p - pot) (fired ?p - pot) (glazed ?p - pot)
+          (thick ?p - pot) (thin ?p - pot) (jug ?p ?q - pot))
+        (:durative-action small-fire :parameters () :duration (= ?duration 8)
+          :effect (and (at start (hot)) (at end (not (hot)))))
+        (:durative-action large-fire :parameters () :duration (= ?duration 20)
+          :effect (and (at start (hot)) (at end (not (hot)))))
+        (:durative-action fire-thin :parameters (?p - pot) :duration (= ?duration 5)
+          :condition (and (at start (thin ?p)) (over all (hot)))
+          :effect (and (at start (firing ?p)) (at end (not (firing ?p))) (at end (fired ?p))))
+        (:durative-action fire-thick :parameters (?p - pot) :duration (= ?duration 15)
+          :condition (and (at start (thick ?p)) (over all (hot)))
+          :effect (and (at start (firing ?p)) (at end (not (firing ?p))) (at end (fired ?p))))
+        (:durative-action glaze :parameters (?p - pot) :duration (= ?duration 1)
+          :condition (over all (firing ?p)) :effect (at end (glazed ?p)))
+        (:durative-action join :parameters (?p ?q - pot) :duration (= ?duration 1)
+          :condition (and (over all (fired ?p)) (over all (glazed ?p))
+                          (over all (fired ?q)) (over all (glazed ?q)))
+          :effect (at end (jug ?p ?q)))";
+    let pots = names('p', pots);
+    let (thin, thick) = pots.split_at(pots.len() / 2);
+    let jugs = thin.iter().zip(thick);
+    let problem = format!(
+        "(:objects {} - pot) (:init {} {}) (:goal (and {}))",
+        pots.join(" "),
+        each(thin, |p| format!("(thin {p})")),
+        each(thick, |p| format!("(thick {p})")),
+        jugs.map(|(p, q)| format!("(jug {p} {q})"))
+            .collect::<String>(),
+    );
+    (domain.to_owned(), problem)
+}
+
+#[test]
+fn what_outlasts_a_fire_is_not_fired_in_it() {
+    let (domain, problem) = pottery(24);
+    let answer = answer(&domain, &problem);
+    let evaluated = counts(&answer).evaluated;
+    assert!(evaluated < 1_000, "{evaluated} states");
+}
+
+#[test]
+fn jugs_that_nobody_asks_for_are_left_out() {
+    let (domain, problem) = pottery(24);
+    let actions = counts(&answer(&domain, &problem)).actions;
+    // Two fires; firing and glazing of each pot; twelve jugs.
+    assert_eq!(actions, 2 + 24 + 24 + 12);
+}
+
+/// Jars with lids that stay open for a while are filled from cans, a cup at a time, and shipped;
+/// what is shipped, or waits for it, is not opened again. All cans together hold just enough.
+fn filling(cans: &[usize], jars: &[usize]) -> (String, String) {
+    let domain = "
+        (:requirements :typing :durative-actions :numeric-fluents :negative-preconditions)
+        (:types vessel - object can jar - vessel)
+        (:predicates (shut ?v - vessel) (shipped ?v - vessel) (waiting ?v - vessel))
+        (:functions (cups ?v - vessel))
+        (:durative-action open :parameters (?v - vessel) :duration (= ?duration 5)
+          :condition (and (at start (shut ?v)) (at end (not (shut ?v))))
+          :effect (and (at start (not (shut ?v))) (at end (shut ?v))))
+        (:durative-action fill :parameters (?c - can ?j - jar) :duration (= ?duration 1)
+          :condition (and (at start (>= (cups ?c) 1)) (at start (not (shipped ?c)))
+            (at start (not (shipped ?j))) (over all (not (shut ?c))) (over all (not (shut ?j))))
+          :effect (and (at start (decrease (cups ?c) 1)) (at end (increase (cups ?j) 1))))
+        (:durative-action ship :parameters (?v - vessel) :duration (= ?duration 3)
+          :condition (and (at start (shut ?v)) (at start (not (waiting ?v))) (over all (shut ?v)))
+          :effect (and (at start (waiting ?v)) (at end (shipped ?v))))";
+    let can_names = names('c', cans.len());
+    let jar_names = names('j', jars.len());
+    let cups = |names: &[String], cups: &[usize]| -> String {
+        let pairs = names.iter().zip(cups);
+        pairs
+            .map(|(name, cups)| format!("(= (cups {name}) {cups})"))
+            .collect()
+    };
+    let both: Vec<String> = can_names.iter().chain(&jar_names).cloned().collect();
+    let problem = format!(
+        "(:objects {} - can {} - jar) (:init {} {} {}) (:goal (and {} {}))",
+        can_names.join(" "),
+        jar_names.join(" "),
+        each(&both, |v| format!("(shut {v})")),
+        cups(&can_names, cans),
+        each(&jar_names, |j| format!("(= (cups {j}) 0)")),
+        cups(&jar_names, jars),
+        each(&both, |v| format!("(shipped {v})")),
+    );
+    (domain.to_owned(), problem)
+}
+
+#[test]
+fn a_can_that_is_still_needed_is_not_shipped() {
+    let (domain, problem) = filling(&[4, 2, 5, 1], &[5, 2, 1, 4]);
+    let answer = answer(&domain, &problem);
+    let evaluated = counts(&answer).evaluated;
+    assert!(evaluated < 10_000, "{evaluated} states");
+}
+
+#[test]
+fn cans_that_hold_too_little_fill_no_jar() {
+    let (domain, problem) = filling(&[2], &[3]);
+    let answer = answer(&domain, &problem);
+    assert!(answer.found().is_none(), "{}", describe(&answer));
+}
