@@ -206,7 +206,7 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
         let (task, plan) = kind.read();
         let (open, nominal) = opened(&task, &plan);
         let envelope = flow::robust_plan(&task, &plan, &flow::Settings::default());
-        let envelope = envelope.expect("within reach").run.envelope;
+        let envelope = envelope.expect("within reach").envelope;
         let lines: Vec<&str> = kind.plan.lines().collect();
         for text in orders(&lines) {
             let (task, plan) = kind.read_with(&text);
@@ -217,7 +217,7 @@ fn the_order_of_the_lines_of_a_plan_does_not_matter() {
             assert_eq!(found.parameters, open.parameters, "{here}");
             assert_eq!((names(&found), &times), (names(&open), &nominal), "{here}");
             let found = flow::robust_plan(&task, &plan, &flow::Settings::default());
-            let found = found.expect("within reach").run.envelope;
+            let found = found.expect("within reach").envelope;
             assert_eq!(found, envelope, "{}:\n{text}", kind.name);
         }
     }

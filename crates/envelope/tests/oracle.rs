@@ -2,7 +2,6 @@
 
 mod given;
 
-use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Objection, Oracle};
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, Side};
@@ -103,11 +102,22 @@ fn an_oracle_can_be_made_in_one_thread_and_used_in_another() {
     assert_eq!(asked.join().unwrap(), Ok(true));
 }
 
+/// The relay needs nobody to know anything in advance: of guarantees the stronger one never gives
+/// more.
 #[test]
-fn a_guarantee_without_a_check_is_refused_by_name() {
+fn a_stronger_guarantee_accepts_no_box_that_a_weaker_one_refuses() {
     let (task, plan) = RELAY.task_and_plan();
-    for guarantee in [Guarantee::Dynamic, Guarantee::Strong] {
-        let refusal = Oracle::new(&task, &plan, &Rational::ONE, guarantee);
-        assert_eq!(refusal.unwrap_err(), Refusal::Guarantee { guarantee });
+    let reaches = [1, 2, 5, 9, 20, 100];
+    for reach in reaches {
+        let accepts = |guarantee| {
+            let oracle = Oracle::new(&task, &plan, &Rational::new(1, 4), guarantee);
+            oracle
+                .unwrap()
+                .try_reach(upper(0), Some(number(reach)))
+                .unwrap()
+        };
+        let [weak, dynamic, strong] =
+            [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong].map(accepts);
+        assert!(weak >= dynamic && dynamic >= strong, "{reach}");
     }
 }

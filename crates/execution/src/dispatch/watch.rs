@@ -221,8 +221,7 @@ fn at_the_end(moment: &Moment<'_>) -> Decided {
 /// An over-all condition of something running that does not hold.
 fn broken(moment: &Moment<'_>) -> Option<Reason> {
     let (_, underway) = moment.belief.broken()?;
-    let body = underway.action.durative()?;
-    let unmet = moment.belief.unmet(&body.over_all, Some(&underway.planned));
+    let unmet = underway.broken_parts();
     let about = format!("{} throughout", in_words(moment.belief, &unmet));
     let reason = Reason::new(Cause::Condition).of(&underway.action.name);
     Some(reason.about(about).since(moment.now.clone()))
