@@ -159,7 +159,7 @@ pub fn open(
 ) -> Result<ParametrizedPlan, FlowError> {
     let Deordered { plan, nominal } = freed.deordered;
     let plan = parametrize(task, plan, &nominal, specs)?;
-    Ok(room::sound(task, plan, &nominal, epsilon))
+    Ok(room::sound(task, &plan, &nominal, epsilon))
 }
 
 /// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
@@ -167,7 +167,7 @@ pub fn open(
 pub fn closed(task: &Task, freed: Freed, epsilon: &Rational) -> ParametrizedPlan {
     let Deordered { plan, nominal } = freed.deordered;
     let plan = ParametrizedPlan::closed(task, plan);
-    room::sound(task, plan, &nominal, epsilon)
+    room::sound(task, &plan, &nominal, epsilon)
 }
 
 /// An STN plan, which may have parameters already, with more left open.

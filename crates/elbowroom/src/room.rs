@@ -23,7 +23,7 @@ use elbowroom_plan::{
 /// what is wrong with it.
 pub(crate) fn sound(
     task: &Task,
-    plan: ParametrizedPlan,
+    plan: &ParametrizedPlan,
     nominal: &[Rational],
     epsilon: &Rational,
 ) -> ParametrizedPlan {

@@ -60,7 +60,7 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
                     rewrite_condition(task, &mut body.over_all, function, replace);
                 }
                 Place::Effects(function) => {
-                    let is_decrease = only_decreases(task, &action.schema, function);
+                    let is_decrease = only_decreases(task, action.schema, function);
                     for effect in &mut body.continuous {
                         if task.function_of(effect.fluent) == function {
                             effect.rate = rewrite_rate(&effect.rate, is_decrease, replace);
@@ -75,7 +75,7 @@ fn rewritten(task: &Task, action: &Action, place: Place, replace: Replace<'_>) -
 
 /// Whether the action changes the function continuously, and in no other direction than down as far
 /// as the words go: `(decrease (charge) (* #t 2))`.
-fn only_decreases(task: &Task, schema: &problem::SchemaId, function: FunctionId) -> bool {
+fn only_decreases(task: &Task, schema: problem::SchemaId, function: FunctionId) -> bool {
     let problem::Body::Durative { continuous, .. } = &task.problem().schemas[schema.index()].body
     else {
         return false;
