@@ -262,6 +262,12 @@ pub(crate) struct RunArgs {
     /// What to leave open, see `elbowroom help envelope`; by default all durations
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
+    /// Actions whose durations the executor chooses, see `elbowroom help envelope`
+    #[arg(long, value_name = "ACTION")]
+    pub(crate) controllable: Vec<String>,
+    /// What is guaranteed inside the envelopes that executors go by
+    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
+    pub(crate) guarantee: Guarantee,
     /// How close to its limit each end of the envelope should come
     #[arg(long, value_name = "B", default_value = "1", value_parser = positive)]
     pub(crate) precision: Rational,
@@ -297,6 +303,22 @@ pub(crate) struct RunArgs {
     pub(crate) json: bool,
 }
 
+impl RunArgs {
+    /// What to leave open, and what not.
+    pub(crate) fn specifications(&self) -> Vec<String> {
+        let controllable = controllable(&self.controllable);
+        self.vary.iter().cloned().chain(controllable).collect()
+    }
+}
+
+/// What says that the executor chooses the durations of these actions.
+pub(crate) fn controllable(actions: &[String]) -> Vec<String> {
+    actions
+        .iter()
+        .map(|action| format!("controllable {action}"))
+        .collect()
+}
+
 /// What a stored trace says, and the command line cannot change.
 const IN_THE_TRACE: &[&str] = &[
     "domain",
@@ -314,6 +336,8 @@ const IN_THE_TRACE: &[&str] = &[
     "likelihoods",
     "seed",
     "vary",
+    "controllable",
+    "guarantee",
     "precision",
     "running",
     "planning_time",

@@ -36,6 +36,9 @@ pub enum Guarantee {
 }
 
 impl Guarantee {
+    /// All of them, the weakest first.
+    pub const ALL: [Self; 3] = [Self::Weak, Self::Dynamic, Self::Strong];
+
     /// Its name in documents and on the command line.
     pub fn name(self) -> &'static str {
         match self {

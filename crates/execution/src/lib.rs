@@ -49,6 +49,6 @@ pub use odds::{Compared, Odds, Remainder};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};
-pub use reason::{Cause, Reason};
+pub use reason::{Cause, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
 pub use world::{Passage, World, WorldError};

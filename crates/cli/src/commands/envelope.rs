@@ -22,7 +22,9 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     let mut watch = Watch::start(arguments);
     let mut task = input::task(&arguments.problem)?;
     let mut vary = specifications(&arguments.vary)?;
-    vary.extend(specifications(&controllable(&arguments.controllable))?);
+    vary.extend(specifications(&args::controllable(
+        &arguments.controllable,
+    ))?);
     let plan = input::any_plan(&mut task, &arguments.plan)?;
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
@@ -59,14 +61,6 @@ fn exit(outcome: &EnvelopeOutcome) -> Exit {
         EnvelopeFinding::Fails(_) | EnvelopeFinding::Outside { .. } => Exit::No,
         EnvelopeFinding::None { .. } => Exit::Limit,
     }
-}
-
-/// What says that the executor chooses the durations of these actions.
-fn controllable(actions: &[String]) -> Vec<String> {
-    actions
-        .iter()
-        .map(|action| format!("controllable {action}"))
-        .collect()
 }
 
 fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Failure> {

@@ -9,6 +9,7 @@ mod trace_file;
 
 use std::sync::Arc;
 
+use elbowroom::envelope::Guarantee;
 use elbowroom::execute::{Analyst, WholeRegion, check_vary};
 use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
@@ -224,7 +225,8 @@ impl Choices {
     fn of(arguments: &RunArgs, likelihoods: Option<&Source>, task: &Task) -> Result<Self, Failure> {
         let choices = Self::new(
             &arguments.executor,
-            &arguments.vary,
+            &arguments.specifications(),
+            arguments.guarantee.into(),
             &arguments.precision,
             RunSettings {
                 epsilon: arguments.epsilon.clone(),
@@ -263,6 +265,7 @@ impl Choices {
     pub(super) fn new(
         executor: &str,
         vary: &[String],
+        guarantee: Guarantee,
         precision: &Rational,
         settings: RunSettings,
     ) -> Result<Self, Failure> {
@@ -276,6 +279,7 @@ impl Choices {
         let mut flow = flow::Settings {
             epsilon: settings.epsilon.clone(),
             vary,
+            guarantee,
             ..flow::Settings::default()
         };
         flow.search.precision = precision.clone();
@@ -384,7 +388,8 @@ fn header(
         "seed": arguments.seed,
         "planner_states": arguments.planner_states,
         "improve_states": arguments.improve_states,
-        "vary": arguments.vary,
+        "vary": arguments.specifications(),
+        "guarantee": Guarantee::from(arguments.guarantee).name(),
         "precision": arguments.precision.to_string(),
         "running": format!("{:?}", arguments.running).to_lowercase(),
         "planning_time": planning_time_text(arguments),

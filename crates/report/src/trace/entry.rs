@@ -108,7 +108,7 @@ pub fn report(report: &Report) -> Value {
 
 /// A reason: its words, and its parts.
 pub(crate) fn reason(reason: &Reason) -> Value {
-    json!({
+    let mut value = json!({
         "cause": reason.cause.name(),
         "words": reason.to_string(),
         "action": reason.action,
@@ -118,7 +118,11 @@ pub(crate) fn reason(reason: &Reason) -> Value {
         "behind": reason.behind,
         "by": optional(reason.by.as_ref()),
         "since": optional(reason.since.as_ref()),
-    })
+    });
+    if let Some(promise) = reason.promise {
+        value["promise"] = promise.name().into();
+    }
+    value
 }
 
 fn executed(executed: &ExecutedStep) -> Value {

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use elbowroom::envelope::Guarantee;
 use elbowroom::execution::Odds;
 use elbowroom::execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom::model::Task;
@@ -145,6 +146,11 @@ impl Header<'_> {
             .flatten()
             .filter_map(|spec| spec.as_str().map(str::to_owned))
             .collect();
+        // Traces from before there were guarantees do not say which.
+        let named = Guarantee::ALL
+            .into_iter()
+            .find(|it| it.name() == self.text("guarantee"));
+        let guarantee = named.unwrap_or_default();
         let replans = self.0.get("max_replans").and_then(Value::as_u64);
         let running = RunningRule::NAMES
             .iter()
@@ -152,6 +158,7 @@ impl Header<'_> {
         Choices::new(
             self.text("executor"),
             &vary,
+            guarantee,
             &self.number("precision", Rational::ONE),
             RunSettings {
                 epsilon: self.number("epsilon", plain.epsilon.clone()),
