@@ -8,6 +8,8 @@ use std::sync::Arc;
 
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, check};
 use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Stop, envelope};
+use elbowroom::answers::plan as planning;
+use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, PlanStop};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
 use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
@@ -145,6 +147,55 @@ fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
     };
     assert_eq!(network.answer.finding, expected);
     assert_stored(&network.answer);
+}
+
+fn planned(task: &mut Task, watcher: &mut dyn Watcher) -> PlanOutcome {
+    let mut request = PlanRequest {
+        task,
+        epsilon: Rational::new(1, 1000),
+        first_plan_only: true,
+        most_memory: None,
+    };
+    planning::plan(&mut request, watcher).expect("supported")
+}
+
+#[test]
+fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
+    let (task, _) = read("delivery");
+    let mut task = Task::clone(&task);
+    let found = planned(&mut task, &mut Unwatched);
+    assert_eq!(
+        (found.answer.stop, found.answer.plans),
+        (PlanStop::FirstPlan, 1)
+    );
+    let PlanFinding::Plan { makespan, .. } = &found.answer.finding else {
+        panic!("{:?}", found.answer)
+    };
+    let judged = check(&CheckRequest {
+        task: &task,
+        plan: found.plan.as_ref(),
+        name: String::new(),
+        settings: Settings::default(),
+    });
+    let Ok(CheckAnswer::Plan(judged)) = judged else {
+        panic!("{judged:?}")
+    };
+    assert!(
+        matches!(&judged.finding, CheckFinding::Valid { makespan: same, .. } if same == makespan)
+    );
+    assert_stored(&found.answer);
+    let domain = "(define (domain d) (:predicates (p) (q))
+        (:action a :parameters () :precondition (p) :effect (q)))";
+    let problem = "(define (problem d) (:domain d) (:init) (:goal (q)))";
+    let read = pddl::read_problem(
+        &Source::new("domain", domain),
+        &Source::new("problem", problem),
+    );
+    let mut task = Task::new(read.expect("a problem without mistakes").0);
+    let none = planned(&mut task, &mut Unwatched);
+    assert!(none.plan.is_none() && none.answer.stop == PlanStop::Proved);
+    assert!(matches!(none.answer.finding, PlanFinding::NoPlan { .. }));
+    assert_stored(&none.answer);
 }
 
 #[test]
