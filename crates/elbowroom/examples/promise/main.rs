@@ -36,6 +36,7 @@ mod trial;
 mod worlds;
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -114,7 +115,7 @@ fn counted<T: Send>(
 fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
     let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
     for (why, count) in skipped {
-        text.push_str(&format!("| {why} | {count} |\n"));
+        let _ = writeln!(text, "| {why} | {count} |");
     }
     text
 }

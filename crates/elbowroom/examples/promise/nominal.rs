@@ -1,5 +1,6 @@
 //! Every plan where nothing deviates: no executor may fail.
 
+use std::fmt::Write as _;
 use std::time::Instant;
 
 use super::options::Options;
@@ -44,10 +45,11 @@ fn line(rows: &[&Row]) -> String {
     let mut line = format!("| {} |", rows.len());
     for executor in 0..EXECUTORS.len() {
         let failed = rows.iter().filter(|row| row.failed[executor]).count();
-        line.push_str(&format!(" {failed} |"));
+        let _ = write!(line, " {failed} |");
     }
     let missed = rows.iter().filter(|row| row.is_order_missed).count();
-    format!("{line} {missed} |")
+    let _ = write!(line, " {missed} |");
+    line
 }
 
 #[allow(
