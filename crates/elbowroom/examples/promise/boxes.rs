@@ -23,7 +23,7 @@ struct Row {
     times: [Duration; 2],
 }
 
-pub(crate) fn main(options: &Options) -> Result<(), String> {
+pub(crate) fn main(options: &Options) {
     let (families, skipped) = counted(options, &|source| {
         row(source, options).map(|row| (source.family.clone(), row))
     });
@@ -38,7 +38,6 @@ pub(crate) fn main(options: &Options) -> Result<(), String> {
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
     print!("{}", not_counted(&skipped));
-    Ok(())
 }
 
 fn line(rows: &[&Row]) -> String {

@@ -36,7 +36,7 @@ struct Row {
     spoiled: [usize; EXECUTORS.len()],
 }
 
-pub(crate) fn main(options: &Options) -> Result<(), String> {
+pub(crate) fn main(options: &Options) {
     let (families, skipped) = counted(options, &|source| {
         row(source, options).map(|row| (source.family.clone(), row))
     });
@@ -52,7 +52,6 @@ pub(crate) fn main(options: &Options) -> Result<(), String> {
     let all: Vec<&Row> = families.values().flatten().collect();
     println!("| **all** {}", line(&all));
     print!("{}", not_counted(&skipped));
-    Ok(())
 }
 
 fn line(rows: &[&Row]) -> String {

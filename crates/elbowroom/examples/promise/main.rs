@@ -36,6 +36,7 @@ mod trial;
 mod worlds;
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -51,14 +52,20 @@ fn main() -> ExitCode {
     let outcome = Options::read(&rest).and_then(|options| {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs);
         let pool = threads.build().map_err(|error| error.to_string())?;
-        pool.install(|| match command.as_str() {
-            "plan" => plan(&options),
-            "nominal" => nominal::main(&options),
-            "runs" => runs::main(&options),
-            "grow" => grow::main(&options),
-            "boxes" => boxes::main(&options),
-            _ => Err("the first word says what to do; the source says what there is".to_owned()),
-        })
+        let command: fn(&Options) = match command.as_str() {
+            "plan" => plan,
+            "nominal" => nominal::main,
+            "runs" => runs::main,
+            "grow" => grow::main,
+            "boxes" => boxes::main,
+            _ => {
+                return Err(
+                    "the first word says what to do: plan, nominal, runs, grow or boxes".to_owned(),
+                );
+            }
+        };
+        pool.install(|| command(&options));
+        Ok(())
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -80,10 +87,13 @@ fn wanted(options: &Options) -> Vec<Source> {
     sources
 }
 
+/// What there is to say of a plan and its family, or why it does not count.
+type Say<'a, T> = dyn Fn(&Source) -> Result<(String, T), String> + Sync + 'a;
+
 /// What there is to say of each plan, by family; and why others do not count, and how many.
 fn counted<T: Send>(
     options: &Options,
-    say: &(dyn Fn(&Source) -> Result<(String, T), String> + Sync),
+    say: &Say<'_, T>,
 ) -> (BTreeMap<String, Vec<T>>, BTreeMap<String, usize>) {
     let sources = wanted(options);
     let done = AtomicUsize::new(0);
@@ -114,13 +124,13 @@ fn counted<T: Send>(
 fn not_counted(skipped: &BTreeMap<String, usize>) -> String {
     let mut text = String::from("\n| not counted | plans |\n|---|--:|\n");
     for (why, count) in skipped {
-        text.push_str(&format!("| {why} | {count} |\n"));
+        let _ = writeln!(text, "| {why} | {count} |");
     }
     text
 }
 
 /// Makes plans, and keeps them.
-fn plan(options: &Options) -> Result<(), String> {
+fn plan(options: &Options) {
     let mut sources = wanted(options);
     sources.retain(|source| source.origin == Origin::Planned);
     let done = AtomicUsize::new(0);
@@ -135,5 +145,4 @@ fn plan(options: &Options) -> Result<(), String> {
             source.name
         );
     });
-    Ok(())
 }

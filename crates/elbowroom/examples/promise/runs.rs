@@ -15,7 +15,7 @@ use super::worlds::{Kind, Worlds};
 use super::{counted, not_counted, wanted};
 
 #[allow(clippy::disallowed_methods, reason = "runs are timed")]
-pub(crate) fn main(options: &Options) -> Result<(), String> {
+pub(crate) fn main(options: &Options) {
     let begin = Instant::now();
     let total = AtomicU64::new(0);
     let most = 4 * options.runs.div_ceil(wanted(options).len().max(1) as u64);
@@ -31,7 +31,6 @@ pub(crate) fn main(options: &Options) -> Result<(), String> {
     let seconds = begin.elapsed().as_secs();
     let runs: u64 = all.iter().map(|tally| tally.runs()).sum();
     println!("\n{runs} runs, {seconds} s.");
-    Ok(())
 }
 
 fn line(tallies: &[&Tally]) -> String {

@@ -176,7 +176,7 @@ fn companions(parts: &[&str]) -> Option<(String, String)> {
                 format!("ccmmz_examples/{example}/{problem}.pddl"),
             ))
         }
-        ["golden_reference_runs", "rcll"] if is_stn || name.ends_with(".plan") => owned(
+        ["golden_reference_runs", "rcll"] if is_stn || name.starts_with("plan") => owned(
             "rcll_duration/domain_rcll_simple_robust.pddl",
             "rcll_duration/problems/problem_lp0.05_hp0.95.pddl".to_owned(),
         ),

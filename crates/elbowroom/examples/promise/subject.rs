@@ -123,7 +123,7 @@ fn scheduled(bytes: &[u8], task: &mut Task) -> Result<TimeTriggeredPlan, String>
     let network = stn::ConsistentNetwork::try_from(plan.network(&[]));
     let network = network.map_err(|_| "an STN plan without a schedule")?;
     let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
-    Ok(plan.scheduled(&schedule.times().to_vec()))
+    Ok(plan.scheduled(schedule.times()))
 }
 
 /// The task of two files.
