@@ -230,9 +230,14 @@ pub(crate) struct RunArgs {
     /// How many of them for a better plan than the first
     #[arg(long, value_name = "N", default_value_t = 2_000)]
     pub(crate) improve_states: u64,
-    /// The world to execute in (docs/formats/world.md); without it, everything goes as planned
-    #[arg(long, value_name = "WORLD.toml")]
+    /// The world to execute in (docs/formats/world.md), or `spoiler`: one that lets each action of
+    /// the plan end when that is worst; without it, everything goes as planned
+    #[arg(long, value_name = "WORLD.toml|spoiler")]
     pub(crate) world: Option<PathBuf>,
+    /// The box inside which the spoiler chooses durations: `"dur_0=[8,14]"`; by default the plan's
+    /// envelope
+    #[arg(long, value_name = "BOX", requires = "world")]
+    pub(crate) spoil: Option<String>,
     /// A program that is the world, and talks JSON Lines (docs/formats/world-protocol.md)
     #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
     pub(crate) world_process: Option<String>,
@@ -304,6 +309,11 @@ pub(crate) struct RunArgs {
 }
 
 impl RunArgs {
+    /// Whether the world is the spoiler.
+    pub(crate) fn is_spoiled(&self) -> bool {
+        self.world.as_deref() == Some(std::path::Path::new("spoiler"))
+    }
+
     /// What to leave open, and what not.
     pub(crate) fn specifications(&self) -> Vec<String> {
         let controllable = controllable(&self.controllable);
@@ -329,6 +339,7 @@ const IN_THE_TRACE: &[&str] = &[
     "planner_states",
     "improve_states",
     "world",
+    "spoil",
     "world_process",
     "answer_within",
     "strict_world",

@@ -105,6 +105,8 @@ fn failures_as_planned(subject: &Subject) -> Vec<String> {
     let label = format!("{} {}", subject.family, subject.name);
     let ready = match Ready::new(subject, SEARCH) {
         Ok(ready) => ready,
+        // Numbers that change in nonlinear ways are refused by name, which is no failure.
+        Err(why) if why == "beyond exact analysis" => return Vec::new(),
         Err(why) => return vec![format!("{label}: {why}")],
     };
     let failed = KEEP.iter().filter_map(|executor| {

@@ -10,19 +10,19 @@ mod trace_file;
 use std::sync::Arc;
 
 use elbowroom::envelope::Guarantee;
-use elbowroom::execute::{Analyst, WholeRegion, check_vary};
+use elbowroom::execute::{Analyst, Spoiling, WholeRegion, check_vary};
 use elbowroom::execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom::execution::run::{
     PlanningTime, Ports, Report, Run, RunSettings, RunningRule, Verdict,
 };
-use elbowroom::execution::{Odds, Planner, Recorder, World};
-use elbowroom::flow;
+use elbowroom::execution::{Need, Odds, Planner, Preparer, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::Source;
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::report::trace;
-use elbowroom::sim::{SimWorld, Unreliable, WorldModel};
+use elbowroom::sim::{Paced, SimWorld, Unreliable, WorldModel};
+use elbowroom::{flow, parse_box};
 use serde_json::{Value, json};
 
 use crate::args::{RunArgs, RunningChoice};
@@ -150,12 +150,52 @@ impl Job<'_> {
             .with(self.arguments, &self.texts, choices, model, interrupt, run)
     }
 
+    /// A run in a world that lets each action end when that is worst, inside the box that is given,
+    /// or inside the plan's envelope.
+    fn spoiled(&self, recorder: &mut dyn Recorder) -> Result<Report, Failure> {
+        let arguments = self.arguments;
+        let Some(first) = &self.first else {
+            return Err(Failure::new(
+                "there is no plan for --world spoiler to spoil",
+                "give one with --plan",
+            ));
+        };
+        if arguments.realtime.is_some() {
+            let what = "--world spoiler has no wall clock";
+            return Err(Failure::new(what, "leave out --realtime"));
+        }
+        let mut analyst = Analyst::new(self.choices.flow.clone());
+        let prepared = analyst.prepare(&self.task, first, Need::OpenNetwork);
+        let prepared = prepared.map_err(|error| Failure::new(error, ""))?;
+        let envelope = match (&arguments.spoil, prepared.envelope) {
+            (Some(text), _) => parse_box(text, &prepared.plan)
+                .map_err(|error| Failure::new(format!("--spoil: {error}"), ""))?,
+            (None, Some(envelope)) => envelope,
+            (None, None) => {
+                let what = "the plan has no envelope to spoil it in";
+                return Err(Failure::new(what, "give a box with --spoil"));
+            }
+        };
+        let network = prepared.plan.uncertain_network(&envelope).map_err(|_| {
+            let what = "in this box nothing satisfies the plan's constraints";
+            Failure::new(what, "give a smaller box with --spoil")
+        })?;
+        let model = WorldModel::as_planned();
+        let sim = SimWorld::new(Arc::clone(&self.task), &model, arguments.seed);
+        let spoiling = Spoiling::new(&prepared.plan.plan, &network, &prepared.nominal);
+        let mut world = Paced::new(sim, spoiling);
+        Ok(self.run(&mut world, Some(&model), None, recorder))
+    }
+
     fn simulated(
         &self,
         world: Option<&str>,
         recorder: &mut dyn Recorder,
     ) -> Result<Report, Failure> {
         let arguments = self.arguments;
+        if arguments.is_spoiled() {
+            return self.spoiled(recorder);
+        }
         let model = match world {
             Some(text) => WorldModel::read(text, self.task.problem()).map_err(|error| {
                 let path = arguments
@@ -333,7 +373,7 @@ fn time_triggered(task: &mut Task, path: &std::path::Path) -> Result<TimeTrigger
 }
 
 fn world_text(arguments: &RunArgs) -> Result<Option<String>, Failure> {
-    let Some(path) = &arguments.world else {
+    let Some(path) = arguments.world.as_ref().filter(|_| !arguments.is_spoiled()) else {
         return Ok(None);
     };
     let source = input::source(path, "world")?;

@@ -7,6 +7,7 @@ use elbowroom_stn::WindowEnd;
 
 use super::{Dispatch, explain, is_instantaneous};
 use crate::executor::{Decided, Decision, Moment, Order, StepId};
+use crate::horizon::Horizon;
 use crate::progression::Progression;
 use crate::reason::{Cause, Reason};
 
@@ -58,6 +59,9 @@ impl Dispatch {
         }
         for &id in &self.progress.running {
             let node = self.awaited(id);
+            if self.was_told_in_time(id) {
+                continue;
+            }
             if let Some(latest) = self.horizon.window(network_node(node)).1 {
                 wake_at(latest.max(now.clone()) + &self.epsilon, node);
             }
@@ -157,6 +161,18 @@ impl Dispatch {
         }
     }
 
+    /// Whether an instance was told to start in time, and nobody has said that it did: reports can
+    /// be lost, and when it did start is known from its end at the latest, or from the silence.
+    fn was_told_in_time(&self, id: InstanceId) -> bool {
+        let start = network_node(self.ends[id.index()][0]);
+        let is_dispatchable = matches!(self.horizon, Horizon::Dispatchable(_));
+        is_dispatchable
+            && self.told.get(&id).is_some_and(|told| {
+                let latest = self.horizon.window(start).1;
+                latest.is_none_or(|latest| *told <= latest)
+            })
+    }
+
     /// What should have happened by now and has not.
     ///
     /// The windows are exact, so comparing each time point that is awaited with its own window
@@ -166,6 +182,9 @@ impl Dispatch {
         let now = self.local(moment.now);
         for &id in &self.progress.running {
             let node = self.awaited(id);
+            if self.was_told_in_time(id) {
+                continue;
+            }
             let latest = self.horizon.window(network_node(node)).1;
             let Some(latest) = latest.filter(|latest| *latest < now) else {
                 continue;

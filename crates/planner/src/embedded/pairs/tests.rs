@@ -120,7 +120,12 @@ impl Draft {
         for fact in (0..5).filter(|fact| self.initial >> fact & 1 == 1) {
             write!(problem, " (f{fact})").expect("strings take all");
         }
+        // What happens at one time has no order, so nothing may become true and false then.
+        let mut said = std::collections::BTreeSet::new();
         for &(time, fact, truth) in &self.timed {
+            if !said.insert((time, fact)) {
+                continue;
+            }
             problem += &written(&[(fact, truth)], &format!("at {time}"));
         }
         let goal = written(&self.goal, "and");

@@ -196,7 +196,12 @@ impl Draft {
                 .concat()
         };
         let mut initial = facts(self.initial) + "(= (store) 2) (= (cost) 0)";
+        // What happens at one time has no order, so nothing may become true and false then.
+        let mut said = std::collections::BTreeSet::new();
         for (time, fact, truth) in &self.timed {
+            if !said.insert((time, fact)) {
+                continue;
+            }
             let literal = written(&[(*fact, *truth)], "");
             write!(initial, " (at {time}{literal})").expect("as written above");
         }
