@@ -8,6 +8,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
+use super::limits::FARTHER;
 use super::search::flow;
 use crate::answers::{Exact, RequestError, Watcher};
 use crate::flow::FlowError;
@@ -96,10 +97,18 @@ fn unknown(
             let Some(reach) = end.reach(envelope) else {
                 continue;
             };
-            let farther = end.with_reach(envelope, Some(reach + step));
-            let objection = oracle.objection(&farther).map_err(FlowError::Refused)?;
-            if let Some(Objection::Uncontrollable(conflict)) = objection {
-                unknown.extend(conflict.ends().iter().map(|end| end.parameter));
+            // An end that has room for one step may still be stopped by the next larger one.
+            let mut distance = step.clone();
+            for _ in 0..=FARTHER {
+                let farther = end.with_reach(envelope, Some(&reach + &distance));
+                match oracle.objection(&farther).map_err(FlowError::Refused)? {
+                    None => distance = &distance + &distance,
+                    Some(Objection::Uncontrollable(conflict)) => {
+                        unknown.extend(conflict.ends().iter().map(|end| end.parameter));
+                        break;
+                    }
+                    Some(_) => break,
+                }
             }
         }
     }

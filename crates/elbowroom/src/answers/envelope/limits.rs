@@ -11,7 +11,7 @@ use crate::answers::Watcher;
 /// By what part of the precision a sharpened end is moved to see what it touches.
 const SHARP: i64 = 1_000_000_000;
 /// How often the step is doubled to see what stops an end.
-const FARTHER: usize = 3;
+pub(super) const FARTHER: usize = 3;
 
 /// For each parameter, what keeps the lower and the upper end of its interval; `None` if nothing
 /// does, or if there is no time left to ask.
