@@ -44,7 +44,8 @@ const SUPPORTED: &[(&str, &str)] = &[
     ),
     (
         "Timed initial literals and fluents",
-        "`(at 10 (p))`, `(at 10 (not (p)))`, `(at 10 (= (f) 3))`",
+        "`(at 10 (p))`, `(at 10 (not (p)))`, `(at 10 (= (f) 3))`; two that contradict each other at \
+         one time are a mistake in the problem",
     ),
     ("Derived predicates", "stratified rules"),
     ("Metrics", "read; they have no bearing on validity"),
