@@ -7,8 +7,8 @@
 //! ```
 //! use elbowroom::network::{Request, Verdict, examine, read};
 //!
-//! let text = "# KIND OF NETWORK\nSTNU\n# Time-Point Names\nbrewed drunk cooled\n\
-//!             # Ordinary Edges\ndrunk 0 cooled\n# Contingent Links\nbrewed 5 9 cooled\n";
+//! let text = "# KIND OF NETWORK\nSTNU\n# Time-Point Names\nbrewed drunk cooled\n# \
+//!             Ordinary Edges\ndrunk 0 cooled\n# Contingent Links\nbrewed 5 9 cooled\n";
 //! let file = read("tea.plainstnu", text.as_bytes())?;
 //! let answer = examine(&file, &Request::default())?;
 //! assert_eq!(answer.dynamic.map(|promise| promise.verdict), Some(Verdict::Yes));

@@ -1,5 +1,10 @@
 //! How long the questions about a network take. `cargo bench -p elbowroom-network`
 
+#![allow(
+    clippy::print_stdout,
+    reason = "a benchmark says what it measures, or that it is skipped"
+)]
+
 use std::path::Path;
 
 use divan::Bencher;
