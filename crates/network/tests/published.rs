@@ -1,5 +1,7 @@
 //! Networks as their authors published them, where they are there.
 
+#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
