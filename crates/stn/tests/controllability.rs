@@ -1,6 +1,13 @@
 //! Dynamic controllability against a game that is played out in full, and the dispatcher against
 //! worlds of all kinds.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::too_many_lines,
+    clippy::type_complexity,
+    reason = "the helpers of a test are part of it"
+)]
+
 mod game;
 
 use std::sync::Arc;
@@ -125,9 +132,8 @@ fn execute(
             let upper = link.upper.unwrap_or(link.lower + 50);
             match world {
                 World::Early => link.lower,
-                World::Late => upper,
                 World::Corners if random.below(2) == 0 => link.lower,
-                World::Corners => upper,
+                World::Late | World::Corners => upper,
                 World::Anyhow => random.whole(link.lower, upper),
             }
         })

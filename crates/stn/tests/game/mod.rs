@@ -177,7 +177,7 @@ impl Game<'_> {
     }
 }
 
-/// A generator of random numbers (SplitMix64), the same on every machine.
+/// A generator of random numbers (`SplitMix64`), the same on every machine.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
