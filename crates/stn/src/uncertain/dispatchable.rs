@@ -118,7 +118,7 @@ impl<W: Weight> Dispatchable<W> {
                 continue;
             }
             self.before[later.index()].push(first);
-            if !self.network.is_contingent(first) {
+            if !self.is_up_to_the_world(first) {
                 self.not_after[later.index()].push((first, edge));
             }
         }
