@@ -11,10 +11,10 @@ fuzz_target!(|bytes: &[u8]| {
     let problem = Source::new("problem.pddl", include_str!("../fixed/problem.pddl"));
     let (problem, _) = read_problem(&domain, &problem).expect("the fixed texts are right");
     let mut task = Task::new(problem);
-    match read_plan(&Source::from_bytes("plan", bytes), &mut task) {
+    match read_plan(&Source::from_bytes("plan", bytes), &task) {
         Ok((mut plan, _)) => {
             let written = write_plan(&task, &plan);
-            let (again, _) = read_plan(&Source::new("written", written), &mut task)
+            let (again, _) = read_plan(&Source::new("written", written), &task)
                 .expect("what is written is right");
             plan.steps.sort_by(|a, b| a.start.cmp(&b.start));
             assert_eq!(again, plan);

@@ -12,11 +12,11 @@ fuzz_target!(|bytes: &[u8]| {
     let problem = Source::new("problem.pddl", include_str!("../fixed/problem.pddl"));
     let (problem, _) = read_problem(&domain, &problem).expect("the fixed texts are right");
     let mut task = Task::new(problem);
-    match format::read(bytes, &mut task) {
+    match format::read(bytes, &task) {
         Ok(plan) => {
             let written = format::write(&task, &plan).expect("what was read can be written");
             let again =
-                format::read(written.as_bytes(), &mut task).expect("what is written is right");
+                format::read(written.as_bytes(), &task).expect("what is written is right");
             // Bounds on the same difference are merged the first time.
             let rewritten = format::write(&task, &again).expect("what was read can be written");
             assert_eq!(rewritten, written);

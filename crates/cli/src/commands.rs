@@ -6,4 +6,5 @@ pub(crate) mod envelope;
 pub(crate) mod network;
 pub(crate) mod plan;
 pub(crate) mod run;
+pub(crate) mod shell;
 pub(crate) mod stn;

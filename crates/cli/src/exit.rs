@@ -3,6 +3,11 @@
 use std::fmt::{self, Write as _};
 use std::process::ExitCode;
 
+use elbowroom::text::{Diagnostics, Record};
+use serde::Serialize;
+
+use crate::output::counted;
+
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Exit {
@@ -27,37 +32,84 @@ impl From<Exit> for ExitCode {
 }
 
 /// Why there is no answer: the input cannot be understood, or the outside world failed.
-///
-/// What it says goes to standard error as it stands, so it brings its own `error: `.
-#[derive(Debug)]
-pub(crate) struct Failure(String);
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Failure {
+    /// What is wrong, in lower case.
+    message: String,
+    /// What to do.
+    advice: Option<String>,
+    /// Where it is wrong, if it is a text.
+    diagnostics: Vec<Record>,
+    /// What a terminal shows.
+    #[serde(skip)]
+    text: String,
+}
 
 /// The answer to a command, already printed; or why there is none.
 pub(crate) type Answer = Result<Exit, Failure>;
 
+/// A failure as a document: `docs/formats/diagnostics.md`.
+#[derive(Serialize)]
+pub(crate) struct FailureDocument<'a> {
+    format: &'static str,
+    version: u32,
+    #[serde(flatten)]
+    failure: &'a Failure,
+}
+
 impl Failure {
     /// A failure with what to do about it.
-    pub(crate) fn new(message: impl fmt::Display, help: impl fmt::Display) -> Self {
-        let help = help.to_string();
-        let mut text = format!(
-            "{}: {message}",
-            crate::look::styled(crate::look::BAD, "error")
-        );
-        if !help.is_empty() {
+    pub(crate) fn new(message: impl fmt::Display, advice: impl fmt::Display) -> Self {
+        let (message, advice) = (message.to_string(), advice.to_string());
+        let label = crate::look::styled(crate::look::BAD, "error");
+        let mut text = format!("{label}: {message}");
+        if !advice.is_empty() {
             let label = crate::look::styled(crate::look::HINT, "help");
-            let _ = write!(text, "\n  {label}: {help}");
+            let _ = write!(text, "\n  {label}: {advice}");
         }
-        Self(text)
+        Self {
+            message,
+            advice: (!advice.is_empty()).then_some(advice),
+            diagnostics: Vec::new(),
+            text,
+        }
     }
 
-    /// A failure that says everything itself.
-    pub(crate) fn rendered(text: String) -> Self {
-        Self(text)
+    /// The same with advice, if it has none of its own.
+    pub(crate) fn advised(mut self, advice: &str) -> Self {
+        if self.advice.is_none() {
+            let label = crate::look::styled(crate::look::HINT, "help");
+            let _ = write!(self.text, "\n  {label}: {advice}");
+            self.advice = Some(advice.to_owned());
+        }
+        self
+    }
+
+    /// What `--json` prints.
+    pub(crate) fn document(&self) -> FailureDocument<'_> {
+        FailureDocument {
+            format: "elbowroom-failure",
+            version: 1,
+            failure: self,
+        }
+    }
+}
+
+/// A text cannot be used.
+impl From<Diagnostics> for Failure {
+    fn from(diagnostics: Diagnostics) -> Self {
+        let count = counted(diagnostics.errors().count(), "error");
+        Self {
+            message: count.clone(),
+            advice: None,
+            diagnostics: diagnostics.records(),
+            text: format!("{}\n\n{count}", diagnostics.render(true)),
+        }
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.text)
     }
 }

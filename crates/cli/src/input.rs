@@ -1,52 +1,54 @@
 //! Reading files.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, ErrorKind, IsTerminal, Read};
 use std::path::Path;
-use std::sync::Arc;
 
 use elbowroom::PlanKind;
 use elbowroom::model::validate::Violation;
 use elbowroom::model::{Problem, Task};
+use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
-use elbowroom::plan::format::{self, FormatErrors};
+use elbowroom::plan::format;
 
 pub(crate) use elbowroom::AnyPlan;
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
-use crate::look::{BAD, HINT, styled};
+use crate::look::{HINT, styled};
 use crate::output::{self, plain};
 
 /// Larger than any plan or problem, smaller than memory.
 const LARGEST_FILE: u64 = 256 << 20;
 
 /// Reads domain and problem. Warnings go to standard error.
-pub(crate) fn task(arguments: &ProblemArgs) -> Result<Task, Failure> {
-    Ok(task_with_sources(arguments)?.0)
+pub(crate) fn task(arguments: &ProblemArgs, epsilon: &Rational) -> Result<Task, Failure> {
+    Ok(task_with_sources(arguments, epsilon)?.0)
 }
 
 /// The same, with the texts of domain and problem.
 pub(crate) fn task_with_sources(
     arguments: &ProblemArgs,
+    epsilon: &Rational,
 ) -> Result<(Task, Source, Source), Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
     let read: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
-    Ok((Task::new(Arc::new(read)), domain, problem))
+    Ok((
+        Task::new(read).with_epsilon(epsilon.clone()),
+        domain,
+        problem,
+    ))
 }
 
 /// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
-pub(crate) fn any_plan(task: &mut Task, path: &Path) -> Result<AnyPlan, Failure> {
+pub(crate) fn any_plan(task: &Task, path: &Path) -> Result<AnyPlan, Failure> {
     let text = source(path, "plan")?;
     let is_stn_name = path
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("stn"));
     if is_stn_name || PlanKind::of_text(text.text()) == PlanKind::Stn {
-        let plan = format::read(text.text().as_bytes(), task)
-            .map_err(|errors| Failure::rendered(stn_mistakes(&text, &errors)))?;
-        return Ok(AnyPlan::Stn(plan));
+        return Ok(AnyPlan::Stn(format::read(&text, task)?));
     }
     let plan = with_warnings(pddl::read_plan(&text, task))?;
     Ok(AnyPlan::TimeTriggered(plan))
@@ -61,40 +63,6 @@ pub(crate) fn tell_repair(path: &Path, violation: &Violation) {
         path.display(),
         styled(HINT, "note"),
     ));
-}
-
-/// The mistakes in an STN plan file, with excerpts.
-fn stn_mistakes(text: &Source, errors: &FormatErrors) -> String {
-    let mut shown = String::new();
-    for error in &errors.errors {
-        let line = error.line.to_string();
-        let margin = " ".repeat(line.len());
-        let carets = "^".repeat(error.length.max(1));
-        let offset = " ".repeat(error.column.saturating_sub(1));
-        let _ = write!(
-            shown,
-            "{}: {}\n{margin}--> {}:{}:{}\n",
-            styled(BAD, "error"),
-            error.message,
-            text.name(),
-            error.line,
-            error.column,
-        );
-        // An excerpt of a long line does not start at its first column.
-        if error.column <= error.excerpt.chars().count() + 1 {
-            let expected = error.expected.as_deref().unwrap_or_default();
-            let _ = write!(
-                shown,
-                "{margin} |\n{line} | {}\n{margin} | {offset}{carets} {expected}\n",
-                error.excerpt
-            );
-        } else if let Some(expected) = &error.expected {
-            let _ = writeln!(shown, "{margin} = {expected}");
-        }
-        shown.push('\n');
-    }
-    shown.push_str(&output::counted(errors.errors.len(), "error"));
-    shown
 }
 
 /// Reads a text file, or standard input for `-`.
@@ -153,7 +121,7 @@ fn advice(path: &Path, what: &str, error: &io::Error) -> String {
                 }
                 _ => similar_file(path).map_or_else(
                     || match what {
-                        "domain" | "problem" | "plan" => {
+                        "domain" | "problem" => {
                             "check the path; the order is DOMAIN PROBLEM PLAN".to_owned()
                         }
                         _ => "check the path".to_owned(),
@@ -194,17 +162,9 @@ fn similar_file(path: &Path) -> Option<String> {
 pub(crate) fn with_warnings<T>(
     outcome: Result<(T, Vec<Diagnostic>), Diagnostics>,
 ) -> Result<T, Failure> {
-    match outcome {
-        Ok((value, warnings)) => {
-            for warning in &warnings {
-                output::tell(&format!("{}\n", warning.render(true)));
-            }
-            Ok(value)
-        }
-        Err(diagnostics) => Err(Failure::rendered(format!(
-            "{}\n\n{}",
-            diagnostics.render(true),
-            output::counted(diagnostics.errors().count(), "error")
-        ))),
+    let (value, warnings) = outcome?;
+    for warning in &warnings {
+        output::warn_about(warning);
     }
+    Ok(value)
 }

@@ -28,17 +28,22 @@ use exit::Exit;
 
 fn main() -> ExitCode {
     bug::install_hook();
-    let answer = match CommandLine::parse().command {
+    let CommandLine { color, command } = CommandLine::parse();
+    anstream::ColorChoice::from(color).write_global();
+    let as_json = command.is_json();
+    let answer = match command {
         Command::Check(arguments) => commands::check::run(&arguments),
         Command::Plan(arguments) => commands::plan::run(&arguments),
         Command::Stn(arguments) => commands::stn::run(&arguments),
         Command::Envelope(arguments) => commands::envelope::run(&arguments),
         Command::Compare(arguments) => commands::compare::run(&arguments),
         Command::Network(arguments) => commands::network::run(&arguments),
+        Command::Completions(arguments) => commands::shell::completions(&arguments),
+        Command::Man(arguments) => commands::shell::man(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments),
     };
     let exit = answer.unwrap_or_else(|failure| {
-        output::tell(&failure.to_string());
+        output::fail(&failure, as_json);
         Exit::BadInput
     });
     exit.into()

@@ -1,8 +1,10 @@
 //! Standard output and standard error.
 
+use std::cell::{Cell, RefCell};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
+use elbowroom::text::{Diagnostic, Record};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -19,16 +21,52 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     survive(written, "standard output")
 }
 
-/// Writes one JSON document to standard output.
+thread_local! {
+    /// The warnings that were printed, for the document that `--json` asks for.
+    static WARNINGS: RefCell<Vec<Record>> = const { RefCell::new(Vec::new()) };
+    /// Whether standard output has its document.
+    static HAS_DOCUMENT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Writes one JSON document to standard output, with the warnings that were printed before.
 pub(crate) fn print_json(document: &Value) -> Result<(), Failure> {
+    let warnings = WARNINGS.take();
+    HAS_DOCUMENT.set(true);
+    if let (Value::Object(members), false) = (document, warnings.is_empty())
+        && !members.contains_key(DIAGNOSTICS)
+    {
+        let mut members = members.clone();
+        let warnings = serde_json::to_value(warnings).unwrap_or_default();
+        members.insert(DIAGNOSTICS.to_owned(), warnings);
+        return print(&format!("{:#}\n", Value::Object(members)));
+    }
     print(&format!("{document:#}\n"))
 }
 
+/// The member of documents that lists warnings, and what is wrong in a text.
+const DIAGNOSTICS: &str = "diagnostics";
+
 /// Writes an answer to standard output, as one JSON document.
 pub(crate) fn print_document(answer: &impl Serialize) -> Result<(), Failure> {
-    let text = serde_json::to_string_pretty(answer)
+    let document = serde_json::to_value(answer)
         .map_err(|error| Failure::new(format!("cannot write the answer as JSON: {error}"), ""))?;
-    print(&format!("{text}\n"))
+    print_json(&document)
+}
+
+/// Writes why there is no answer to standard error and, if a program is to read it and there is no
+/// document yet, as one to standard output.
+pub(crate) fn fail(failure: &Failure, as_json: bool) {
+    tell(&failure.to_string());
+    if as_json && !HAS_DOCUMENT.get() {
+        // That standard output cannot be written to is told by the exit code.
+        let _ = print_document(&failure.document());
+    }
+}
+
+/// Writes a warning about a text to standard error.
+pub(crate) fn warn_about(warning: &Diagnostic) {
+    tell(&format!("{}\n", warning.render(true)));
+    WARNINGS.with_borrow_mut(|warnings| warnings.push(warning.record()));
 }
 
 /// Writes text to standard error. There is nobody to tell when that fails.

@@ -7,6 +7,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Searches that end sooner than this show no line at all.
 const PATIENCE: Duration = Duration::from_millis(200);
 
+/// How often the line turns.
+const TURN: Duration = Duration::from_millis(250);
+
 /// A line on standard error that overwrites itself and vanishes at the end.
 pub(crate) struct Progress {
     line: Option<ProgressBar>,
@@ -26,7 +29,10 @@ impl Progress {
         let line = self.line.get_or_insert_with(|| {
             let style = ProgressStyle::with_template("{spinner} {wide_msg}")
                 .expect("a template without mistakes");
-            ProgressBar::new_spinner().with_style(style)
+            let line = ProgressBar::new_spinner().with_style(style);
+            // It turns also while nothing new is told.
+            line.enable_steady_tick(TURN);
+            line
         });
         line.set_message(message());
         line.tick();

@@ -4,7 +4,10 @@
 
 #[path = "../../elbowroom/tests/shared/rounds.rs"]
 mod rounds;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -108,7 +111,7 @@ fn ends_the_search_with_the_best_box_so_far(name: &str, signal: u32) {
 fn a_terminal_shows_how_the_search_is_getting_on() {
     let version = Command::new("script").arg("--version").output();
     if !version.is_ok_and(|output| output.stdout.starts_with(b"script from util-linux")) {
-        println!("skipped: there is no `script` of util-linux here");
+        skipped("there is no `script` of util-linux here");
         return;
     }
     let quoted = |text: String| format!("'{text}'");

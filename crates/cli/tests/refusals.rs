@@ -140,20 +140,16 @@ fn experiment(folder: &Path, changes: &[(&str, &str)]) -> String {
 fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
     let folder = folder("empty-experiments");
     let cases = [
-        (
-            "trials = 6",
-            "trials = 0",
-            "line 6: make at least one trial",
-        ),
+        ("trials = 6", "trials = 0", "make at least one trial"),
         (
             "executors = [\"guarded\", \"live\", \"fixed:10\"]",
             "executors = []",
-            "line 7: name at least one",
+            "name at least one",
         ),
         (
             "[[column]]",
             "[blanks]\nfoo = []\n[[column]]",
-            "line 13: give the blank",
+            "give the blank",
         ),
         (
             "[[column]]",
@@ -163,13 +159,14 @@ fn experiments_that_would_make_an_empty_or_wrong_table_are_refused() {
         (
             "trials = 6",
             "trials = 6\nplanner_time = 5",
-            "line 7: `planner_time` is for another",
+            "`planner_time` is for another",
         ),
     ];
     for (from, to, words) in cases {
         let file = experiment(&folder, &[(from, to)]);
         let said = refusal(&["compare", &file]);
         assert!(said.contains(words), "{to}: {said}");
+        assert!(said.contains("experiment.toml:"), "{to}: {said}");
     }
     for (figures, words) in [
         (
@@ -259,4 +256,92 @@ fn a_folder_that_cannot_be_written_is_told_before_the_trials() {
     let table = String::from_utf8(output.stdout).expect("text");
     assert!(table.contains("guarded"), "{table}");
     fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
+fn numbers_below_zero_are_refused_as_numbers() {
+    let said = refusal(&[
+        "envelope",
+        "cases/delivery/domain.pddl",
+        "cases/delivery/problem.pddl",
+        "cases/delivery/plan.plan",
+        "--precision",
+        "-1",
+    ]);
+    assert!(said.contains("greater than 0"), "{said}");
+}
+
+#[test]
+fn nothing_is_to_be_installed_that_has_the_name_of_a_typo() {
+    let output = elbowroom(&[&RUN[..], &["--planner", "up:nosuch"]].concat());
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("up:nosuch"), "{said}");
+    assert!(!said.contains("up-nosuch"), "{said}");
+}
+
+#[test]
+fn a_file_that_is_no_trace_is_told_so() {
+    let said = refusal(&["run", "--replay", "cases/delivery/plan.plan"]);
+    assert!(said.contains("no trace of a run"), "{said}");
+}
+
+#[test]
+fn a_plan_that_is_not_there_is_not_taken_for_a_wrong_order() {
+    let said = refusal(&[&RUN[..], &["--plan", "nope.plan"]].concat());
+    assert!(!said.contains("DOMAIN PROBLEM PLAN"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_left_open_says_what_can() {
+    for (spec, words) in [
+        ("deadlin (counter-open office)", "did you mean `deadline`?"),
+        ("initial battery rover", "`initial (battery rover)`"),
+    ] {
+        let said = refusal(&[
+            "envelope",
+            "cases/delivery/domain.pddl",
+            "cases/delivery/problem.pddl",
+            "cases/delivery/plan.plan",
+            "--vary",
+            spec,
+        ]);
+        assert!(said.contains(words), "{spec}: {said}");
+    }
+}
+
+#[test]
+fn a_misspelt_key_of_a_world_is_shown_with_the_one_that_was_meant() {
+    let folder = folder("misspelt-key");
+    let world = folder.join("world.toml");
+    let text = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\nactoin = \"drive\"\n";
+    fs::write(&world, text).expect("a file can be written");
+    let world = world.display().to_string();
+    let said = refusal(&[&RUN[..], &["--world", &world]].concat());
+    assert!(said.contains("did you mean `action`?"), "{said}");
+    assert!(said.contains(":4:1"), "{said}");
+    fs::remove_dir_all(folder).expect("it was there");
+}
+
+/// With `--json`, a program is told what a person is told.
+#[test]
+fn a_failure_is_a_document_where_one_is_asked_for() {
+    let output = elbowroom(&[
+        "check",
+        "crates/cli/tests/files/misspelt.pddl",
+        "cases/delivery/problem.pddl",
+        "--json",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    let document: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(document["format"], "elbowroom-failure");
+    let first = &document["diagnostics"][0];
+    assert_eq!(first["severity"], "error");
+    for member in ["line", "column", "length"] {
+        assert!(first[member].as_u64().is_some(), "{member}: {first}");
+    }
+    for member in ["file", "message"] {
+        assert!(first[member].as_str().is_some(), "{member}: {first}");
+    }
 }

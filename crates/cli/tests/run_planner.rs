@@ -2,11 +2,14 @@
 #![cfg(unix)]
 
 mod command;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 
 use std::fs;
 use std::path::PathBuf;
 
 use command::{elbowroom, root};
+use skipped::skipped;
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
@@ -101,7 +104,7 @@ fn an_experiment_can_have_another_planner() {
 #[test]
 fn lpg_makes_a_new_plan_in_the_middle() {
     if std::env::var_os("ELBOWROOM_LPG").is_none() {
-        println!("skipped: ELBOWROOM_LPG is not set");
+        skipped("ELBOWROOM_LPG is not set");
         return;
     }
     // LPG-td does not read empty conditions.

@@ -1,11 +1,14 @@
 //! Worlds that are processes, and runs that are killed.
 
 mod command;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 
 use std::fs;
 use std::process::{Command, Output};
 
 use command::{elbowroom, root};
+use skipped::skipped;
 
 const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
 
@@ -18,7 +21,7 @@ fn temporary(name: &str) -> String {
 #[test]
 fn the_example_world_delivers_the_parcel() {
     if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no python3");
+        skipped("there is no python3");
         return;
     }
     let trace = temporary("world.jsonl");
@@ -44,7 +47,7 @@ fn the_example_world_delivers_the_parcel() {
 #[test]
 fn the_example_world_reports_a_cancel_at_once() {
     if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no python3");
+        skipped("there is no python3");
         return;
     }
     let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--json"];
@@ -178,7 +181,7 @@ fn every_fact_of_the_problem_may_be_reported() {
     ] {
         let first = format!(r#"{{"type":"fact","fact":"{fact}","becomes":{truth},"time":0}}"#);
         let Some((output, trace)) = example_that_says(name, &first, &["--strict-world"]) else {
-            eprintln!("skipped: there is no python3");
+            skipped("there is no python3");
             return;
         };
         assert!(output.status.success(), "{fact}: {output:?}");
@@ -208,7 +211,7 @@ fn what_cannot_be_understood_is_a_remark_in_the_trace() {
         r#"{"type":"dance","time":0}"#.to_owned(),
     ] {
         let Some((output, trace)) = example_that_says("slip", &first, &[]) else {
-            eprintln!("skipped: there is no python3");
+            skipped("there is no python3");
             return;
         };
         assert!(output.status.success(), "{first}: {output:?}");
@@ -236,7 +239,7 @@ fn what_a_world_says_is_shown_tame_and_wrapped() {
     let first =
         format!(r#"{{"type":"ended","ticket":0,"outcome":"failed","why":"{why}","time":0}}"#);
     let Some((output, trace)) = example_that_says("rude", &first, &[]) else {
-        eprintln!("skipped: there is no python3");
+        skipped("there is no python3");
         return;
     };
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

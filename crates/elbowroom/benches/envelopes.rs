@@ -20,7 +20,6 @@ use divan::Bencher;
 use elbowroom::flow;
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_plan::{ParametrizedPlan, format};
 use shared::instances::{Instance, figure_3, figure_4};
@@ -49,9 +48,9 @@ fn read(name: &str) -> (Arc<Task>, Arc<ParametrizedPlan>) {
         .into_iter()
         .find(|i| i.name == name)
         .expect("a known instance");
-    let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
+    let task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
-    let plan = format::read(&bytes, &mut task).expect("a readable plan");
+    let plan = format::read(&bytes, &task).expect("a readable plan");
     (Arc::new(task), Arc::new(plan))
 }
 
@@ -62,8 +61,7 @@ fn search(
     guarantee: Guarantee,
     enough: usize,
 ) -> usize {
-    let mut oracle =
-        Oracle::new(task, plan, &Rational::new(1, 1000), guarantee).expect("within reach");
+    let mut oracle = Oracle::new(task, plan, guarantee).expect("within reach");
     let mut widenings = 0;
     let run = irr(&mut oracle, &Settings::default(), &mut |widening| {
         widenings += usize::from(widening.is_some());
@@ -94,11 +92,10 @@ fn delivery(parameters: usize) -> (Arc<Task>, Arc<ParametrizedPlan>) {
     let domain = Source::new("domain", shared::rounds::DOMAIN);
     let (problem, _) =
         read_problem(&domain, &Source::new("problem", problem)).expect("a readable problem");
-    let mut task = Task::new(problem);
-    let (plan, _) = read_plan(&Source::new("plan", plan), &mut task).expect("a readable plan");
-    let epsilon = Rational::new(1, 1000);
-    let freed = flow::free(&task, &plan, &epsilon).expect("a valid plan");
-    let plan = flow::open(&task, freed, &[], &epsilon).expect("durations to leave open");
+    let task = Task::new(problem);
+    let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
+    let freed = flow::free(&task, &plan).expect("a valid plan");
+    let plan = flow::open(&task, freed, &[]).expect("durations to leave open");
     assert_eq!(plan.parameters.len(), parameters);
     (Arc::new(task), Arc::new(plan))
 }

@@ -13,24 +13,26 @@
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
 //! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+//! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
 
 pub mod check;
 pub mod envelope;
-mod exact;
 mod format;
 pub mod plan;
+pub mod run;
 pub mod stn;
 mod violation;
 mod watch;
 
 pub use check::{CheckAnswer, CheckRequest};
+pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
-pub use exact::Exact;
 pub use format::Version;
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
+pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;
-pub use watch::{EnvelopeProgress, Event, Halt, PlanProgress, Unwatched, Watcher};
+pub use watch::{EnvelopeProgress, Event, Halt, PlanProgress, TrialsProgress, Unwatched, Watcher};
 
 use crate::box_text::BoxTextError;
 use crate::flow::FlowError;

@@ -1,26 +1,47 @@
-//! Boxes as text: `dur_0=[7/4,3829/4] dur_7=[0,inf]`.
+//! Boxes as text: `dur_0=[7/4,3829/4] (drive rover depot shelf)=12 all=±10%`.
 
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use elbowroom_text::nearest;
+
+/// What stands for every parameter.
+const ALL: &str = "all";
+
+/// So many parameters are listed where a name is unknown; of more only a similar one is told.
+const MOST_LISTED: usize = 12;
 
 /// A text is not a box of this plan's parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BoxTextError {
-    /// Something else than `name=[lower,upper]`.
+    /// Something else than a name with an interval.
     #[error(
-        "`{text}` is not an interval: write name=[lower,upper], such as d0=[1/2,7.5] or d0=[0,inf]"
+        "`{text}` is not an interval: write NAME=[LOWER,UPPER], NAME=VALUE or NAME=±10%, such as \
+         dur_0=[1/2,7.5], dur_0=[0,inf] or all=±10%"
     )]
     Syntax {
         /// What was found.
         text: String,
     },
     /// No parameter has that name.
-    #[error("there is no parameter `{name}`; the parameters are {known}")]
+    #[error("there is no parameter `{name}`; {}", .nearest.as_ref().map_or_else(
+        || format!("the parameters are {known}"),
+        |near| format!("did you mean `{near}`?"),
+    ))]
     Unknown {
         /// The name given.
         name: String,
         /// The names there are.
         known: String,
+        /// The one that was probably meant.
+        nearest: Option<String>,
+    },
+    /// Several parameters could be meant.
+    #[error("`{name}` could mean {}: write which", choices.join(", "))]
+    Ambiguous {
+        /// The name given.
+        name: String,
+        /// The names of those parameters.
+        choices: Vec<String>,
     },
     /// A parameter is mentioned twice.
     #[error("`{name}` is given two intervals: give it one")]
@@ -36,28 +57,52 @@ pub enum BoxTextError {
     },
 }
 
-/// Reads a box: `name=[lower,upper]` for some of the parameters, separated by spaces. The other
-/// parameters keep their nominal value.
+/// Reads a box: intervals for some of the parameters, separated by spaces. The other parameters
+/// keep their nominal value.
+///
+/// A parameter goes by its name (`dur_0`), and a duration also by its action,
+/// `(drive rover depot shelf)`, or the action's label (`n0`); `all` is every parameter that is not
+/// named itself. After `=` stands an interval `[5,12]`, one value `12`, or a deviation from the
+/// nominal value, `±10%` or `±2` (`+-` will do for `±`), which ends where the parameter's natural
+/// range does.
 ///
 /// # Errors
 /// When the text is not of that form, or names what is not a parameter of the plan.
 pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelope, BoxTextError> {
-    let mut envelope = DecoupledEnvelope::point(&plan.nominal());
-    let mut given = vec![false; plan.parameters.len()];
-    for item in items(text) {
-        let (name, interval) =
-            parse_item(&item).ok_or_else(|| BoxTextError::Syntax { text: item.clone() })?;
-        let id = plan.find(&name).ok_or_else(|| BoxTextError::Unknown {
-            name: name.clone(),
-            known: known(plan),
+    let mut given: Vec<Option<Interval>> = vec![None; plan.parameters.len()];
+    let mut of_all = None;
+    for (name, value) in items(text)? {
+        let value = parse_value(&value).ok_or_else(|| BoxTextError::Syntax {
+            text: format!("{name}={value}"),
         })?;
-        if std::mem::replace(&mut given[id.index()], true) {
-            return Err(BoxTextError::Twice { name });
-        }
+        let id = match find(&name, plan) {
+            Err(BoxTextError::Unknown { .. }) if name.eq_ignore_ascii_case(ALL) => {
+                if of_all.replace(value).is_some() {
+                    return Err(BoxTextError::Twice { name });
+                }
+                continue;
+            }
+            found => found?,
+        };
+        let interval = value.around(&plan.parameters[id.index()]);
         if interval.is_empty() {
             return Err(BoxTextError::Empty { name });
         }
-        envelope.intervals[id.index()] = interval;
+        if given[id.index()].replace(interval).is_some() {
+            return Err(BoxTextError::Twice { name });
+        }
+    }
+    let mut envelope = DecoupledEnvelope::point(&plan.nominal());
+    for (index, parameter) in plan.parameters.iter().enumerate() {
+        let own = given[index].take();
+        let interval = own.or_else(|| of_all.as_ref().map(|all| all.around(parameter)));
+        if let Some(interval) = interval {
+            if interval.is_empty() {
+                let name = parameter.name.clone();
+                return Err(BoxTextError::Empty { name });
+            }
+            envelope.intervals[index] = interval;
+        }
     }
     Ok(envelope)
 }
@@ -83,32 +128,139 @@ pub fn write_box(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Strin
     items.join(" ")
 }
 
-/// The text split after each `]`, with spaces taken out.
-fn items(text: &str) -> Vec<String> {
-    text.split_inclusive(']')
-        .map(|item| item.split_whitespace().collect::<String>())
-        .map(|item| item.trim_start_matches([',', ';']).to_owned())
-        .filter(|item| !item.is_empty())
-        .collect()
+/// Names with what stands after their `=`.
+fn items(text: &str) -> Result<Vec<(String, String)>, BoxTextError> {
+    let is_between = |c: char| c.is_whitespace() || matches!(c, ',' | ';');
+    let wrong = |text: &str| BoxTextError::Syntax {
+        text: text.trim().to_owned(),
+    };
+    let mut items = Vec::new();
+    let mut rest = text.trim_start_matches(is_between);
+    while !rest.is_empty() {
+        let (name, after) = rest.split_once('=').ok_or_else(|| wrong(rest))?;
+        let after = after.trim_start();
+        let end = if after.starts_with('[') {
+            after.find(']').map(|end| end + 1)
+        } else {
+            Some(after.find(is_between).unwrap_or(after.len()))
+        };
+        let end = end.ok_or_else(|| wrong(rest))?;
+        let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
+        let name = name.replace("( ", "(").replace(" )", ")");
+        if name.is_empty() {
+            return Err(wrong(rest));
+        }
+        let value = after[..end].split_whitespace().collect();
+        items.push((name, value));
+        rest = after[end..].trim_start_matches(is_between);
+    }
+    Ok(items)
 }
 
-fn parse_item(item: &str) -> Option<(String, Interval)> {
-    let (name, rest) = item.split_once('=')?;
-    let (lower, upper) = rest.strip_prefix('[')?.strip_suffix(']')?.split_once(',')?;
-    if name.is_empty() {
-        return None;
+/// What stands after the `=`.
+enum Value {
+    Interval(Interval),
+    /// So far from the nominal value, in both directions.
+    Deviation(Rational),
+    /// The same as a share of it.
+    Share(Rational),
+}
+
+fn parse_value(text: &str) -> Option<Value> {
+    let deviation = text.strip_prefix('±').or_else(|| text.strip_prefix("+-"));
+    if let Some(deviation) = deviation {
+        let number = |text: &str| {
+            let number: Option<Rational> = text.parse().ok();
+            number.filter(|number| !number.is_negative())
+        };
+        return match deviation.strip_suffix('%') {
+            Some(percent) => Some(Value::Share(number(percent)? / Rational::from(100))),
+            None => number(deviation).map(Value::Deviation),
+        };
     }
+    let Some(ends) = text.strip_prefix('[') else {
+        return text
+            .parse()
+            .ok()
+            .map(|value| Value::Interval(Interval::point(value)));
+    };
+    let (lower, upper) = ends.strip_suffix(']')?.split_once(',')?;
     let end = |text: &str, infinity: &[&str]| {
         if infinity.contains(&text) {
             return Some(End::Infinite);
         }
         text.parse::<Rational>().ok().map(End::Closed)
     };
-    let interval = Interval {
+    Some(Value::Interval(Interval {
         lower: end(lower, &["-inf"])?,
         upper: end(upper, &["inf", "+inf"])?,
+    }))
+}
+
+impl Value {
+    /// The values of the parameter that are meant.
+    fn around(&self, parameter: &Parameter) -> Interval {
+        let nominal = &parameter.nominal;
+        let reach = match self {
+            Self::Interval(interval) => return interval.clone(),
+            Self::Deviation(reach) => reach.clone(),
+            Self::Share(share) => &nominal.abs() * share,
+        };
+        let limit = |own: Rational, natural: Option<&Rational>, is_lower: bool| match natural {
+            Some(natural) if (own < *natural) == is_lower => natural.clone(),
+            _ => own,
+        };
+        let range = &parameter.range;
+        Interval {
+            lower: End::Closed(limit(nominal - &reach, range.lower.value(), true)),
+            upper: End::Closed(limit(nominal + &reach, range.upper.value(), false)),
+        }
+    }
+}
+
+/// The parameter of that name, or the duration of that action.
+fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
+    if let Some(id) = plan.find(name) {
+        return Ok(id);
+    }
+    let durations: Vec<(ParameterId, &str, &str)> = plan
+        .parameters
+        .iter()
+        .enumerate()
+        .filter_map(|(index, parameter)| match parameter.kind {
+            ParameterKind::Duration(id) => {
+                let instance = plan.plan.instance(id);
+                let names = (&*instance.action.name, &*instance.label);
+                Some((ParameterId::from(index), names.0, names.1))
+            }
+            _ => None,
+        })
+        .collect();
+    let is_meant = |(_, action, label): &&(ParameterId, &str, &str)| {
+        action.eq_ignore_ascii_case(name) || *label == name
     };
-    Some((name.to_owned(), interval))
+    let found: Vec<ParameterId> = durations.iter().filter(is_meant).map(|it| it.0).collect();
+    match found[..] {
+        [id] => Ok(id),
+        [] => {
+            // Names of parameters are alike, and a few of them are told as well as one of them.
+            let names = plan.parameters.iter().map(|parameter| &*parameter.name);
+            let names = names.filter(|_| plan.parameters.len() > MOST_LISTED);
+            let actions = durations.iter().map(|(_, action, _)| *action);
+            Err(BoxTextError::Unknown {
+                name: name.to_owned(),
+                known: known(plan),
+                nearest: nearest(name, names.chain(actions)).map(str::to_owned),
+            })
+        }
+        _ => Err(BoxTextError::Ambiguous {
+            name: name.to_owned(),
+            choices: found
+                .iter()
+                .map(|id| format!("`{}`", plan.parameters[id.index()].name))
+                .collect(),
+        }),
+    }
 }
 
 fn known(plan: &ParametrizedPlan) -> String {
@@ -145,6 +297,7 @@ mod tests {
             plan: StnPlan::default(),
             parameters: vec![parameter("d0"), parameter("d1")],
             initial: BTreeMap::new(),
+            told: BTreeMap::new(),
             goal: Condition::TRUE,
         }
     }
@@ -161,9 +314,30 @@ mod tests {
     }
 
     #[test]
+    fn a_value_and_a_deviation_are_intervals() {
+        let plan = plan();
+        for (text, expected) in [
+            ("d0=7", "d0=[7,7] d1=[5,5]"),
+            ("d0=±10% d1=+-2", "d0=[9/2,11/2] d1=[3,7]"),
+            ("all=±10%", "d0=[9/2,11/2] d1=[9/2,11/2]"),
+            ("all=±10%, d1=[1,9]", "d0=[9/2,11/2] d1=[1,9]"),
+            // A duration is at least 0.
+            ("d1=±9", "d0=[5,5] d1=[0,14]"),
+        ] {
+            let envelope = parse_box(text, &plan).unwrap();
+            assert_eq!(write_box(&envelope, &plan), expected, "{text}");
+        }
+    }
+
+    #[test]
     fn what_is_wrong_with_a_box_is_said() {
         let error = |text: &str| parse_box(text, &plan()).unwrap_err();
-        assert!(matches!(error("d0=7"), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("d0"), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("d0="), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("=[1,2]"), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("d0=±-1"), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("d0=[1,2"), BoxTextError::Syntax { .. }));
+        assert!(matches!(error("all=±1 all=±2"), BoxTextError::Twice { .. }));
         assert!(matches!(error("d0=[7]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[1,x]"), BoxTextError::Syntax { .. }));
         assert!(matches!(error("d0=[inf,1]"), BoxTextError::Syntax { .. }));
@@ -173,8 +347,18 @@ mod tests {
             BoxTextError::Twice { .. }
         ));
         assert_eq!(
-            error("x=[1,2]").to_string(),
-            "there is no parameter `x`; the parameters are `d0`, `d1`"
+            error("xyz=[1,2]").to_string(),
+            "there is no parameter `xyz`; the parameters are `d0`, `d1`"
+        );
+        let mut many = plan();
+        let first = many.parameters[0].clone();
+        many.parameters.extend((2..20).map(|number| Parameter {
+            name: format!("rate_{number}"),
+            ..first.clone()
+        }));
+        assert_eq!(
+            parse_box("rte_7=[1,2]", &many).unwrap_err().to_string(),
+            "there is no parameter `rte_7`; did you mean `rate_7`?"
         );
     }
 }

@@ -1,22 +1,27 @@
 //! Executing plans: the ports of [`execution`](crate::execution), with everything that is there
 //! behind them.
+//!
+//! [`execute()`] is one call for a plan in one's own world. [`Execution`] puts a run together from
+//! whoever decides, plans, prepares and records.
 
 mod analyst;
-#[cfg(feature = "external")]
+mod execution;
 mod external;
 mod facts_only;
 mod likeliest;
 mod memory;
 mod planners;
-pub(crate) mod rewrite;
+pub mod rewrite;
+mod spec;
 mod spoiling;
 mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
-#[cfg(feature = "external")]
+pub use execution::{Execution, execute};
 pub use external::External;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
+pub use spec::{NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
 pub use spoiling::Spoiling;
 pub use vary::check_vary;

@@ -22,7 +22,6 @@ use elbowroom_stn::{ConsistentNetwork, Constraint};
 pub struct Explainer<'a> {
     task: &'a Task,
     plan: &'a ParametrizedPlan,
-    epsilon: &'a Rational,
 }
 
 /// Why a plan does not work somewhere.
@@ -67,12 +66,8 @@ impl Shortfall {
 
 impl<'a> Explainer<'a> {
     /// Explains what concerns this plan.
-    pub fn new(task: &'a Task, plan: &'a ParametrizedPlan, epsilon: &'a Rational) -> Self {
-        Self {
-            task,
-            plan,
-            epsilon,
-        }
+    pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Self {
+        Self { task, plan }
     }
 
     /// Why a box is not inside the envelope, with an example.
@@ -186,7 +181,7 @@ impl<'a> Explainer<'a> {
         let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
         example.schedule = schedule.times().to_vec();
         Some(most.map_or(Shortfall::Boundless, |most| {
-            Shortfall::Time(&most + self.epsilon)
+            Shortfall::Time(&most + self.task.epsilon())
         }))
     }
 
@@ -204,10 +199,7 @@ impl<'a> Explainer<'a> {
         }
         let plan = self.plan.plan.at(&example.valuation);
         let plan = plan.scheduled(&example.schedule);
-        let settings = validate::Settings {
-            epsilon: Some(self.epsilon.clone()),
-            ..validate::Settings::default()
-        };
+        let settings = validate::Settings::default();
         match validate::validate(self.task, &plan, &settings) {
             Verdict::Invalid(violation) => Some(violation.to_string()),
             _ => None,
@@ -220,7 +212,7 @@ impl<'a> Explainer<'a> {
         let Requirement::Separation { first, second } = requirement else {
             return self.with_names(requirement.describe(self.task, plan));
         };
-        let epsilon = self.epsilon.to_decimal(6);
+        let epsilon = self.task.epsilon().to_decimal(6);
         let kind = |node: &NodeId| plan.nodes[node.index()];
         match (kind(first), kind(second)) {
             (Node::Start(start), Node::End(end)) if start == end => self.own_separation(),
@@ -278,7 +270,7 @@ impl<'a> Explainer<'a> {
 
     /// Why an action cannot take no time at all.
     fn own_separation(&self) -> String {
-        let epsilon = self.epsilon.to_decimal(6);
+        let epsilon = self.task.epsilon().to_decimal(6);
         format!("an action whose start and end interfere takes at least {epsilon}")
     }
 

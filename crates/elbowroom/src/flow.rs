@@ -7,8 +7,7 @@ use elbowroom_envelope::Guarantee;
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
-use elbowroom_plan::deorder::{self, DeorderError, Deordered, deorder};
+use elbowroom_plan::deorder::{DeorderError, Deordered, deorder};
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary};
 use elbowroom_plan::{NodeId, ParametrizedPlan};
 use elbowroom_stn::ConsistentNetwork;
@@ -20,8 +19,6 @@ use crate::room;
 /// What to leave open, and how to search.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The least separation of interfering happenings (ε); positive.
-    pub epsilon: Rational,
     /// What to leave open; all durations if empty.
     pub vary: Vec<VarySpec>,
     /// What to guarantee inside the envelope.
@@ -31,10 +28,9 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// ε = 0.001, all durations, the dynamic guarantee, precision 1.
+    /// All durations, the dynamic guarantee, precision 1.
     fn default() -> Self {
         Self {
-            epsilon: Rational::new(1, 1000),
             vary: Vec::new(),
             guarantee: Guarantee::default(),
             search: elbowroom_envelope::Settings::default(),
@@ -94,24 +90,16 @@ pub struct Freed {
 ///
 /// # Errors
 /// When the judge rejects the plan.
-pub fn free(
-    task: &Task,
-    time_triggered: &TimeTriggeredPlan,
-    epsilon: &Rational,
-) -> Result<Freed, FlowError> {
-    let settings = deorder::Settings {
-        epsilon: epsilon.clone(),
-    };
-    let time_triggered = in_order(time_triggered);
-    let Verdict::Invalid(violation) = judge(task, &time_triggered, epsilon) else {
+pub fn free(task: &Task, time_triggered: &TimeTriggeredPlan) -> Result<Freed, FlowError> {
+    let Verdict::Invalid(violation) = judge(task, time_triggered) else {
         return Ok(Freed {
-            deordered: deorder(task, &time_triggered, &settings)?,
+            deordered: deorder(task, time_triggered)?,
             repaired: None,
         });
     };
     let violation = Box::new(violation);
-    let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal), epsilon).is_valid();
-    match deorder(task, &time_triggered, &settings) {
+    let works = |d: &Deordered| judge(task, &d.plan.scheduled(&d.nominal)).is_valid();
+    match deorder(task, time_triggered) {
         Ok(deordered) if works(&deordered) => Ok(Freed {
             deordered,
             repaired: Some(violation),
@@ -120,28 +108,11 @@ pub fn free(
     }
 }
 
-/// The plan in order of start, by name where actions start together: in which order a file lists
-/// these says nothing, and must not matter.
-fn in_order(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
-    let mut plan = plan.clone();
-    plan.steps.sort_by(|a, b| {
-        let by_name = || a.action.name.cmp(&b.action.name);
-        let by_duration = || a.duration.cmp(&b.duration);
-        let by_start = a.start.cmp(&b.start);
-        by_start.then_with(by_name).then_with(by_duration)
-    });
-    plan
-}
-
 /// A plan like the one given, with other times, if the judge rejects it but accepts those: what
-/// [`planner::external`](elbowroom_planner) asks for where a planner's times are rounded.
-pub fn repaired(
-    task: &Task,
-    time_triggered: &TimeTriggeredPlan,
-    epsilon: &Rational,
-) -> Option<TimeTriggeredPlan> {
-    let freed = free(task, time_triggered, epsilon).ok()?;
-    let Deordered { plan, nominal } = freed.deordered;
+/// [`external`](elbowroom_external) asks for where a planner's times are rounded.
+pub fn repaired(task: &Task, time_triggered: &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> {
+    let freed = free(task, time_triggered).ok()?;
+    let Deordered { plan, nominal, .. } = freed.deordered;
     Some(plan.scheduled(&nominal))
 }
 
@@ -151,23 +122,18 @@ pub fn repaired(
 ///
 /// # Errors
 /// When `specs` names what the plan does not have.
-pub fn open(
-    task: &Task,
-    freed: Freed,
-    specs: &[VarySpec],
-    epsilon: &Rational,
-) -> Result<ParametrizedPlan, FlowError> {
-    let Deordered { plan, nominal } = freed.deordered;
+pub fn open(task: &Task, freed: Freed, specs: &[VarySpec]) -> Result<ParametrizedPlan, FlowError> {
+    let Deordered { plan, nominal, .. } = freed.deordered;
     let plan = parametrize(task, plan, &nominal, specs)?;
-    Ok(room::sound(task, &plan, &nominal, epsilon))
+    Ok(room::sound(task, &plan, &nominal))
 }
 
 /// The plan with nothing left open. Where needed, differences of times are kept near the plan's own
 /// so that every schedule works.
-pub fn closed(task: &Task, freed: Freed, epsilon: &Rational) -> ParametrizedPlan {
-    let Deordered { plan, nominal } = freed.deordered;
+pub fn closed(task: &Task, freed: Freed) -> ParametrizedPlan {
+    let Deordered { plan, nominal, .. } = freed.deordered;
     let plan = ParametrizedPlan::closed(task, plan);
-    room::sound(task, &plan, &nominal, epsilon)
+    room::sound(task, &plan, &nominal)
 }
 
 /// An STN plan, which may have parameters already, with more left open.
@@ -192,10 +158,6 @@ pub fn open_more(
 }
 
 /// What the judge says of a plan.
-pub(crate) fn judge(task: &Task, plan: &TimeTriggeredPlan, epsilon: &Rational) -> Verdict {
-    let settings = validate::Settings {
-        epsilon: Some(epsilon.clone()),
-        ..validate::Settings::default()
-    };
-    validate::validate(task, plan, &settings)
+pub(crate) fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
+    validate::validate(task, plan, &validate::Settings::default())
 }

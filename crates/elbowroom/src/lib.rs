@@ -1,15 +1,17 @@
-//! How much elbow room does a temporal plan have?
+//! Temporal plans on robots: planning, validation, robustness envelopes, execution.
 //!
-//! Elbowroom reads PDDL 2.1 problems with durative actions, and a plan for one, and computes how
-//! far each duration, rate or deadline may deviate while the plan is still guaranteed to work.
-//! [`flow::robust_plan`] is the whole way; the [`tutorial`] walks it with an example.
+//! Elbowroom reads PDDL 2.1 problems with durative actions. It finds plans for them, computes how far
+//! each duration, rate or deadline may deviate while a plan is still guaranteed to work, and
+//! executes plans with dispatching, monitoring and replanning. All arithmetic that decides something
+//! is exact.
+//!
+//! # Planning
 //!
 //! ```
-//! use std::sync::Arc;
-//!
-//! use elbowroom::flow::{Settings, robust_plan};
-//! use elbowroom::model::Task;
-//! use elbowroom::pddl::{self, Source};
+//! use elbowroom::answers::Unwatched;
+//! use elbowroom::answers::plan::{PlanRequest, plan};
+//! # use elbowroom::model::Task;
+//! # use elbowroom::pddl::{self, Source};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let domain = Source::new("domain", "
@@ -25,8 +27,40 @@
 //!       (:init (open) (at 30 (not (open))))
 //!       (:goal (delivered)))");
 //! let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
-//! let mut task = Task::new(problem);
-//! let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &mut task)?;
+//! let task = Task::new(problem);
+//!
+//! let mut request = PlanRequest { task: &task, first_plan_only: true, most_memory: None };
+//! let plan = plan(&mut request, &mut Unwatched)?.plan.expect("there is a plan");
+//! assert_eq!(plan.steps.len(), 1);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Envelopes
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use elbowroom::flow::{Settings, robust_plan};
+//! # use elbowroom::model::Task;
+//! # use elbowroom::pddl::{self, Source};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let domain = Source::new("domain", "
+//! #     (define (domain post)
+//! #       (:requirements :durative-actions :timed-initial-literals)
+//! #       (:predicates (open) (delivered))
+//! #       (:durative-action deliver :parameters ()
+//! #         :duration (= ?duration 10)
+//! #         :condition (at end (open))
+//! #         :effect (at end (delivered))))");
+//! # let problem = Source::new("problem", "
+//! #     (define (problem letter) (:domain post)
+//! #       (:init (open) (at 30 (not (open))))
+//! #       (:goal (delivered)))");
+//! # let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
+//! # let task = Task::new(problem);
+//! // The same problem, and a plan from elsewhere.
+//! let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
 //!
 //! let robust = robust_plan(&Arc::new(task), &plan, &Settings::default())?;
 //! let envelope = robust.envelope.expect("the plan works as it is");
@@ -37,45 +71,101 @@
 //! # }
 //! ```
 //!
-//! Each question of the command line is a request with an answer in [`answers`]; an answer is plain
-//! data, and its JSON is the document that `docs/formats` describes.
+//! # Execution
 //!
-//! The crates behind it, each under its own name:
+//! A world is anything that implements [`execution::World`]: a robot, or a simulation with seeds.
+//! [`execute::Execution`] has all that can be chosen, and an example of an event loop that drives a
+//! run step by step.
 //!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use elbowroom::execute::execute;
+//! use elbowroom::execution::run::Verdict;
+//! use elbowroom::sim::{SimWorld, WorldModel};
+//! # use elbowroom::model::Task;
+//! # use elbowroom::pddl::{self, Source};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let domain = Source::new("domain", "
+//! #     (define (domain post)
+//! #       (:requirements :durative-actions :timed-initial-literals)
+//! #       (:predicates (open) (delivered))
+//! #       (:durative-action deliver :parameters ()
+//! #         :duration (= ?duration 10)
+//! #         :condition (at end (open))
+//! #         :effect (at end (delivered))))");
+//! # let problem = Source::new("problem", "
+//! #     (define (problem letter) (:domain post)
+//! #       (:init (open) (at 30 (not (open))))
+//! #       (:goal (delivered)))");
+//! # let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
+//! # let task = Task::new(problem);
+//! # let (plan, _warnings) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
+//! let text = r#"
+//!     format = "elbowroom-world"
+//!     version = 1
+//!     [[duration]]
+//!     action = "deliver"
+//!     uniform = { from = 9, to = 20 }"#;
+//! let task = Arc::new(task);
+//! let model = WorldModel::read(text, task.problem())?;
+//! let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
+//!
+//! let report = execute(&task, &plan, "guarded", &mut world)?;
+//! assert_eq!(report.verdict, Verdict::GoalReached);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # What there is
+//!
+//! The [`tutorial`] goes through planning, envelopes, execution and probability. Each
+//! question of the command line is a request with an answer in [`answers`]; an answer is plain data,
+//! and its JSON is the document that `docs/formats` describes.
+//!
+//! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
+//! - [`flow`]: from a plan to its envelope in one call or step by step.
+//! - [`execute`](mod@execute): executes plans.
+//! - [`graph`]: networks as graphs for Graphviz.
+//! - [`Explainer`]: says in words what limits an envelope, and why a plan does not work.
+//! - [`parse_box`], [`write_box`]: boxes as text. [`AnyPlan`]: a plan of either kind.
+//! - [`earliest_end`]: when a plan is over at the earliest.
+//!
+//! The crates below, re-exported:
+//!
+//! - [`text`]: texts, source positions, diagnostics.
 //! - [`num`]: exact rationals and intervals.
-//! - [`model`]: problems, plans with fixed times, and the judge ([`model::validate()`]).
-//! - [`pddl`]: PDDL and plan text to the model and back.
-//! - [`stn`]: temporal networks.
-//! - [`plan`]: plans that leave room, and their parameters.
-//! - [`envelope`]: the box check, and the search for a box.
-//! - [`network`]: temporal networks in the formats of the field, and what can be promised about
-//!   them.
-//! - [`probability`]: how likely a plan is to succeed, and the best order.
-//! - [`planner`]: finds plans, or has other planners find them.
-//! - [`execution`]: what to do next, given what has happened: executors, and the run of a plan.
-//! - [`sim`]: worlds to execute in.
+//! - [`model`]: problems, plans with fixed times, and validation ([`model::validate()`]).
+//! - [`pddl`]: reads and writes PDDL and plans.
+//! - [`stn`]: simple temporal networks, with and without uncertainty.
+//! - [`network`]: reads the field's formats of temporal networks, and decides their controllability.
+//! - [`plan`]: networks of plans, and their parameters.
+//! - [`envelope`]: decides whether a box is inside the envelope, and searches for a large one.
+//! - [`probability`]: success probabilities, and the best order of a plan's actions.
+//! - [`planner`]: the embedded planner; [`external`]: other planners, as supervised processes.
+//! - [`execution`]: executors, and the run of a plan.
+//! - [`sim`]: simulated worlds.
 //! - [`report`]: traces, replays, statistics, tables and plots.
 //!
-//! What stands here adds words to what these find out ([`Explainer`]), reads and writes boxes
-//! ([`parse_box`]), and draws pictures ([`graph`]). It does not look at clocks or files, and it
-//! does not print.
+//! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`.
+//!
+//! The library looks at no clock and no file, and prints nothing.
 
 pub mod answers;
 mod box_text;
-pub mod compare;
 pub mod execute;
 mod explain;
 pub mod flow;
 pub mod graph;
 mod makespan;
 pub mod network;
-pub mod perturbed;
 mod plan_file;
 mod room;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
+pub use elbowroom_external as external;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;
@@ -85,12 +175,23 @@ pub use elbowroom_probability as probability;
 pub use elbowroom_report as report;
 pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
+pub use elbowroom_text as text;
+pub use execute::execute;
 pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;
 pub use plan_file::{AnyPlan, PlanKind};
 
 /// Longer reading. Its code is compiled and run with the tests.
 pub mod tutorial {
-    #[doc = include_str!("../../../docs/tutorial/01-from-a-plan-to-an-envelope.md")]
+    #[doc = include_str!("../docs/tutorial/01-from-a-plan-to-an-envelope.md")]
     pub mod t01_from_a_plan_to_an_envelope {}
+
+    #[doc = include_str!("../docs/tutorial/02-planning.md")]
+    pub mod t02_planning {}
+
+    #[doc = include_str!("../docs/tutorial/03-execution.md")]
+    pub mod t03_execution {}
+
+    #[doc = include_str!("../docs/tutorial/04-probability.md")]
+    pub mod t04_probability {}
 }

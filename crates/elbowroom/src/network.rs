@@ -60,7 +60,7 @@ impl Default for Request {
 /// When the network cannot be simulated as asked.
 pub fn examine(file: &NetworkFile, request: &Request) -> Result<Answer, SimulationError> {
     let consistent = reasons::consistent(file);
-    let form = file.network.dynamic();
+    let form = file.network.dispatchable();
     let (mut weak, mut dynamic, mut strong) = (None, None, None);
     if !file.is_certain() {
         weak = Some(match &form {

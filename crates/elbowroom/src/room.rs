@@ -25,7 +25,6 @@ pub(crate) fn sound(
     task: &Task,
     plan: &ParametrizedPlan,
     nominal: &[Rational],
-    epsilon: &Rational,
 ) -> ParametrizedPlan {
     let sided = |sided: fn(StnPlan) -> StnPlan| ParametrizedPlan {
         plan: sided(plan.plan.clone()),
@@ -38,7 +37,7 @@ pub(crate) fn sound(
     let found = free
         .iter()
         .chain([&one_way, &all])
-        .find_map(|plan| pinned(task, plan, nominal, epsilon));
+        .find_map(|plan| pinned(task, plan, nominal));
     found.unwrap_or(all)
 }
 
@@ -57,12 +56,7 @@ fn most_sides(plan: &StnPlan) -> usize {
 }
 
 /// The plan with pins, none of them needless, as loose as can be; `None` if nothing can be told.
-fn pinned(
-    task: &Task,
-    plan: &ParametrizedPlan,
-    nominal: &[Rational],
-    epsilon: &Rational,
-) -> Option<ParametrizedPlan> {
+fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &[Rational]) -> Option<ParametrizedPlan> {
     let mut free = plan.clone();
     free.plan = without_sides(free.plan).0;
     let given = free.plan.constraints.len();
@@ -76,7 +70,7 @@ fn pinned(
     let mut is_refused = false;
     let mut oracle = |fixed: &StnPlan| {
         let candidate = with_pins(fixed);
-        let broken = broken_in(task, &candidate, epsilon, &point);
+        let broken = broken_in(task, &candidate, &point);
         is_refused |= broken.is_err();
         let broken = broken.ok().flatten()?;
         Some(nodes_of(&broken, candidate.plan.nodes.len()))
@@ -84,7 +78,7 @@ fn pinned(
     let at_nominal = plan.plan.at(&plan.nominal());
     let fixed = pin_until_sound(at_nominal, nominal, &mut oracle)?;
     let scale = longest(&plan.plan, nominal);
-    (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale, epsilon))
+    (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale))
 }
 
 /// How long the longest action takes.
@@ -133,7 +127,6 @@ fn loosened(
     plan: ParametrizedPlan,
     given: usize,
     scale: &Rational,
-    epsilon: &Rational,
 ) -> ParametrizedPlan {
     let mut open = plan.clone();
     let mut pins = Vec::new();
@@ -171,7 +164,7 @@ fn loosened(
     if pins.is_empty() {
         return plan;
     }
-    let Ok(Some(sound)) = SoundBox::new(task, &open, epsilon) else {
+    let Ok(Some(sound)) = SoundBox::new(task, &open) else {
         return plan;
     };
     let mut growth = Growth {
@@ -179,7 +172,7 @@ fn loosened(
         plan: &open,
         checks: 0,
     };
-    growth.run(scale, epsilon);
+    growth.run(scale, task.epsilon());
     for &(_, id) in &pins {
         growth.beyond(id);
     }

@@ -17,7 +17,6 @@ use elbowroom::execute::Analyst;
 use elbowroom::execution::{Need, Preparer};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
-use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Source};
 use elbowroom::{AnyPlan, flow, plan};
 use serde::Serialize;
@@ -37,8 +36,8 @@ fn read(case: &str) -> (Arc<Task>, TimeTriggeredPlan) {
 fn read_with(case: &str, plan: &str) -> (Arc<Task>, TimeTriggeredPlan) {
     let source = |file: &str| Source::new(file, text(case, file));
     let read = pddl::read_problem(&source("domain.pddl"), &source("problem.pddl"));
-    let mut task = Task::new(read.expect("a case without mistakes").0);
-    let plan = pddl::read_plan(&Source::new("plan", plan), &mut task);
+    let task = Task::new(read.expect("a case without mistakes").0);
+    let plan = pddl::read_plan(&Source::new("plan", plan), &task);
     let plan = plan.expect("a plan without mistakes").0;
     (Arc::new(task), plan)
 }
@@ -100,14 +99,12 @@ fn answers_can_be_stored_and_read_again() {
         let network = stn(&StnRequest {
             task: &task,
             plan: AnyPlan::TimeTriggered(plan),
-            epsilon: request.epsilon.clone(),
         });
         assert_stored(&network.expect("a valid plan").answer);
         // With parameters and infinite bounds.
         let network = stn(&StnRequest {
             task: &task,
             plan: AnyPlan::Stn(plan::ParametrizedPlan::clone(&opened)),
-            epsilon: request.epsilon.clone(),
         });
         let written = assert_stored(&network.expect("a valid plan").answer);
         assert!(written.contains("\"parameter\": \""));
@@ -139,7 +136,6 @@ fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
     let network = stn(&StnRequest {
         task: &task,
         plan: plan.into(),
-        epsilon: Rational::new(1, 1000),
     })
     .expect("an answer");
     let expected = StnFinding::Invalid {
@@ -149,10 +145,9 @@ fn a_plan_that_the_judge_rejects_is_answered_with_its_violation() {
     assert_stored(&network.answer);
 }
 
-fn planned(task: &mut Task, watcher: &mut dyn Watcher) -> PlanOutcome {
+fn planned(task: &Task, watcher: &mut dyn Watcher) -> PlanOutcome {
     let mut request = PlanRequest {
         task,
-        epsilon: Rational::new(1, 1000),
         first_plan_only: true,
         most_memory: None,
     };
@@ -162,8 +157,8 @@ fn planned(task: &mut Task, watcher: &mut dyn Watcher) -> PlanOutcome {
 #[test]
 fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
     let (task, _) = read("delivery");
-    let mut task = Task::clone(&task);
-    let found = planned(&mut task, &mut Unwatched);
+    let task = Task::clone(&task);
+    let found = planned(&task, &mut Unwatched);
     assert_eq!(
         (found.answer.stop, found.answer.plans),
         (PlanStop::FirstPlan, 1)
@@ -191,8 +186,8 @@ fn a_plan_is_an_answer_and_so_is_that_there_is_none() {
         &Source::new("domain", domain),
         &Source::new("problem", problem),
     );
-    let mut task = Task::new(read.expect("a problem without mistakes").0);
-    let none = planned(&mut task, &mut Unwatched);
+    let task = Task::new(read.expect("a problem without mistakes").0);
+    let none = planned(&task, &mut Unwatched);
     assert!(none.plan.is_none() && none.answer.stop == PlanStop::Proved);
     assert!(matches!(none.answer.finding, PlanFinding::NoPlan { .. }));
     assert_stored(&none.answer);

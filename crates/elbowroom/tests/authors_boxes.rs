@@ -61,8 +61,8 @@ struct Case {
 }
 
 fn read(instance: &Instance, text: &str) -> Case {
-    let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
-    let plan = format::read(text.as_bytes(), &mut task).expect("a readable plan");
+    let task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
+    let plan = format::read(text.as_bytes(), &task).expect("a readable plan");
     Case {
         task: Arc::new(task),
         plan: Arc::new(plan),
@@ -83,10 +83,6 @@ fn envelope_of(plan: &ParametrizedPlan, recorded: &Recorded) -> DecoupledEnvelop
     }
 }
 
-fn epsilon() -> Rational {
-    Rational::new(1, 1000)
-}
-
 /// The only recorded ends that may move further: `senddata` takes exactly 1 in its domain, which
 /// binds it in the authors' tool. Here a duration that is a parameter is free of its domain.
 fn is_freed_by_us(instance: &str, parameter: &str) -> bool {
@@ -103,8 +99,7 @@ fn every_recorded_box_is_inside_and_cannot_grow_by_what_its_run_left_open() {
             continue;
         };
         let Case { task, plan } = read(&instance, &plan_text(&instance));
-        let mut oracle =
-            Oracle::new(&task, &plan, &epsilon(), Guarantee::Weak).expect("within reach");
+        let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
         for recorded in recorded {
             let envelope = envelope_of(&plan, recorded);
             let objection = oracle.objection(&envelope).expect("within reach");
@@ -190,8 +185,7 @@ fn the_same_search_finds_the_same_fractions() {
 
 /// What the search with the authors' settings finds.
 fn search(case: &Case) -> Recorded {
-    let mut oracle =
-        Oracle::new(&case.task, &case.plan, &epsilon(), Guarantee::Weak).expect("within reach");
+    let mut oracle = Oracle::new(&case.task, &case.plan, Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     })

@@ -36,9 +36,9 @@ fn read(case: &str) -> (Task, TimeTriggeredPlan) {
     let (problem, warnings) =
         pddl::read_problem(&domain, &problem).expect("a case without mistakes");
     assert!(warnings.is_empty(), "{warnings:?}");
-    let mut task = Task::new(problem);
+    let task = Task::new(problem);
     let plan = source(&folder.join("plan.plan"));
-    let (plan, _) = pddl::read_plan(&plan, &mut task).expect("a plan without mistakes");
+    let (plan, _) = pddl::read_plan(&plan, &task).expect("a plan without mistakes");
     (task, plan)
 }
 
@@ -52,8 +52,8 @@ fn opened(task: &Task, plan: &TimeTriggeredPlan, vary: &[&str]) -> ParametrizedP
         .iter()
         .map(|text| text.parse().expect("a specification"))
         .collect();
-    let freed = flow::free(task, plan, &epsilon()).expect("a valid plan");
-    flow::open(task, freed, &specs, &epsilon()).expect("quantities of this plan")
+    let freed = flow::free(task, plan).expect("a valid plan");
+    flow::open(task, freed, &specs).expect("quantities of this plan")
 }
 
 fn number(text: &str) -> Rational {
@@ -64,8 +64,7 @@ fn number(text: &str) -> Rational {
 fn alone(task: &Arc<Task>, time_triggered: &TimeTriggeredPlan, instance: usize) -> Interval {
     let vary = format!("duration n{instance}");
     let plan = Arc::new(opened(task, time_triggered, &[&vary]));
-    let mut oracle =
-        Oracle::new(task, &plan, &epsilon(), Guarantee::Weak).expect("within exact reasoning");
+    let mut oracle = Oracle::new(task, &plan, Guarantee::Weak).expect("within exact reasoning");
     let go_on = ControlFlow::Continue(());
     let run = irr(&mut oracle, &envelope::Settings::default(), &mut |_| go_on).expect("few cases");
     let found = run.envelope.expect("the plan works as planned");
@@ -88,8 +87,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
     let opened = Arc::new(opened(&task, &plan, &[]));
     let nominal = opened.nominal();
     assert!(region(&nominal), "{case}: the nominal point");
-    let mut oracle =
-        Oracle::new(&task, &opened, &epsilon(), Guarantee::Weak).expect("within exact reasoning");
+    let mut oracle = Oracle::new(&task, &opened, Guarantee::Weak).expect("within exact reasoning");
     // All points whose coordinates are these shares of the nominal ones, and just beyond zero.
     let shares = ["0", "1/3", "3/4", "1", "7/6", "3/2", "2"].map(number);
     let mut inside = 0;
@@ -220,7 +218,7 @@ fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
     for case in ["hatchery", "lamp"] {
         let (task, plan) = read(case);
         let (task, plan) = (Arc::new(task.clone()), opened(&task, &plan, &[]));
-        let mut oracle = Oracle::new(&task, &Arc::new(plan), &epsilon(), Guarantee::Dynamic)
+        let mut oracle = Oracle::new(&task, &Arc::new(plan), Guarantee::Dynamic)
             .expect("within exact reasoning");
         for (lower, width, least, expected) in [
             ("7.501", "4.998", "5", true),
@@ -254,20 +252,19 @@ fn the_paintshop_is_as_worked_by_hand() {
         intervals: vec![Interval::at_least(Rational::ZERO); 3],
     };
     for guarantee in [Guarantee::Weak, Guarantee::Dynamic] {
-        let mut oracle =
-            Oracle::new(&task, &opened, &epsilon(), guarantee).expect("within exact reasoning");
+        let mut oracle = Oracle::new(&task, &opened, guarantee).expect("within exact reasoning");
         assert_eq!(oracle.objection(&everything), Ok(None), "{guarantee:?}");
     }
 }
 
 #[test]
 fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
-    let (mut task, plan) = read("delivery");
+    let (task, plan) = read("delivery");
     let text = fs::read(folder("delivery").join("plan.stn")).unwrap();
-    let by_hand = plan::format::read(&text, &mut task).expect("an STN plan file without mistakes");
+    let by_hand = plan::format::read(&text, &task).expect("an STN plan file without mistakes");
     let (task, by_hand) = (Arc::new(task), Arc::new(by_hand));
     let derived = Arc::new(opened(&task, &plan, &[]));
-    let oracle = |plan| Oracle::new(&task, plan, &epsilon(), Guarantee::Weak).unwrap();
+    let oracle = |plan| Oracle::new(&task, plan, Guarantee::Weak).unwrap();
     let (mut of_file, mut of_plan) = (oracle(&by_hand), oracle(&derived));
     // The file leaves open first, second, handing and opening; the plan also the pick.
     for (first, second, handing, opening) in [

@@ -75,7 +75,7 @@ fn objection(task: &Task, plan: &StnPlan, schedule: &[Rational]) -> Option<Strin
 
 /// With all durations left open, the nominal schedule is one at the nominal values.
 fn assert_parametrized(task: &Task, deordered: &Deordered) {
-    let Deordered { plan, nominal } = deordered.clone();
+    let Deordered { plan, nominal, .. } = deordered.clone();
     let open = parametrize(task, plan, &nominal, &[]).unwrap_or_else(|error| panic!("{error}"));
     let network = open.plan.network(&open.nominal());
     assert!(elbowroom_stn::Schedule::new(nominal).holds_in(&network));
@@ -143,16 +143,15 @@ struct Count {
 /// The deordered plan is sound at the nominal point, its nominal schedule is one of it, and the
 /// judge accepts that one and others drawn at random.
 fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, count: &mut Count) {
-    let epsilon = Rational::new(1, 1000);
     let name = plan_file.display();
-    let Ok(mut task) = shared::task(domain, problem) else {
+    let Ok(task) = shared::task(domain, problem) else {
         println!("{name}: its problem is not supported");
         count.unsupported += 1;
         return;
     };
-    let (plan, _) = read_plan(&shared::source(plan_file), &mut task)
+    let (plan, _) = read_plan(&shared::source(plan_file), &task)
         .unwrap_or_else(|error| panic!("{}", error.render(false)));
-    let freed = match flow::free(&task, &plan, &epsilon) {
+    let freed = match flow::free(&task, &plan) {
         Ok(freed) => freed,
         Err(error) => {
             println!("{name}: {error}");
@@ -163,13 +162,13 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
     count.plans += 1;
     assert_parametrized(&task, &freed.deordered);
     let nominal = freed.deordered.nominal.clone();
-    let closed = flow::closed(&task, freed, &epsilon);
+    let closed = flow::closed(&task, freed);
     let network = closed.plan.network(&[]);
     assert!(
         elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&network),
         "{name}"
     );
-    let sound = match broken_in(&task, &closed, &epsilon, &DecoupledEnvelope::point(&[])) {
+    let sound = match broken_in(&task, &closed, &DecoupledEnvelope::point(&[])) {
         Ok(None) => {
             count.told += 1;
             closed.plan

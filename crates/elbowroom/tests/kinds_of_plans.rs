@@ -9,7 +9,7 @@ use std::sync::Arc;
 use elbowroom::envelope::{self, Guarantee, Oracle, StopReason, irr};
 use elbowroom::model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom::num::Rational;
-use elbowroom::plan::{DecoupledEnvelope, NodeId, ParametrizedPlan, format, network_node};
+use elbowroom::plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, format, network_node};
 use elbowroom::stn::ConsistentNetwork;
 use elbowroom::{flow, parse_box};
 use kinds::{Kind, kinds};
@@ -17,27 +17,23 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-fn epsilon() -> Rational {
-    Rational::new(1, 1000)
-}
-
 fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
     validate(task, plan, &elbowroom::model::validate::Settings::default())
 }
 
 /// The plan with all durations left open, and its nominal schedule.
 fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Vec<Rational>) {
-    let freed = flow::free(task, plan, &epsilon()).expect("a valid plan");
+    let freed = flow::free(task, plan).expect("a valid plan");
     assert!(freed.repaired.is_none());
     let nominal = freed.deordered.nominal.clone();
-    let open = flow::open(task, freed, &[], &epsilon()).expect("durations");
+    let open = flow::open(task, freed, &[]).expect("durations");
     (Arc::new(open), nominal)
 }
 
 fn is_inside(kind: &Kind, guarantee: Guarantee, text: &str) -> bool {
     let (task, plan) = kind.read();
     let (open, _) = opened(&task, &plan);
-    let mut oracle = Oracle::new(&task, &open, &epsilon(), guarantee).expect("within reach");
+    let mut oracle = Oracle::new(&task, &open, guarantee).expect("within reach");
     let envelope = parse_box(text, &open).expect("a box of this plan");
     oracle.objection(&envelope).expect("few cases").is_none()
 }
@@ -88,17 +84,16 @@ fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
     for kind in kinds() {
         let (task, plan) = kind.read();
         assert!(judge(&task, &plan).is_valid(), "{}", kind.name);
-        let freed = flow::free(&task, &plan, &epsilon()).expect("a valid plan");
+        let freed = flow::free(&task, &plan).expect("a valid plan");
         let nominal = freed.deordered.nominal.clone();
-        let closed = Arc::new(flow::closed(&task, freed, &epsilon()));
+        let closed = Arc::new(flow::closed(&task, freed));
         let schedule = elbowroom::stn::Schedule::new(nominal);
         assert!(
             schedule.holds_in(&closed.plan.network(&[])),
             "{}",
             kind.name
         );
-        let mut oracle =
-            Oracle::new(&task, &closed, &epsilon(), Guarantee::Weak).expect("within reach");
+        let mut oracle = Oracle::new(&task, &closed, Guarantee::Weak).expect("within reach");
         let objection = oracle.objection(&DecoupledEnvelope::point(&[]));
         assert_eq!(objection, Ok(None), "{}", kind.name);
     }
@@ -154,8 +149,7 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
         let (open, nominal) = opened(&task, &plan);
         let at_nominal = open.plan.network(&open.nominal());
         assert!(elbowroom::stn::Schedule::new(nominal).holds_in(&at_nominal));
-        let mut oracle =
-            Oracle::new(&task, &open, &epsilon(), Guarantee::Weak).expect("within reach");
+        let mut oracle = Oracle::new(&task, &open, Guarantee::Weak).expect("within reach");
         let go_on = &mut |_: Option<&envelope::Widening<'_>>| ControlFlow::Continue(());
         let run = irr(&mut oracle, &envelope::Settings::default(), go_on).expect("few cases");
         assert_eq!(run.stop, StopReason::Converged, "{}", kind.name);
@@ -172,6 +166,46 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
             );
         }
     }
+}
+
+/// Widening one end of one interval after the other, against an oracle that knows nothing of the box
+/// before.
+#[test]
+fn an_oracle_that_remembers_says_what_one_says_that_does_not() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let mut counts = [0; 2];
+    for (kind, guarantee) in kinds()
+        .into_iter()
+        .flat_map(|kind| Guarantee::ALL.map(|guarantee| (kind, guarantee)))
+    {
+        let (task, plan) = kind.read();
+        let (open, _) = opened(&task, &plan);
+        let new = || Oracle::new(&task, &open, guarantee).expect("within reach");
+        for _ in 0..4 {
+            let mut oracle = new();
+            let point = DecoupledEnvelope::point(&open.nominal());
+            if oracle.start(&point).expect("few cases").is_some() {
+                continue;
+            }
+            for _ in 0..15 {
+                let accepted = oracle.accepted().expect("it started").clone();
+                let ends: Vec<BoxEnd> = BoxEnd::all(open.parameters.len()).collect();
+                let end = ends[rng.random_range(0..ends.len())];
+                let Some(reach) = end.reach(&accepted) else {
+                    continue;
+                };
+                let step =
+                    Rational::new(rng.random_range(1..40), [1, 3, 8][rng.random_range(0..3)]);
+                let reach = rng.random_bool(0.9).then(|| reach + step);
+                let wider = end.with_reach(&accepted, reach.clone());
+                let expected = new().objection(&wider).expect("few cases").is_none();
+                let found = oracle.try_reach(end, reach).expect("few cases");
+                assert_eq!(found, expected, "{}, {guarantee}: {wider:?}", kind.name);
+                counts[usize::from(found)] += 1;
+            }
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 200), "{counts:?}");
 }
 
 /// All orders of the lines of a plan.
@@ -301,10 +335,10 @@ fn what_was_found_is_kept_when_there_are_too_many_cases_to_tell_apart() {
     let source = |text: &str| elbowroom::pddl::Source::new("clocks", text);
     let (problem, _) =
         elbowroom::pddl::read_problem(&source(DOMAIN), &source(PROBLEM)).expect("a problem");
-    let mut task = Task::new(problem);
-    let plan = format::read(twin_chains(20).as_bytes(), &mut task).expect("a plan");
+    let task = Task::new(problem);
+    let plan = format::read(twin_chains(20).as_bytes(), &task).expect("a plan");
     let (task, plan) = (Arc::new(task), Arc::new(plan));
-    let mut oracle = Oracle::new(&task, &plan, &epsilon(), Guarantee::Weak).expect("within reach");
+    let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
     let go_on = &mut |_: Option<&envelope::Widening<'_>>| ControlFlow::Continue(());
     let run = irr(&mut oracle, &envelope::Settings::default(), go_on).expect("an answer");
     assert_eq!(run.stop, StopReason::Undecided);
@@ -323,16 +357,16 @@ fn a_number_in_a_continuous_decrease_is_left_open_as_it_is_written() {
     let jobs = all.iter().find(|kind| kind.domain.contains("workshop"));
     let (task, plan) = jobs.expect("the jobs with a battery").read();
     let opened = |spec: &str| {
-        let freed = flow::free(&task, &plan, &epsilon()).expect("a valid plan");
+        let freed = flow::free(&task, &plan).expect("a valid plan");
         let spec = spec.parse().expect("a specification");
-        flow::open(&task, freed, &[spec], &epsilon())
+        flow::open(&task, freed, &[spec])
     };
     let open = Arc::new(opened("constant work charge shared").expect("a number"));
     assert_eq!(open.nominal(), [Rational::ONE]);
     assert!(opened("constant work charge 1 shared").is_ok());
     assert!(opened("constant work charge -1 shared").is_err());
     // Three jobs of 10 each, and 39 to spend.
-    let mut oracle = Oracle::new(&task, &open, &epsilon(), Guarantee::Weak).expect("within reach");
+    let mut oracle = Oracle::new(&task, &open, Guarantee::Weak).expect("within reach");
     for (text, expected) in [("[0,13/10]", true), ("[1/2,1301/1000]", false)] {
         let name = &open.parameters[0].name;
         let envelope = parse_box(&format!("{name}={text}"), &open).expect("a box");

@@ -15,21 +15,24 @@ use toml::{Table, Value};
 
 /// Each crate, by folder, with those it may import. Lowest first.
 const LAYERS: &[(&str, &[&str])] = &[
+    ("text", &[]),
     ("num", &[]),
     ("model", &["num"]),
     ("stn", &["num"]),
-    ("network", &["num", "stn"]),
-    ("pddl", &["num", "model"]),
-    ("plan", &["num", "model", "stn"]),
+    ("network", &["text", "num", "stn"]),
+    ("pddl", &["text", "num", "model"]),
+    ("plan", &["text", "num", "model", "stn"]),
     ("envelope", &["num", "model", "stn", "plan"]),
-    ("probability", &["num", "model", "stn", "plan"]),
-    ("planner", &["num", "model", "stn", "pddl"]),
+    ("probability", &["text", "num", "model", "stn", "plan"]),
+    ("planner", &["num", "model"]),
+    ("external", &["num", "model", "pddl"]),
     ("execution", &["num", "model", "stn", "plan", "probability"]),
-    ("sim", &["num", "model", "probability", "execution"]),
+    ("sim", &["text", "num", "model", "probability", "execution"]),
     ("report", &["num", "model", "plan", "execution"]),
     (
         "elbowroom",
         &[
+            "text",
             "num",
             "model",
             "stn",
@@ -39,12 +42,30 @@ const LAYERS: &[(&str, &[&str])] = &[
             "envelope",
             "probability",
             "planner",
+            "external",
             "execution",
             "sim",
             "report",
         ],
     ),
-    ("cli", &["elbowroom"]),
+    (
+        "laboratory",
+        &[
+            "text",
+            "num",
+            "model",
+            "pddl",
+            "plan",
+            "probability",
+            "planner",
+            "external",
+            "execution",
+            "sim",
+            "report",
+            "elbowroom",
+        ],
+    ),
+    ("cli", &["elbowroom", "laboratory"]),
 ];
 
 #[test]
@@ -89,12 +110,23 @@ fn the_table_goes_upwards_only() {
 fn what_executes_cannot_reach_a_solver() {
     for name in ["probability", "execution", "sim", "report"] {
         let reached = reachable(name);
-        for solver in ["envelope", "planner"] {
+        for solver in ["envelope", "planner", "external"] {
             assert!(
                 !reached.contains(solver),
                 "`{name}` must not reach `{solver}`, but it does through {reached:?}"
             );
         }
+    }
+}
+
+/// Experiments need threads, and what only they ask for; who embeds the library gets neither.
+#[test]
+fn only_the_laboratory_makes_threads() {
+    for (name, _) in LAYERS {
+        let manifest = manifest_of(name);
+        let dependencies = manifest.get("dependencies").and_then(Value::as_table);
+        let has_threads = dependencies.is_some_and(|table| table.contains_key("rayon"));
+        assert_eq!(has_threads, *name == "laboratory", "`{name}`");
     }
 }
 

@@ -278,7 +278,7 @@ proptest! {
         prop_assert_eq!(runs.outside, 0);
         if dynamic {
             prop_assert_eq!(runs.successes, runs.runs, "{:?}", runs.broken);
-            let form = file.network.dynamic().expect("just found");
+            let form = file.network.dispatchable().expect("just found");
             let text = write_json(&file.dispatchable(&form));
             let again = read("again", text.as_bytes()).expect("what was written");
             prop_assert!(again.network.is_dynamically_controllable());

@@ -205,13 +205,8 @@ fn the_spoiler_beats_whoever_relies_on_a_box_that_is_weak_only() {
     let kept = wide(8, 12);
     let broken = wide(6, 12);
     let plan = std::sync::Arc::new(plan.clone());
-    let mut oracle = elbowroom::envelope::Oracle::new(
-        &subject.task,
-        &plan,
-        &subject::epsilon(),
-        Guarantee::Dynamic,
-    )
-    .expect("within reach");
+    let mut oracle = elbowroom::envelope::Oracle::new(&subject.task, &plan, Guarantee::Dynamic)
+        .expect("within reach");
     assert_eq!(oracle.objection(&kept), Ok(None));
     assert!(matches!(
         oracle.objection(&broken),

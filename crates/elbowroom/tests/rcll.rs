@@ -16,7 +16,7 @@ use elbowroom_model::ground::Change;
 use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_plan};
 use elbowroom_plan::{ParameterId, Side};
-use shared::case::{Case, epsilon, number};
+use shared::case::{Case, number};
 
 /// The four productions run side by side. Written for the domain with uncertain durations.
 const DURATION_PLAN: &str = "golden_reference_runs/rcll/plan_o0.plan";
@@ -38,11 +38,11 @@ const RESOURCE_PLAN: &str = "
 
 /// The plan with only the order it needs, and some quantities left open.
 fn opened(domain: &Path, problem: &Path, plan: &str, specs: &[&str]) -> Result<Case, FlowError> {
-    let mut task = shared::task(domain, problem).expect("a readable problem");
-    let (plan, _) = read_plan(&Source::new("plan", plan), &mut task).expect("a readable plan");
+    let task = shared::task(domain, problem).expect("a readable problem");
+    let (plan, _) = read_plan(&Source::new("plan", plan), &task).expect("a readable plan");
     let specs: Result<Vec<VarySpec>, _> = specs.iter().map(|spec| spec.parse()).collect();
-    let freed = free(&task, &plan, &epsilon())?;
-    let plan = open(&task, freed, &specs?, &epsilon())?;
+    let freed = free(&task, &plan)?;
+    let plan = open(&task, freed, &specs?)?;
     Ok(Case {
         task: Arc::new(task),
         plan: Arc::new(plan),
@@ -73,8 +73,7 @@ fn upper_limit(case: &Case, parameter: usize) -> String {
     let mut oracle = case.oracle();
     let all = limits(&mut oracle, &sharp, &Rational::ONE);
     let limit: &Limit = all[parameter][1].as_ref().expect("something limits it");
-    let epsilon = epsilon();
-    Explainer::new(&case.task, &case.plan, &epsilon)
+    Explainer::new(&case.task, &case.plan)
         .limit(ParameterId::from(parameter), Side::Upper, limit)
         .expect("it is limited")
 }

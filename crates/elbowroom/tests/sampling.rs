@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::validate::{self, validate};
-use elbowroom_num::Rational;
 use elbowroom_plan::{ParametrizedPlan, format};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -56,12 +55,11 @@ fn values_and_schedules_in_the_boxes_of_figure_4_pass_the_judge() {
 
 /// Samples the instance's box; false if the plan does not work at its nominal values.
 fn attack(instance: &Instance) -> bool {
-    let mut task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
+    let task = shared::task(&instance.domain, &instance.problem).expect("a readable problem");
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
-    let plan: ParametrizedPlan = format::read(&bytes, &mut task).expect("a readable plan");
+    let plan: ParametrizedPlan = format::read(&bytes, &task).expect("a readable plan");
     let (task, plan) = (Arc::new(task), Arc::new(plan));
-    let mut oracle =
-        Oracle::new(&task, &plan, &Rational::new(1, 1000), Guarantee::Weak).expect("within reach");
+    let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     })

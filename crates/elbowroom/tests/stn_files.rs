@@ -127,17 +127,17 @@ fn every_stn_plan_file_of_the_benchmarks_is_read_and_written() {
             without_problem += 1;
             continue;
         }
-        let mut task = match shared::task(&domain, &problem) {
+        let task = match shared::task(&domain, &problem) {
             Ok(task) => task,
             Err(error) => {
                 mistakes.push(error);
                 continue;
             }
         };
-        match format::read(&fs::read(path).unwrap(), &mut task) {
+        match format::read(&fs::read(path).unwrap(), &task) {
             Ok(plan) => {
                 let text = format::write(&task, &plan).unwrap();
-                let again = format::read(text.as_bytes(), &mut task).unwrap();
+                let again = format::read(text.as_bytes(), &task).unwrap();
                 assert_eq!(again, plan, "{}", path.display());
             }
             Err(errors) => mistakes.push(format!("{}: {errors}", path.display())),

@@ -7,13 +7,11 @@
 
 use std::fmt;
 
-use elbowroom_num::Rational;
+use elbowroom_num::Interval;
 use elbowroom_plan::uncertain::{Impossible, PlanNetwork};
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
-use elbowroom_stn::uncertain::{
-    Conflict, ContingentLink, Ground, StrongConflict, UncertainNetwork,
-};
-use elbowroom_stn::{Constraint, Network, Weight};
+use elbowroom_stn::Weight;
+use elbowroom_stn::uncertain::{Conflict, Ground, LinkId, Recheck, StrongConflict, Unit};
 
 /// What no executor can satisfy without knowing beforehand what it learns too late.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,24 +58,126 @@ impl fmt::Display for ControlConflict {
     }
 }
 
-/// Why the plan cannot be executed by one who learns each value only as it comes about.
-pub(crate) fn dynamic_conflict(
-    plan: &ParametrizedPlan,
-    envelope: &DecoupledEnvelope,
-) -> Option<ControlConflict> {
-    let network = match plan.uncertain_network(envelope) {
-        Ok(network) => network,
-        Err(impossible) => return Some(unsatisfiable(impossible)),
-    };
-    // Whole numbers are several times faster.
-    let conflict = match whole(&network.network) {
-        Some(whole) => whole.conflict().map(|conflict| grounds_of(&conflict)),
-        None => network
-            .network
-            .conflict()
-            .map(|conflict| grounds_of(&conflict)),
-    };
-    conflict.map(|grounds| in_the_plan(plan, &network, &grounds))
+/// Decides on dynamic controllability. It keeps the network of the last box that was found
+/// controllable, and checks a box that differs from it in one parameter only where that matters.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DynamicControl {
+    kept: Option<Kept>,
+}
+
+/// The network of a controllable box.
+#[derive(Clone, Debug)]
+struct Kept {
+    envelope: DecoupledEnvelope,
+    network: PlanNetwork,
+    unit: Unit,
+    check: Recheck<i64>,
+    /// For each parameter, the link whose bounds are its interval; `None` if it has to do with
+    /// anything else too.
+    links: Vec<Option<LinkId>>,
+}
+
+impl DynamicControl {
+    /// Why the plan cannot be executed by one who learns each value only as it comes about.
+    pub(crate) fn conflict(
+        &mut self,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+    ) -> Option<ControlConflict> {
+        if let Some(kept) = &mut self.kept {
+            match kept.recheck(envelope) {
+                Rechecked::Unknown => {}
+                Rechecked::Controllable => return None,
+                Rechecked::Refused(grounds) => {
+                    return Some(in_the_plan(plan, &kept.network, &grounds));
+                }
+            }
+        }
+        let network = match plan.uncertain_network(envelope) {
+            Ok(network) => network,
+            Err(impossible) => return Some(unsatisfiable(impossible)),
+        };
+        let Some(whole) = network.network.whole() else {
+            let conflict = network.network.conflict()?;
+            return Some(in_the_plan(plan, &network, &grounds_of(&conflict)));
+        };
+        match Recheck::new(whole.network) {
+            Ok(check) => {
+                self.kept = Some(Kept {
+                    envelope: envelope.clone(),
+                    links: links_of(plan, &network),
+                    network,
+                    unit: whole.unit,
+                    check,
+                });
+                None
+            }
+            Err(conflict) => Some(in_the_plan(plan, &network, &grounds_of(&conflict))),
+        }
+    }
+}
+
+impl Kept {
+    /// Checks a box that differs from the kept one in the interval of one link alone; if nothing
+    /// stands against it, it is the kept one from now on.
+    fn recheck(&mut self, envelope: &DecoupledEnvelope) -> Rechecked {
+        let pairs = self.envelope.intervals.iter().zip(&envelope.intervals);
+        let mut moved = pairs.enumerate().filter(|(_, (old, new))| old != new);
+        let Some((index, (_, interval))) = moved.next() else {
+            return Rechecked::Controllable;
+        };
+        let change = self.links[index].zip(self.bounds(interval));
+        let Some((link, (lower, upper))) = change.filter(|_| moved.next().is_none()) else {
+            return Rechecked::Unknown;
+        };
+        match self.check.change(link, lower, upper) {
+            Ok(()) => {
+                self.envelope.clone_from(envelope);
+                Rechecked::Controllable
+            }
+            Err(conflict) => Rechecked::Refused(grounds_of(&conflict)),
+        }
+    }
+
+    /// The bounds of a link in whole numbers, if it can have these.
+    fn bounds(&self, interval: &Interval) -> Option<(i64, Option<i64>)> {
+        let lower = self.unit.whole(interval.lower.value()?)?;
+        let upper = match interval.upper.value() {
+            Some(upper) => Some(self.unit.whole(upper)?),
+            None => None,
+        };
+        let is_in_order = lower >= 0 && upper.is_none_or(|upper| lower <= upper);
+        is_in_order.then_some((lower, upper))
+    }
+}
+
+/// What checking the kept network again has shown.
+enum Rechecked {
+    /// Nothing: the box differs in more than one link.
+    Unknown,
+    Controllable,
+    Refused(Vec<Ground>),
+}
+
+/// For each parameter, the link whose bounds are its interval and that has all to do with it.
+fn links_of(plan: &ParametrizedPlan, network: &PlanNetwork) -> Vec<Option<LinkId>> {
+    let mut uses = vec![0; plan.parameters.len()];
+    for constraint in &plan.plan.constraints {
+        let both = [&constraint.lower, &constraint.upper].map(Bound::parameter);
+        let (first, second) = (both[0], both[1].filter(|_| both[0] != both[1]));
+        for id in first.into_iter().chain(second) {
+            uses[id.index()] += 1;
+        }
+    }
+    let mut links = vec![None; plan.parameters.len()];
+    for (link, &source) in network.network.link_ids().zip(&network.links) {
+        if let Some(id) = plan.plan.constraints[source].lower.parameter()
+            && uses[id.index()] == 1
+        {
+            links[id.index()] = Some(link);
+        }
+    }
+    links
 }
 
 /// Why no times fixed beforehand do for all values.
@@ -108,10 +208,7 @@ fn in_the_plan(
     network: &PlanNetwork,
     grounds: &[Ground],
 ) -> ControlConflict {
-    let parameter = |index: usize| match plan.plan.constraints[index].lower {
-        Bound::Parameter(id) => Some(id),
-        Bound::Finite(_) | Bound::Infinite => None,
-    };
+    let parameter = |index: usize| plan.plan.constraints[index].lower.parameter();
     let ground = |ground: &Ground| match *ground {
         Ground::Requirement(id) => network.constraint_of(id).map(ControlGround::Constraint),
         Ground::Early(link) => parameter(network.links[link.index()]).map(ControlGround::Early),
@@ -120,57 +217,4 @@ fn in_the_plan(
     ControlConflict {
         grounds: grounds.iter().filter_map(ground).collect(),
     }
-}
-
-/// The network with all bounds multiplied by their common denominator, if that gives numbers of
-/// which none that the check computes overflows.
-fn whole(network: &UncertainNetwork) -> Option<UncertainNetwork<i64>> {
-    /// Distances stay within the largest bound, sums of two far below overflow.
-    const LARGEST: i128 = 1 << 50;
-    let requirements = network.requirements().constraints().iter();
-    let bounds = requirements.clone().map(|constraint| &constraint.bound);
-    let links = network.links().iter();
-    let bounds = bounds.chain(links.clone().map(|link| &link.lower));
-    let bounds = bounds.chain(links.clone().filter_map(|link| link.upper.as_ref()));
-    let mut denominator: i128 = 1;
-    for bound in bounds {
-        let own = i128::from(bound.denominator()?);
-        if denominator % own != 0 {
-            denominator = denominator.checked_mul(own / gcd(denominator, own))?;
-        }
-        if denominator > LARGEST {
-            return None;
-        }
-    }
-    let scaled = |value: &Rational| {
-        let (numerator, own) = value.as_small()?;
-        let value = i128::from(numerator).checked_mul(denominator / i128::from(own))?;
-        (value.abs() <= LARGEST).then(|| i64::try_from(value).ok())?
-    };
-    let mut whole = Network::with_nodes(network.requirements().node_count());
-    for constraint in requirements {
-        whole.add(Constraint {
-            from: constraint.from,
-            to: constraint.to,
-            bound: scaled(&constraint.bound)?,
-        });
-    }
-    let mut whole_links = Vec::with_capacity(network.links().len());
-    for link in links {
-        let upper = match &link.upper {
-            Some(upper) => Some(scaled(upper)?),
-            None => None,
-        };
-        whole_links.push(ContingentLink {
-            activation: link.activation,
-            end: link.end,
-            lower: scaled(&link.lower)?,
-            upper,
-        });
-    }
-    UncertainNetwork::new(whole, whole_links).ok()
-}
-
-fn gcd(a: i128, b: i128) -> i128 {
-    if b == 0 { a } else { gcd(b, a % b) }
 }

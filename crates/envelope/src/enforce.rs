@@ -1,7 +1,6 @@
 //! Obligations that a dispatcher can see to.
 
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, DecoupledEnvelope, ParametrizedPlan, Reason};
 use elbowroom_stn::{ConsistentNetwork, Weight};
 
@@ -22,13 +21,11 @@ use crate::soundness::earliest_schedule;
 pub fn enforced(
     task: &Task,
     plan: &ParametrizedPlan,
-    epsilon: &Rational,
 ) -> Result<(ParametrizedPlan, usize), Refusal> {
     let reduction = Reduction::new(plan);
     let nominal = plan.nominal();
     let schedule = earliest_schedule(&reduction, &nominal).ok_or(Refusal::NoNominalSchedule)?;
-    let obligations =
-        Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
+    let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
     let ranges = DecoupledEnvelope {
         intervals: plan
             .parameters

@@ -5,14 +5,17 @@ use std::collections::BTreeMap;
 use crate::reduction::{Edge, Reduction};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side, Valuation};
+use elbowroom_stn::branching::{Branching, OpenBound, TooManyBranches};
 use elbowroom_stn::{ConsistentNetwork, Constraint, Network};
 
-use crate::branching::{Branching, TooManyBranches};
 use crate::cycles::{Cycles, Role, own_limits};
 
 /// How many corners are kept from one box to the next; if there are more, [`Branching`] looks for
 /// those that matter.
 const MOST_CORNERS: usize = 1 << 8;
+
+/// How many branches [`Branching`] looks at before the question is given up.
+pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 
 /// Whether a plan's network has a schedule for every value in a box (weak controllability).
 ///
@@ -128,15 +131,19 @@ impl Feasibility {
         &self,
         envelope: &DecoupledEnvelope,
     ) -> Result<Option<BTreeMap<ParameterId, Side>>, TooManyBranches> {
+        let bounds = self.edges.iter().filter(|edge| self.matters(edge));
+        let bounds = bounds.map(|edge| OpenBound {
+            from: edge.from,
+            to: edge.to,
+            constant: edge.constant.clone(),
+            quantity: edge.end.map(|end| (end.parameter, end.side)),
+        });
         let network = Branching {
-            edges: self
-                .edges
-                .iter()
-                .filter(|edge| self.matters(edge))
-                .collect(),
-            class_count: self.class_count,
+            bounds: bounds.collect(),
+            node_count: self.class_count,
             is_pair: &|parameter| !self.coupled.contains(&parameter),
             value: &|parameter, side| any_value(envelope.interval(parameter), side),
+            most_branches: MOST_BRANCHES,
         };
         network.corner_without_schedule()
     }

@@ -4,12 +4,12 @@ use std::fmt;
 use std::sync::Arc;
 
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_stn::branching::TooManyBranches;
 
 use serde::{Deserialize, Serialize};
 
-use crate::branching::{MOST_BRANCHES, TooManyBranches};
-use crate::control::{ControlConflict, dynamic_conflict, strong_conflict};
-use crate::feasibility::{Feasibility, Infeasible};
+use crate::control::{ControlConflict, DynamicControl, strong_conflict};
+use crate::feasibility::{Feasibility, Infeasible, MOST_BRANCHES};
 use crate::obligations::Refusal;
 use crate::oracle::Objection;
 use crate::reduction::Reduction;
@@ -63,7 +63,7 @@ impl fmt::Display for Guarantee {
 #[derive(Clone, Debug)]
 pub(crate) enum Controllability {
     Weak(Feasibility),
-    Dynamic(Control),
+    Dynamic(Control, DynamicControl),
     Strong(Control),
 }
 
@@ -96,7 +96,7 @@ impl Controllability {
         };
         match guarantee {
             Guarantee::Weak => Self::Weak(feasibility),
-            Guarantee::Dynamic => Self::Dynamic(control(feasibility)),
+            Guarantee::Dynamic => Self::Dynamic(control(feasibility), DynamicControl::default()),
             Guarantee::Strong => Self::Strong(control(feasibility)),
         }
     }
@@ -122,8 +122,8 @@ impl Controllability {
                 })?;
                 Ok(found.map(Uncontrollable::Weak))
             }
-            Self::Dynamic(control) => {
-                let conflict = dynamic_conflict(&control.plan, envelope);
+            Self::Dynamic(control, dynamic) => {
+                let conflict = dynamic.conflict(&control.plan, envelope);
                 Ok(conflict.map(Uncontrollable::Conflict))
             }
             Self::Strong(control) => {
@@ -140,7 +140,7 @@ impl Controllability {
         found: Uncontrollable,
     ) -> Objection {
         let (Self::Weak(feasibility)
-        | Self::Dynamic(Control { feasibility, .. })
+        | Self::Dynamic(Control { feasibility, .. }, _)
         | Self::Strong(Control { feasibility, .. })) = self;
         match found {
             Uncontrollable::Weak(found) => {

@@ -12,8 +12,47 @@
 //!
 //! Only crates that may ask a solver can import this one: linear programs and minimum cost flows
 //! are solved here, and nothing that decides while a plan is executed depends on them.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//! use std::sync::Arc;
+//!
+//! use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
+//! use elbowroom_model::Task;
+//! use elbowroom_pddl::{Source, read_plan, read_problem};
+//! use elbowroom_plan::deorder::deorder;
+//! use elbowroom_plan::parametrize::parametrize;
+//!
+//! let domain = Source::new(
+//!     "post.pddl",
+//!     "(define (domain post)
+//!        (:requirements :durative-actions :timed-initial-literals)
+//!        (:predicates (open) (delivered))
+//!        (:durative-action deliver :parameters () :duration (= ?duration 10)
+//!          :condition (at end (open)) :effect (at end (delivered))))",
+//! );
+//! let problem = Source::new(
+//!     "letter.pddl",
+//!     "(define (problem letter) (:domain post)
+//!        (:init (open) (at 30 (not (open)))) (:goal (delivered)))",
+//! );
+//! let (problem, _warnings) = read_problem(&domain, &problem)?;
+//! let task = Task::new(problem);
+//! let (plan, _warnings) = read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
+//!
+//! // The network of the plan, with the duration as its parameter.
+//! let deordered = deorder(&task, &plan)?;
+//! let plan = parametrize(&task, deordered.plan, &deordered.nominal, &[])?;
+//!
+//! let mut oracle = Oracle::new(&Arc::new(task), &Arc::new(plan), Guarantee::Dynamic)?;
+//! let run = irr(&mut oracle, &Settings::default(), &mut |_| ControlFlow::Continue(()))?;
+//! let envelope = run.envelope.map_err(|objection| objection.to_string())?;
+//! // The office closes at 30.
+//! assert!(envelope.intervals[0].contains(&28.into()));
+//! assert!(!envelope.intervals[0].contains(&30.into()));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-mod branching;
 mod control;
 mod cycles;
 mod enforce;

@@ -9,7 +9,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 use crate::control::ControlConflict;
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
 use crate::obligations::Refusal;
-use crate::soundness::{Broken, Counterexample, Soundness};
+use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
 /// schedule, and every schedule is valid (paper 1, CHECKINENVELOPE and theorem 1). "There is a
@@ -35,7 +35,6 @@ use crate::soundness::{Broken, Counterexample, Soundness};
 pub struct Oracle {
     task: Arc<Task>,
     plan: Arc<ParametrizedPlan>,
-    epsilon: Rational,
     guarantee: Guarantee,
     controllability: Controllability,
     soundness: Soundness,
@@ -85,16 +84,14 @@ impl Oracle {
     pub fn new(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
-        epsilon: &Rational,
         guarantee: Guarantee,
     ) -> Result<Self, Refusal> {
         let around = plan.nominal();
-        let soundness = Soundness::around(task, plan, epsilon, &around)?;
+        let soundness = Soundness::around(task, plan, &around)?;
         let controllability = Controllability::new(guarantee, plan, soundness.reduction());
         Ok(Self {
             task: Arc::clone(task),
             plan: Arc::clone(plan),
-            epsilon: epsilon.clone(),
             guarantee,
             controllability,
             soundness,
@@ -121,6 +118,11 @@ impl Oracle {
     /// The box that was accepted by [`start`](Self::start), as widened since; `None` before that.
     pub fn accepted(&self) -> Option<&DecoupledEnvelope> {
         self.accepted.as_ref()
+    }
+
+    /// How the conditions that the plan has to meet are met in a box that is accepted.
+    pub fn conditions(&self) -> Conditions {
+        self.soundness.conditions()
     }
 
     /// How many boxes have been checked.
@@ -329,7 +331,7 @@ impl Oracle {
     /// Values in the box that have no schedule, if that shows already.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
-        match Soundness::around(&self.task, &self.plan, &self.epsilon, &nearest) {
+        match Soundness::around(&self.task, &self.plan, &nearest) {
             Ok(soundness) => {
                 self.refuted_before += self.soundness.refutations();
                 self.soundness = soundness;

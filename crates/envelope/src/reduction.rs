@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::{Delta, Rational};
+use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, Network, NodeId as ClassId, Weight,
 };
@@ -138,8 +138,8 @@ impl Reduction {
         upper: &Bound,
     ) {
         let mut parameters = Vec::new();
-        parameters.extend(parameter_of(lower));
-        parameters.extend(parameter_of(upper));
+        parameters.extend(lower.parameter());
+        parameters.extend(upper.parameter());
         let equal = lower == upper && parameters.len() == 2;
         parameters.dedup();
         for parameter in parameters {
@@ -295,43 +295,20 @@ fn implied<W: Weight>(
         .unwrap_or_default()
 }
 
-/// The network with all bounds multiplied by their common denominator, if that gives numbers so
-/// small that no sum of them overflows.
+/// The network with all bounds multiplied by their common denominator, if they are so small that no
+/// sum of them overflows.
 fn scaled(network: &Network<Delta>) -> Option<Network<i128>> {
-    const LARGEST: i128 = 1 << 80;
-    let mut denominator: i128 = 1;
-    for constraint in network.constraints() {
-        let own = i128::from(constraint.bound.real.denominator()?);
-        denominator = denominator.checked_mul(own / gcd(denominator, own))?;
-        if denominator > LARGEST {
-            return None;
-        }
-    }
+    let bounds = network.constraints().iter();
+    let unit = CommonDenominator::of(bounds.map(|constraint| &constraint.bound.real))?;
     let mut whole = Network::with_nodes(network.node_count());
     for constraint in network.constraints() {
-        let (numerator, own) = constraint.bound.real.as_small()?;
-        let bound = i128::from(numerator).checked_mul(denominator / i128::from(own))?;
-        if bound.abs() > LARGEST {
-            return None;
-        }
         whole.add(Constraint {
             from: constraint.from,
             to: constraint.to,
-            bound,
+            bound: i128::from(unit.whole(&constraint.bound.real)?),
         });
     }
     Some(whole)
-}
-
-fn gcd(a: i128, b: i128) -> i128 {
-    if b == 0 { a } else { gcd(b, a % b) }
-}
-
-fn parameter_of(bound: &Bound) -> Option<ParameterId> {
-    match bound {
-        Bound::Parameter(id) => Some(*id),
-        Bound::Infinite | Bound::Finite(_) => None,
-    }
 }
 
 /// Each node's class and offset: a union-find over constraints of the form `[c, c]`.

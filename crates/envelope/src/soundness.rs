@@ -91,15 +91,40 @@ pub struct Counterexample {
 pub fn broken_in(
     task: &Task,
     plan: &ParametrizedPlan,
-    epsilon: &Rational,
     envelope: &DecoupledEnvelope,
 ) -> Result<Option<Broken>, Refusal> {
     let nearest = envelope.nearest(&plan.nominal());
-    let mut soundness = Soundness::around(task, plan, epsilon, &nearest)?;
+    let mut soundness = Soundness::around(task, plan, &nearest)?;
     soundness.broken(task, plan, envelope, None)
 }
 
+/// How the conditions that a plan has to meet are met in all its schedules.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Conditions {
+    /// Those that are bounds on the difference of two times: the network implies them, so that an
+    /// executor that keeps to the network keeps to them.
+    pub differences: usize,
+    /// Those on numbers, or on several differences at once: they hold in every schedule of the network,
+    /// so that an executor need not look at them.
+    pub all_schedules: usize,
+}
+
 impl Soundness {
+    /// How what is required is met.
+    pub(crate) fn conditions(&self) -> Conditions {
+        let direct = self.obligations.direct.iter();
+        let is_difference =
+            |case: &BadCase| case.differences.len() == 1 && case.inequalities.is_empty();
+        let differences = direct
+            .filter(|obligation| obligation.bad_cases.iter().all(is_difference))
+            .count();
+        let all = self.obligations.direct.len() + self.obligations.over_all.len();
+        Conditions {
+            differences,
+            all_schedules: all - differences,
+        }
+    }
+
     /// Compiles a plan's obligations for boxes that hold these values.
     ///
     /// Happenings are required to keep the order that they have there. That is no restriction in a
@@ -111,14 +136,12 @@ impl Soundness {
     pub(crate) fn around(
         task: &Task,
         plan: &ParametrizedPlan,
-        epsilon: &Rational,
         valuation: &[Rational],
     ) -> Result<Self, Refusal> {
         let reduction = Reduction::new(plan);
         let schedule =
             earliest_schedule(&reduction, valuation).ok_or(Refusal::NoNominalSchedule)?;
-        let obligations =
-            Obligations::compile(task, plan, epsilon, &schedule, &reduction.substitution)?;
+        let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
             for (case, bad) in obligation.bad_cases.iter().enumerate() {

@@ -110,7 +110,7 @@ fn a_stronger_guarantee_accepts_no_box_that_a_weaker_one_refuses() {
     let reaches = [1, 2, 5, 9, 20, 100];
     for reach in reaches {
         let accepts = |guarantee| {
-            let oracle = Oracle::new(&task, &plan, &Rational::new(1, 4), guarantee);
+            let oracle = Oracle::new(&task, &plan, guarantee);
             oracle
                 .unwrap()
                 .try_reach(upper(0), Some(number(reach)))

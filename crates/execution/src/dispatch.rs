@@ -24,8 +24,8 @@ use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, netwo
 use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::executor::{Mission, Planned, StepId};
-use crate::horizon::{Behind, Horizon};
-use crate::reason::{Cause, Reason};
+use crate::horizon::{Behind, Horizon, grounds};
+use crate::reason::{About, Cause, Reason};
 use progress::Progress;
 use retry::Retry;
 
@@ -59,7 +59,7 @@ impl Sources {
 
 /// No executor could keep to the plan's network.
 fn contradiction(mission: &Mission, sources: &Sources, behind: &[Behind]) -> Reason {
-    let mut reason = Reason::new(Cause::Late).about("no times satisfy the plan's constraints");
+    let mut reason = Reason::new(Cause::Late).about(About::NoTimes);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
     reason.behind = indices
         .map(|index| explain::words(&mission.task, &mission.plan.plan, index))
@@ -145,7 +145,7 @@ impl Dispatch {
         let network = plan
             .uncertain_network(reading)
             .map_err(|Impossible(index)| {
-                let mut reason = Reason::new(Cause::Late).about("nothing satisfies a constraint");
+                let mut reason = Reason::new(Cause::Late).about(About::EmptyConstraint);
                 reason.behind = vec![explain::words(&mission.task, plan, index)];
                 Box::new(reason)
             })?;
@@ -153,8 +153,9 @@ impl Dispatch {
             requirements: network.requirements,
             links: network.links,
         };
-        let horizon = Horizon::dispatchable(&network.network)
-            .map_err(|behind| Box::new(contradiction(mission, &sources, &behind)))?;
+        let form = mission.forms.of(&network.network);
+        let form = form.map_err(|behind| Box::new(contradiction(mission, &sources, &behind)))?;
+        let horizon = Horizon::dispatchable(form);
         let bounds = |constraint: &Constraint| bounds_of(reading(constraint));
         Ok(Self::with_horizon(mission, horizon, sources, &bounds))
     }
@@ -216,8 +217,8 @@ impl Dispatch {
                 .collect(),
             links: network.links,
         };
-        let mut horizon = Horizon::dispatchable(&network.network).map_err(|behind| {
-            let mut words: Vec<String> = behind
+        let form = network.network.dispatchable().map_err(|conflict| {
+            let mut words: Vec<String> = grounds(&conflict.steps)
                 .iter()
                 .filter_map(|behind| sources.of(*behind))
                 .map(words)
@@ -225,6 +226,7 @@ impl Dispatch {
             words.dedup();
             words
         })?;
+        let mut horizon = Horizon::dispatchable(Arc::new(form));
         for (node, _) in self.plan.nodes() {
             if let Some(time) = self.happened(node) {
                 let _ = horizon.fix(network_node(node), time);
@@ -271,7 +273,7 @@ impl Dispatch {
             plan,
             nominal: mission.nominal.clone(),
             origin: mission.origin.clone(),
-            epsilon: mission.epsilon.clone(),
+            epsilon: mission.task.epsilon().clone(),
             horizon,
             sources,
             ends,
@@ -342,11 +344,11 @@ impl Dispatch {
     }
 
     /// What the plan's own bounds on an instance's duration are about.
-    fn duration_in_words(&self, id: InstanceId) -> &'static str {
+    fn duration_of(&self, id: InstanceId) -> About {
         if self.resumed.contains(&id) {
-            "what was left of its duration"
+            About::RestOfDuration
         } else {
-            "duration"
+            About::Duration
         }
     }
 
@@ -394,7 +396,7 @@ impl Dispatch {
 fn durations(plan: &StnPlan, bounds: &dyn Fn(&Constraint) -> Bounds) -> Vec<Bounds> {
     let mut durations = vec![(None, None); plan.instances.len()];
     for constraint in &plan.constraints {
-        if let Some(id) = duration_of(plan, constraint) {
+        if let Some(id) = plan.duration_of(constraint) {
             let known: &mut Bounds = &mut durations[id.index()];
             *known = both(std::mem::take(known), bounds(constraint));
         }
@@ -414,15 +416,6 @@ fn bounds_of(reading: Reading) -> Bounds {
 fn both(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())
-}
-
-/// The instance whose duration a constraint bounds.
-pub(crate) fn duration_of(plan: &StnPlan, constraint: &Constraint) -> Option<InstanceId> {
-    let node = |id: NodeId| plan.nodes[id.index()];
-    match (node(constraint.from), node(constraint.to)) {
-        (Node::Start(start), Node::End(end)) if start == end => Some(start),
-        _ => None,
-    }
 }
 
 fn ends_of(plan: &StnPlan) -> Vec<[NodeId; 2]> {

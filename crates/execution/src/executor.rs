@@ -6,9 +6,11 @@ use std::sync::Arc;
 use elbowroom_model::ground::{Action, FactId, FluentId};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, Schedule};
+use elbowroom_plan::{DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule};
 
 use crate::event::{Ending, Measured, Ticket};
+use crate::forms::Forms;
+use crate::preparation::Need;
 use crate::progression::Progression;
 use crate::reason::Reason;
 
@@ -26,7 +28,10 @@ impl From<InstanceId> for StepId {
 
 /// Chooses what to do next. No clock, no input or output, no randomness: the same history leads to
 /// the same decisions.
-pub trait Executor {
+pub trait Executor: Send {
+    /// What it needs to know of a plan.
+    fn need(&self) -> Need;
+
     /// Takes up a plan, and forgets the one before.
     ///
     /// # Errors
@@ -69,10 +74,13 @@ pub struct Mission {
     pub nominal: Schedule,
     /// In which values of the open quantities the plan is guaranteed to work.
     pub envelope: Option<DecoupledEnvelope>,
+    /// Forms of the plan's network that executors have asked for before.
+    pub forms: Forms,
+    /// The partial order of the plan's happenings, for those that need it
+    /// ([`Need::PartialOrder`]); its instances are the plan's steps in order of start.
+    pub order: Option<PartialOrderPlan>,
     /// The plan's first steps that are running already.
     pub running: BTreeMap<StepId, Ticket>,
-    /// The least separation of interfering happenings (ε).
-    pub epsilon: Rational,
 }
 
 /// A moment at which to decide.

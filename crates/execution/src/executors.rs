@@ -26,7 +26,7 @@ pub use lookahead::Foresight;
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
 use crate::preparation::{Need, Region};
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 /// Every executor, in the order in which help and reports list them.
 pub const EXECUTORS: &[Registered] = &[
@@ -133,6 +133,23 @@ impl ExecutorSpec {
     }
 }
 
+impl PartialEq for ExecutorSpec {
+    /// Names are unique, and where code lies in memory says nothing.
+    fn eq(&self, other: &Self) -> bool {
+        self.registered.name == other.registered.name && self.argument == other.argument
+    }
+}
+
+impl Default for ExecutorSpec {
+    /// `guarded`.
+    fn default() -> Self {
+        Self {
+            registered: &guarded::REGISTERED,
+            argument: None,
+        }
+    }
+}
+
 impl fmt::Debug for ExecutorSpec {
     /// Its name: where its code lies in memory is another in each process.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -178,7 +195,7 @@ impl FromStr for ExecutorSpec {
             (Some(meaning), None) => {
                 return Err(wrong(format!(
                     "say which {meaning}, as in `{}`",
-                    registered.usage().replace(['X'], "30")
+                    registered.example()
                 )));
             }
             (Some(meaning), Some(argument)) => {
@@ -206,13 +223,21 @@ impl Registered {
             None => self.name.to_owned(),
         }
     }
+
+    /// One that there is: `guarded`, `fixed:30`, `live`.
+    pub fn example(&self) -> String {
+        match self.argument {
+            Some(_) if !self.is_optional => format!("{}:30", self.name),
+            _ => self.name.to_owned(),
+        }
+    }
 }
 
 /// What an executor says that has no plan.
 fn without_plan() -> Decided {
     Decided {
         decision: Decision::Replan,
-        reason: Reason::new(Cause::PlanDone).about("there is no plan"),
+        reason: Reason::new(Cause::PlanDone).about(About::NoPlan),
     }
 }
 

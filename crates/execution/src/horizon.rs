@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use elbowroom_num::Rational;
-use elbowroom_stn::uncertain::{Dispatcher, Ground, LinkId, Step, UncertainNetwork};
+use elbowroom_stn::uncertain::{Dispatchable, Dispatcher, Ground, LinkId, Step};
 use elbowroom_stn::{
     ConsistentNetwork, Constraint, ConstraintId, MovingWindows, Network, NodeId, WindowEnd,
 };
@@ -60,17 +60,9 @@ impl Horizon {
         Self::OneHop(OneHop { network, happened })
     }
 
-    /// The network, ready to be dispatched.
-    ///
-    /// # Errors
-    /// Why it is not dynamically controllable.
-    pub(crate) fn dispatchable(network: &UncertainNetwork) -> Result<Self, Vec<Behind>> {
-        match network.dynamic() {
-            Ok(form) => Ok(Self::Dispatchable(Box::new(Dispatcher::new(Arc::new(
-                form,
-            ))))),
-            Err(conflict) => Err(grounds(&conflict.steps)),
-        }
+    /// A network in a form that can be dispatched.
+    pub(crate) fn dispatchable(form: Arc<Dispatchable<Rational>>) -> Self {
+        Self::Dispatchable(Box::new(Dispatcher::new(form)))
     }
 
     /// Whether all that must come before a time point has happened, as far as that is known here.
@@ -184,7 +176,8 @@ fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<Behind> 
     behind
 }
 
-fn grounds(steps: &[Step]) -> Vec<Behind> {
+/// The parts of a network behind these steps.
+pub(crate) fn grounds(steps: &[Step]) -> Vec<Behind> {
     let ground = |step: &Step| match step.ground {
         Ground::Requirement(id) => Behind::Constraint(id),
         Ground::Early(link) | Ground::Late(link) => Behind::Link(link),

@@ -6,10 +6,9 @@
 //! the same code.
 //!
 //! - [`Executor`]: chooses. [`executors::EXECUTORS`] lists them all.
-//! - [`run::run`]: the loop of deciding, waiting, taking in what was observed, and replanning.
+//! - [`run::Run`]: deciding, waiting, taking in what was observed, and replanning.
 //! - [`Progression`]: a state that follows what happens.
 //! - [`Recorder`]: takes the record of a run.
-//! - [`untimed`]: the same where there is no time, as in the experiments of paper 2.
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
 //! [`Planner`], [`Preparer`], [`Region`] (what a plan survives) and [`Odds`] (how likely it is to
@@ -30,6 +29,7 @@ mod dispatch;
 mod event;
 mod executor;
 pub mod executors;
+mod forms;
 mod horizon;
 mod odds;
 mod planning;
@@ -40,15 +40,15 @@ mod quantities;
 mod reason;
 mod record;
 pub mod run;
-pub mod untimed;
 mod world;
 
 pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
 pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};
-pub use reason::{Cause, Promise, Reason};
+pub use reason::{About, Cause, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
 pub use world::{Passage, World, WorldError};

@@ -6,7 +6,7 @@ use crate::executor::Mission;
 use crate::progression::Progression;
 
 /// Knows how likely plans are to succeed.
-pub trait Odds {
+pub trait Odds: Send {
     /// Compares the rest of the present plan with a plan made now; `None` where there is no other
     /// plan, or nothing can be said.
     fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared>;

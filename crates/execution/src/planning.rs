@@ -4,15 +4,21 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 /// Makes plans.
-pub trait Planner {
+pub trait Planner: Send {
     /// A plan from here. See [`Situation`] for what such a plan looks like.
     ///
     /// The plan's facts and fluents are those of `task`, whose table may grow for that.
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned;
+    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
+}
+
+impl<P: Planner + ?Sized> Planner for &mut P {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
+        (**self).plan(task, situation)
+    }
 }
 
 impl<P: Planner + ?Sized> Planner for Box<P> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> Planned {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
         (**self).plan(task, situation)
     }
 }
@@ -45,7 +51,7 @@ pub enum PlanAnswer {
 pub struct NoPlanner;
 
 impl Planner for NoPlanner {
-    fn plan(&mut self, _task: &mut Task, _situation: &Situation) -> Planned {
+    fn plan(&mut self, _task: &Task, _situation: &Situation) -> Planned {
         Planned {
             answer: PlanAnswer::NotFound {
                 why: "there is no planner in this run".to_owned(),

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Schedule};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, PartialOrderPlan, Schedule};
+
+use crate::forms::Forms;
 
 /// What an executor needs to know of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,7 +16,10 @@ pub enum Need {
     /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
     /// guaranteed: what `ROSPlan`'s dispatcher has.
     Orderings,
-    /// The same, with as many differences of times fixed as it takes for every schedule to work.
+    /// The same, and the partial order of the plan's happenings, whose layers can be executed in more
+    /// than one order.
+    PartialOrder,
+    /// The orderings, with as many differences of times fixed as it takes for every schedule to work.
     Network,
     /// The same, with quantities left open, and for which values the plan is guaranteed to work if
     /// that can be found out.
@@ -32,10 +37,14 @@ pub struct Prepared {
     pub nominal: Schedule,
     /// For which values it is guaranteed to work, if that was asked for.
     pub envelope: Option<DecoupledEnvelope>,
+    /// Forms of the plan's network that executors have asked for before.
+    pub forms: Forms,
+    /// The partial order of its happenings, if that was asked for ([`Need::PartialOrder`]).
+    pub order: Option<PartialOrderPlan>,
 }
 
 /// Makes plans ready.
-pub trait Preparer {
+pub trait Preparer: Send {
     /// Frees a plan from the order that it does not need, and finds out what was asked for.
     ///
     /// # Errors
@@ -48,8 +57,19 @@ pub trait Preparer {
     ) -> Result<Prepared, String>;
 }
 
+impl<P: Preparer + ?Sized> Preparer for &mut P {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String> {
+        (**self).prepare(task, plan, need)
+    }
+}
+
 /// Knows which values a plan survives.
-pub trait Region {
+pub trait Region: Send {
     /// Why the plan is not guaranteed to work for these values; `None` if it is.
     fn objection(
         &mut self,

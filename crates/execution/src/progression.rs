@@ -109,11 +109,6 @@ impl Progression {
         &self.task
     }
 
-    /// The table of facts and fluents has grown; those known keep their numbers.
-    pub fn know(&mut self, task: Arc<Task>) {
-        self.task = task;
-    }
-
     /// The moment.
     pub fn time(&self) -> &Rational {
         &self.time

@@ -41,7 +41,9 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
                 if let Some(reason) = crate::dispatch::unmet(action, &duration, &state) {
                     return Some(Failure {
                         action: reason.action,
-                        condition: reason.about.unwrap_or_default(),
+                        condition: reason
+                            .about
+                            .map_or(String::new(), |about| about.to_string()),
                     });
                 }
                 let ticket = Ticket(IMAGINED + u64::from(id.0));
@@ -64,7 +66,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
     let unmet = state.unmet(&goal, None);
     (!unmet.is_empty()).then(|| Failure {
         action: None,
-        condition: in_words(&state, &unmet),
+        condition: in_words(&state, &unmet).join(" and "),
     })
 }
 
@@ -110,7 +112,7 @@ fn at_end(state: &Progression, ticket: Ticket) -> Option<Failure> {
     let unmet = state.unmet_on_arrival(&body.end.condition, Some(&underway.planned));
     (!unmet.is_empty()).then(|| Failure {
         action: Some(underway.action.name.clone()),
-        condition: in_words(state, &unmet),
+        condition: in_words(state, &unmet).join(" and "),
     })
 }
 
@@ -118,6 +120,6 @@ fn broken(state: &Progression) -> Option<Failure> {
     let (_, underway) = state.broken()?;
     Some(Failure {
         action: Some(underway.action.name.clone()),
-        condition: in_words(state, &underway.broken_parts()),
+        condition: in_words(state, &underway.broken_parts()).join(" and "),
     })
 }

@@ -1,8 +1,12 @@
 //! Why an executor decides as it does.
 
+mod about;
+
 use std::fmt;
 
 use elbowroom_num::{Interval, Rational};
+
+pub use about::About;
 
 /// Why an executor decides as it does: what was observed or not, what was allowed, what stands
 /// behind that, by how much it was missed, and since when. Times are the world's.
@@ -12,8 +16,8 @@ pub struct Reason {
     pub cause: Cause,
     /// The action it is about.
     pub action: Option<String>,
-    /// The quantity, condition or moment it is about, in words.
-    pub about: Option<String>,
+    /// The quantity, condition, moment or state of affairs that it is about.
+    pub about: Option<About>,
     /// What was observed: a duration, an amount, or the time of a happening.
     pub observed: Option<Rational>,
     /// What is allowed.
@@ -157,8 +161,8 @@ impl Reason {
 
     /// About what.
     #[must_use]
-    pub fn about(mut self, about: impl Into<String>) -> Self {
-        self.about = Some(about.into());
+    pub fn about(mut self, about: About) -> Self {
+        self.about = Some(about);
         self
     }
 
@@ -196,7 +200,8 @@ impl Reason {
     /// The reason without its numbers.
     fn statement(&self) -> String {
         let action = self.action.as_deref().unwrap_or("the plan");
-        let about = self.about.as_deref().unwrap_or("something");
+        let known = self.about.as_ref().map(ToString::to_string);
+        let about = known.as_deref().unwrap_or("something");
         match self.cause {
             Cause::Due => format!("{action} is due"),
             Cause::NothingDue => format!("nothing is due before {about}"),
@@ -204,7 +209,7 @@ impl Reason {
             Cause::Outlived => format!("{action} has not ended in time"),
             Cause::Unreachable => format!("too little time is left for {about}"),
             Cause::Condition => format!("{action} needs {about}, which does not hold"),
-            Cause::Failed => match self.about.as_deref() {
+            Cause::Failed => match known.as_deref() {
                 Some(why) if !why.is_empty() => format!("{action} failed: {why}"),
                 _ => format!("{action} failed"),
             },
@@ -216,7 +221,7 @@ impl Reason {
             Cause::GuaranteeLost => {
                 format!("the rest of the plan is no longer guaranteed: {about}")
             }
-            Cause::NoOrder => match self.about.as_deref() {
+            Cause::NoOrder => match known.as_deref() {
                 Some(why) => format!("no order of the plan's actions can be chosen: {why}"),
                 None => "no order of the plan's actions leads to the goal from here".to_owned(),
             },

@@ -1,8 +1,6 @@
 //! The record of a run: everything that came in and went out, in order.
 
-use std::sync::Arc;
-
-use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 use crate::event::{Command, Observation};
@@ -11,13 +9,16 @@ use crate::reason::Reason;
 use crate::run::Report;
 
 /// Takes the record of a run as it comes about.
-pub trait Recorder {
+pub trait Recorder: Send {
     /// One entry. What is kept must be kept before this returns, so that a run that is cut short
     /// leaves its record.
     fn record(&mut self, entry: &Entry<'_>);
+}
 
-    /// The table of facts and fluents has grown; those known keep their numbers.
-    fn know(&mut self, _task: &Arc<Task>) {}
+impl<R: Recorder + ?Sized> Recorder for &mut R {
+    fn record(&mut self, entry: &Entry<'_>) {
+        (**self).record(entry);
+    }
 }
 
 /// Keeps nothing.

@@ -1,7 +1,11 @@
 //! A run: a plan is executed in a world, watched, and replaced when it no longer works.
 //!
-//! [`Run::go`] is the whole loop. What happens when reports are wrong is defined here, so that no
-//! executor needs to know:
+//! A [`Run`] is a state machine. [`Run::next`] says what it needs of the world: a command carried
+//! out, time, or a look at something; [`Run::observe`] and [`Run::see`] take the answers. Whoever
+//! drives it decides how to wait, so that an event loop can. [`Run::go`] is the loop for a [`World`]
+//! that blocks.
+//!
+//! What happens when reports are wrong is defined here, so that no executor needs to know:
 //!
 //! | report | what is made of it |
 //! | --- | --- |
@@ -25,7 +29,9 @@
 //! world has had a chance to look ([`World::look`]).
 
 mod account;
+mod agenda;
 mod dead_end;
+mod drive;
 mod farewell;
 mod handover;
 mod intake;
@@ -38,41 +44,42 @@ use elbowroom_model::{Footprint, Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
 pub use account::{Account, ExecutedStep};
+pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
-pub use settings::{Patience, PlanningTime, Report, RunSettings, RunningRule, Verdict};
+pub use settings::{
+    Patience, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
+};
 
 use crate::event::{Command, Ticket};
-use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, StepId};
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 use crate::planning::Planner;
-use crate::preparation::{Need, Preparer};
+use crate::preparation::Preparer;
 use crate::progression::Progression;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 use crate::record::{Entry, Recorder};
-use crate::world::{Passage, World, WorldError};
+use crate::world::{World, WorldError};
+use agenda::Todo;
 use dead_end::Happened;
+use farewell::Closing;
 use progress::Progress;
 
-/// What a run needs.
+/// What a run needs, but for the world.
 pub struct Ports<'a> {
-    /// Where it happens.
-    pub world: &'a mut dyn World,
     /// Where plans come from.
-    pub planner: &'a mut dyn Planner,
+    pub planner: Box<dyn Planner + 'a>,
     /// What makes them ready.
-    pub preparer: &'a mut dyn Preparer,
+    pub preparer: Box<dyn Preparer + 'a>,
     /// Who decides.
-    pub executor: &'a mut dyn Executor,
-    /// What the executor needs to know of a plan.
-    pub need: Need,
+    pub executor: Box<dyn Executor + 'a>,
     /// Who takes the record.
-    pub recorder: &'a mut dyn Recorder,
+    pub recorder: Box<dyn Recorder + 'a>,
 }
 
 /// A plan being executed.
 pub struct Run<'a> {
     task: Arc<Task>,
     ports: Ports<'a>,
-    settings: &'a RunSettings,
+    settings: RunSettings,
     now: Rational,
     progress: Progress,
     belief: Progression,
@@ -88,38 +95,46 @@ pub struct Run<'a> {
     /// What was observed and believed, in order.
     history: Vec<Happened>,
     /// Asked whether to end.
-    is_to_end: Option<&'a dyn Fn() -> bool>,
+    is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
+    /// What is to be done before the executor is asked again; what comes next is last.
+    agenda: Vec<Todo>,
+    /// The question that the world has not answered.
+    asked: Option<Next>,
+    /// How the run ends, while what is running is told to stop.
+    closing: Option<Closing>,
+    /// What came of it.
+    report: Option<Report>,
 }
 
-/// Why the loop is left.
+/// Why the plan is not gone on with.
 enum Stop {
     Over(Verdict),
     World(WorldError),
 }
 
-impl From<WorldError> for Stop {
-    fn from(error: WorldError) -> Self {
-        Self::World(error)
-    }
-}
-
-/// Executes a plan, or, without one, first makes one.
+/// Executes a plan in a world, or, without a plan, first makes one.
 ///
 /// Always returns if the ports do: the run has an end ([`RunSettings::time_limit`]), and a world
 /// whose clock does not come forward to it is broken ([`Verdict::WorldFailed`]).
-pub fn run<'a>(
+pub fn run(
     task: Arc<Task>,
     first: Option<&TimeTriggeredPlan>,
-    settings: &'a RunSettings,
-    ports: Ports<'a>,
+    settings: &RunSettings,
+    ports: Ports<'_>,
+    world: &mut dyn World,
 ) -> Report {
-    Run::new(task, settings, ports).go(first)
+    Run::new(task, first.cloned(), settings.clone(), ports).go(world)
 }
 
 impl<'a> Run<'a> {
-    /// A run that has not begun.
-    pub fn new(task: Arc<Task>, settings: &'a RunSettings, ports: Ports<'a>) -> Self {
+    /// A run that has not begun, of this plan; without one, a plan is made first.
+    pub fn new(
+        task: Arc<Task>,
+        first: Option<TimeTriggeredPlan>,
+        settings: RunSettings,
+        ports: Ports<'a>,
+    ) -> Self {
         let allowance = match &settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
@@ -138,8 +153,12 @@ impl<'a> Run<'a> {
             reasons: Vec::new(),
             allowance,
             history: Vec::new(),
-            is_to_end: None,
+            is_to_end: Box::new(|| false),
             is_explaining: false,
+            agenda: vec![Todo::Begin(first)],
+            asked: None,
+            closing: None,
+            report: None,
         }
     }
 
@@ -147,8 +166,8 @@ impl<'a> Run<'a> {
     /// there is a whole report. It is asked before each decision, and after each answer of the world
     /// and of the planner.
     #[must_use]
-    pub fn ending_when(mut self, is_to_end: &'a dyn Fn() -> bool) -> Self {
-        self.is_to_end = Some(is_to_end);
+    pub fn ending_when(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
+        self.is_to_end = Box::new(is_to_end);
         self
     }
 
@@ -159,63 +178,6 @@ impl<'a> Run<'a> {
     pub fn explaining(mut self) -> Self {
         self.is_explaining = true;
         self
-    }
-
-    /// The whole loop: take up a plan, decide, wait, take in what was observed; replan when the
-    /// executor gives the plan up.
-    pub fn go(mut self, first: Option<&TimeTriggeredPlan>) -> Report {
-        let begun = match first {
-            Some(plan) => self.take_up(plan, &Situation::initial(&self.task), &[]),
-            None => self.replan(&Reason::new(Cause::NewPlan)),
-        };
-        let mut outcome = begun;
-        while outcome.is_ok() {
-            outcome = self.step();
-        }
-        let verdict = match outcome {
-            Err(Stop::Over(verdict)) => verdict,
-            Err(Stop::World(error)) => Verdict::WorldFailed { why: error.message },
-            Ok(()) => unreachable!("the loop ends with an error"),
-        };
-        let dead_end = match verdict {
-            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
-            _ => Vec::new(),
-        };
-        if !matches!(verdict, Verdict::WorldFailed { .. }) {
-            self.leave_nothing_running();
-        }
-        let report = Report {
-            verdict,
-            time: self.now.clone(),
-            replans: self.replans,
-            reasons: std::mem::take(&mut self.reasons),
-            dead_end,
-            starts: self.account.started(),
-            executed: self.account.executed(&self.now),
-        };
-        self.ports.recorder.record(&Entry::Over(&report));
-        report
-    }
-
-    /// One decision, and what follows from it.
-    fn step(&mut self) -> Result<(), Stop> {
-        self.heed()?;
-        let decided = self.decide();
-        match decided.decision {
-            Decision::Start(orders) => self.start(orders),
-            Decision::Cancel(steps) => {
-                let tickets: Vec<_> = steps
-                    .iter()
-                    .filter_map(|step| self.account.ticket(*step))
-                    .collect();
-                tickets
-                    .into_iter()
-                    .try_for_each(|ticket| self.cancel(ticket))
-            }
-            Decision::Wait { until } => self.wait(until),
-            Decision::Replan => self.replan(&decided.reason),
-            Decision::GoalReached => self.goal_reached(),
-        }
     }
 
     fn decide(&mut self) -> Decided {
@@ -232,36 +194,54 @@ impl<'a> Run<'a> {
         decided
     }
 
-    fn start(&mut self, orders: Vec<Order>) -> Result<(), Stop> {
-        for order in orders {
-            let ticket = self.account.open(&order, &self.now);
-            let command = Command::Start {
-                ticket,
-                action: order.action,
-                duration: order.duration,
-            };
-            self.ports.recorder.record(&Entry::Command {
-                now: &self.now,
-                command: &command,
-                planned: &order.planned,
-            });
-            self.ports.world.command(&self.now, &command)?;
+    /// One decision; what follows from it goes onto the agenda.
+    fn decide_and_follow(&mut self) -> Result<(), Stop> {
+        self.heed()?;
+        let decided = self.decide();
+        match decided.decision {
+            Decision::Start(orders) => {
+                // What starts at once is told at once, and must be known before anything else is
+                // decided.
+                self.agenda.push(Todo::Pass(self.now.clone()));
+                let orders = orders.into_iter().rev();
+                self.agenda.extend(orders.map(Todo::Start));
+            }
+            Decision::Cancel(steps) => {
+                let tickets = steps.iter().rev();
+                let tickets = tickets.filter_map(|step| self.account.ticket(*step));
+                self.agenda.extend(tickets.map(Todo::Cancel));
+            }
+            Decision::Wait { until } => self.wait(until)?,
+            Decision::Replan => self.replan(&decided.reason)?,
+            Decision::GoalReached => self.goal_reached(),
         }
-        // What starts at once is told at once, and must be known before anything else is decided.
-        let now = self.now.clone();
-        self.pass(&now)
+        Ok(())
     }
 
-    fn cancel(&mut self, ticket: Ticket) -> Result<(), Stop> {
+    fn start(&mut self, order: Order) -> Command {
+        let ticket = self.account.open(&order, &self.now);
+        let command = Command::Start {
+            ticket,
+            action: order.action,
+            duration: order.duration,
+        };
+        self.ports.recorder.record(&Entry::Command {
+            now: &self.now,
+            command: &command,
+            planned: &order.planned,
+        });
+        command
+    }
+
+    fn cancel(&mut self, ticket: Ticket) -> Command {
         let command = Command::Cancel { ticket };
         self.ports.recorder.record(&Entry::Command {
             now: &self.now,
             command: &command,
-            planned: &crate::executor::Planned::default(),
+            planned: &Planned::default(),
         });
         self.account.note_cancel(ticket, &self.now);
-        self.ports.world.command(&self.now, &command)?;
-        Ok(())
+        command
     }
 
     /// Waits until the executor wants to be asked again, or somebody's patience ends.
@@ -269,75 +249,24 @@ impl<'a> Run<'a> {
         let silence = self.next_silence();
         // More of what happens now may still come in; if not, some condition has failed.
         let breaking =
-            (!self.belief.breaking().is_empty()).then(|| &self.now + &self.settings.epsilon);
+            (!self.belief.breaking().is_empty()).then(|| &self.now + self.task.epsilon());
         let until = until.into_iter().chain(silence).chain(breaking).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
-            return self.replan(&Reason::new(Cause::Late).about("the plan waits for nothing"));
+            return self.replan(&Reason::new(Cause::Late).about(About::Nothing));
         };
-        self.pass(&until)?;
-        self.give_up_the_silent()
-    }
-
-    /// Lets time pass and takes in what is observed.
-    fn pass(&mut self, until: &Rational) -> Result<(), Stop> {
-        let until = until.min(&self.settings.time_limit);
-        let until = until.clone();
-        let passage = self.ports.world.wait(&until)?;
-        self.take_up_passage(&until, passage);
-        self.heed()?;
-        if self.now >= self.settings.time_limit {
-            return Err(Stop::Over(Verdict::TimeLimit));
-        }
-        let moves_on = self.progress.note(&self.now, self.steps);
-        moves_on.map_err(|why| Stop::World(WorldError::new(why)))
-    }
-
-    /// Takes in an answer of the world.
-    fn take_up_passage(&mut self, until: &Rational, passage: Passage) {
-        self.know_what_the_world_mentions();
-        self.ports.recorder.record(&Entry::Passed {
-            until,
-            now: &passage.now,
-            observations: &passage.observations,
-        });
-        self.now = passage.now.max(self.now.clone());
-        self.take_in(passage.observations);
-    }
-
-    /// A fact that no plan has mentioned may still matter to the next one.
-    fn know_what_the_world_mentions(&mut self) {
-        if let Some(task) = self.ports.world.grown() {
-            self.know(task);
-        }
-    }
-
-    /// The table of facts and fluents has grown.
-    fn know(&mut self, task: Arc<Task>) {
-        self.task = task;
-        self.belief.know(Arc::clone(&self.task));
-        self.ports.recorder.know(&self.task);
+        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::Pass(until));
+        Ok(())
     }
 
     /// The executor takes the goal for reached. The world may look; then it is, or it is not.
-    fn goal_reached(&mut self) -> Result<(), Stop> {
-        let now = self.now.clone();
+    fn goal_reached(&mut self) {
         let mut footprint = Footprint::of_condition(&self.task, self.task.goal());
-        let facts: Vec<_> = std::mem::take(&mut footprint.reads).into_iter().collect();
-        let fluents: Vec<_> = footprint.reads_fluents.into_iter().collect();
-        let observations = self.ports.world.look(&facts, &fluents)?;
-        self.know_what_the_world_mentions();
-        self.ports.recorder.record(&Entry::Looked {
-            now: &now,
-            observations: &observations,
+        self.asked = Some(Next::Look {
+            facts: std::mem::take(&mut footprint.reads).into_iter().collect(),
+            fluents: footprint.reads_fluents.into_iter().collect(),
         });
-        self.take_in(observations);
-        self.heed()?;
-        if self.is_goal_certain() {
-            return Err(Stop::Over(Verdict::GoalReached));
-        }
-        self.news.clear();
-        self.replan(&Reason::new(Cause::Surprise).about("what the world looks like at the end"))
     }
 
     fn is_goal_certain(&self) -> bool {
@@ -349,7 +278,8 @@ impl<'a> Run<'a> {
         // What deviated may have been the last thing to do.
         if self.is_goal_certain() {
             self.news.clear();
-            return self.goal_reached();
+            self.goal_reached();
+            return Ok(());
         }
         if reason.cause != Cause::NewPlan {
             self.reasons.push(reason.clone());
@@ -359,8 +289,9 @@ impl<'a> Run<'a> {
                 return Err(Stop::Over(Verdict::ReplanLimit));
             }
         }
-        self.settle()?;
-        self.plan_from_here(reason)
+        self.agenda.push(Todo::Plan(reason.clone()));
+        self.settle();
+        Ok(())
     }
 
     /// Makes a plan ready and begins with it. `running` are the tickets of what the situation has
@@ -410,7 +341,10 @@ impl<'a> Run<'a> {
     ) -> Result<Mission, String> {
         let task = Arc::new(situation.rest_of_task(&self.task));
         let plan = situation.rest_of_plan(plan);
-        let prepared = self.ports.preparer.prepare(&task, &plan, self.ports.need)?;
+        let prepared = self
+            .ports
+            .preparer
+            .prepare(&task, &plan, self.ports.executor.need())?;
         Ok(Mission {
             task,
             origin: situation.time.clone(),
@@ -419,8 +353,9 @@ impl<'a> Run<'a> {
             plan: prepared.plan,
             nominal: prepared.nominal,
             envelope: prepared.envelope,
+            forms: prepared.forms,
+            order: prepared.order,
             running: (0..).map(StepId).zip(running.iter().copied()).collect(),
-            epsilon: self.settings.epsilon.clone(),
         })
     }
 }

@@ -1,8 +1,5 @@
 //! Where plans are executed: a port.
 
-use std::sync::Arc;
-
-use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
@@ -23,7 +20,7 @@ use crate::event::{Command, Observation};
 ///
 /// Worlds break contracts. What happens then is defined in [`Run`](crate::run::Run): nothing
 /// hangs, and no report is believed twice.
-pub trait World {
+pub trait World: Send {
     /// Gives a command. Returns at once; what comes of it is observed later.
     ///
     /// # Errors
@@ -47,16 +44,6 @@ pub trait World {
         _fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
         Ok(Vec::new())
-    }
-
-    /// The table of facts and fluents has grown, because a plan mentions new ones. Those known
-    /// keep their numbers.
-    fn know(&mut self, _task: &Arc<Task>) {}
-
-    /// The table with what the last answer has mentioned for the first time, if it has: that table
-    /// which it knew, and more.
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        None
     }
 }
 

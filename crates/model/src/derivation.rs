@@ -8,13 +8,13 @@ mod rules;
 mod strata;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::ground::{Condition, Expression, FactId};
 use crate::problem::Comparison;
 
-pub use rules::GroundRule;
-pub(crate) use rules::Rules;
-pub(crate) use strata::Strata;
+pub use rules::{GroundRule, Rules};
+use strata::Strata;
 
 /// A moment at which conditions are read. A fact or a comparison may say nothing, for the reason
 /// given as `F`.
@@ -70,27 +70,51 @@ fn decided_by<'a, F>(
 }
 
 /// The rules of a task, sorted so that what a rule negates is settled before the rule is used.
-#[derive(Clone, Copy, Debug)]
-pub struct Derivation<'a> {
-    rules: &'a Rules,
-    strata: &'a Strata,
+///
+/// It is that of a moment: rules of facts that are mentioned later are not among them.
+#[derive(Clone, Debug, Default)]
+pub struct Derivation {
+    /// `None` if there are no rules, so that nothing is shared then.
+    sorted: Option<Arc<Sorted>>,
 }
 
-impl<'a> Derivation<'a> {
-    /// `strata` are those of `rules`.
-    pub(crate) fn new(rules: &'a Rules, strata: &'a Strata) -> Self {
-        Self { rules, strata }
+#[derive(Debug)]
+struct Sorted {
+    rules: Arc<Rules>,
+    strata: Strata,
+}
+
+impl Derivation {
+    /// `None` if a derived fact depends on its own negation.
+    pub(crate) fn of(rules: &Arc<Rules>) -> Option<Self> {
+        if rules.is_empty() {
+            return Some(Self::default());
+        }
+        let strata = Strata::of(rules)?;
+        let rules = Arc::clone(rules);
+        let sorted = Some(Arc::new(Sorted { rules, strata }));
+        Some(Self { sorted })
+    }
+
+    fn rules(&self) -> &[GroundRule] {
+        self.sorted.as_ref().map_or(&[], |sorted| &sorted.rules)
+    }
+
+    fn rules_of(&self, fact: FactId) -> &[GroundRule] {
+        let sorted = self.sorted.as_ref();
+        sorted.map_or(&[], |sorted| sorted.rules.of(fact))
     }
 
     /// Whether rules define the fact.
     pub fn defines(&self, fact: FactId) -> bool {
-        self.rules.define(fact)
+        let sorted = self.sorted.as_ref();
+        sorted.is_some_and(|sorted| sorted.rules.define(fact))
     }
 
     /// Whether rules define any fact that the condition reads.
     pub fn is_read_by(&self, condition: &Condition) -> bool {
         let mut is_read = false;
-        if !self.rules.as_slice().is_empty() {
+        if self.sorted.is_some() {
             condition.visit_facts(&mut |fact| is_read |= self.defines(fact));
         }
         is_read
@@ -98,7 +122,7 @@ impl<'a> Derivation<'a> {
 
     /// Calls `visit` for the body of each rule.
     pub fn visit_bodies(&self, visit: &mut impl FnMut(&Condition)) {
-        for rule in self.rules.as_slice() {
+        for rule in self.rules() {
             visit(&rule.body);
         }
     }
@@ -109,13 +133,17 @@ impl<'a> Derivation<'a> {
     /// nothing; all else is false.
     pub fn derive<F: Clone>(&self, basic: &dyn Moment<F>) -> Derived<F> {
         let mut derived = Derived {
-            holding: vec![false; self.strata.table_size()],
+            holding: Vec::new(),
             unclear: BTreeMap::new(),
         };
-        for stratum in self.strata.iter() {
+        let Some(sorted) = &self.sorted else {
+            return derived;
+        };
+        derived.holding.resize(sorted.strata.table_size(), false);
+        for stratum in sorted.strata.iter() {
             match stratum {
-                [fact] if !self.strata.is_recursive(*fact) => {
-                    let bodies = self.rules.of(*fact).iter().map(|rule| &rule.body);
+                [fact] if !sorted.strata.is_recursive(*fact) => {
+                    let bodies = self.rules_of(*fact).iter().map(|rule| &rule.body);
                     let truth = decided_by(bodies, &self.on_top_of(basic, &derived), true);
                     match truth {
                         Ok(truth) => derived.holding[fact.index()] = truth,
@@ -176,7 +204,7 @@ impl<F: Clone> Derived<F> {
 }
 
 struct With<'a, F> {
-    derivation: &'a Derivation<'a>,
+    derivation: &'a Derivation,
     basic: &'a dyn Moment<F>,
     derived: &'a Derived<F>,
 }

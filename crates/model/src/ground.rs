@@ -13,6 +13,10 @@ pub struct FactId(pub u32);
 pub struct FluentId(pub u32);
 
 impl FactId {
+    /// No task numbers a fact so high: from here on, ids are free for whoever needs facts of their
+    /// own beside a task's.
+    pub const FIRST_FREE: Self = Self(1 << 31);
+
     /// The position in the table.
     pub fn index(self) -> usize {
         self.0 as usize

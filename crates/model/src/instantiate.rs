@@ -1,31 +1,35 @@
-//! From lifted to ground: variables replaced by objects, quantifiers expanded.
+//! Actions by schema and arguments.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use crate::ground;
+use crate::grounder::Nothing;
+use crate::problem::{ObjectId, SchemaId};
+use crate::task::Task;
 
-use elbowroom_num::Rational;
-
-use crate::ground::{self, FactId, FluentId};
-use crate::problem::{
-    self, Atom, Body, Condition, Expression, Fluent, ObjectId, SchemaId, TimedChange,
-    UpdateOperator, Variable,
-};
-use crate::task::{InstantiateError, Task, TimedHappening};
-use crate::terms::{resolve, with_arguments};
-
-/// What is known beforehand, so that quantifiers need not be expanded in full.
-pub(crate) trait Foreknowledge {
-    /// The truth of a condition that is the same in every state; `None` for all others.
-    fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool>;
-}
-
-/// Nothing is known beforehand.
-struct Nothing;
-
-impl Foreknowledge for Nothing {
-    fn truth(&self, _: &Condition, _: &[ObjectId]) -> Option<bool> {
-        None
-    }
+/// An action cannot be instantiated as asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum InstantiateError {
+    /// The number of arguments is wrong.
+    #[error("`{action}` takes {expected} arguments, not {found}")]
+    ArgumentCount {
+        /// The action's name.
+        action: String,
+        /// How many it takes.
+        expected: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// An argument is not of the parameter's type.
+    #[error("`{object}` cannot stand for {variable} of `{action}`: it is not of type {expected}")]
+    ArgumentType {
+        /// The action's name.
+        action: String,
+        /// The parameter.
+        variable: String,
+        /// The object given.
+        object: String,
+        /// The type asked for.
+        expected: String,
+    },
 }
 
 impl Task {
@@ -36,59 +40,12 @@ impl Task {
     /// # Errors
     /// When number or types of the arguments do not fit the schema.
     pub fn instantiate(
-        &mut self,
+        &self,
         schema: SchemaId,
         arguments: &[ObjectId],
     ) -> Result<ground::Action, InstantiateError> {
         self.check_arguments(schema, arguments)?;
-        Ok(self.instantiate_knowing(schema, arguments, &Nothing))
-    }
-
-    /// The ground action of a schema with these arguments, which must fit. Quantified conditions
-    /// and effects are expanded only as far as they are not decided by what is known.
-    pub(crate) fn instantiate_knowing(
-        &mut self,
-        schema: SchemaId,
-        arguments: &[ObjectId],
-        known: &dyn Foreknowledge,
-    ) -> ground::Action {
-        let problem = self.problem.clone();
-        let mut binding = arguments.to_vec();
-        let binding = &mut binding;
-        let body = match &problem.schemas[schema.index()].body {
-            Body::Instantaneous { condition, effects } => {
-                ground::Body::Instantaneous(self.ground_snap(condition, effects, binding, known))
-            }
-            Body::Durative {
-                duration,
-                at_start,
-                over_all,
-                at_end,
-                start_effects,
-                end_effects,
-                continuous,
-            } => ground::Body::Durative(ground::DurativeBody {
-                duration: duration
-                    .iter()
-                    .map(|constraint| ground::DurationConstraint {
-                        comparison: constraint.comparison,
-                        bound: self.ground_expression(&constraint.bound, binding),
-                        at_end: constraint.at_end,
-                    })
-                    .collect(),
-                start: self.ground_snap(at_start, start_effects, binding, known),
-                over_all: self.expand(over_all, binding, known),
-                end: self.ground_snap(at_end, end_effects, binding, known),
-                continuous: self.ground_continuous(continuous, binding, known),
-            }),
-        };
-        let name = self.action_name(schema, arguments);
-        ground::Action {
-            schema,
-            arguments: arguments.to_vec(),
-            name,
-            body,
-        }
+        Ok(self.grounding(|grounder| grounder.action(schema, arguments, &Nothing)))
     }
 
     fn check_arguments(
@@ -121,249 +78,4 @@ impl Task {
         }
         Ok(())
     }
-
-    fn ground_snap(
-        &mut self,
-        condition: &Condition,
-        effects: &[problem::Effect],
-        binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
-    ) -> ground::SnapAction {
-        let condition = self.expand(condition, binding, known);
-        let mut ground_effects = Vec::with_capacity(effects.len());
-        for effect in effects {
-            self.for_all(&effect.variables, binding, &mut |task, binding| {
-                if is_known_to_fail(&effect.guard, binding, known) {
-                    return;
-                }
-                let guard = task.ground_guard(&effect.guard, binding, known);
-                let change = task.ground_change(&effect.change, binding);
-                ground_effects.push(ground::Effect { guard, change });
-            });
-        }
-        ground::SnapAction {
-            condition,
-            effects: ground_effects,
-        }
-    }
-
-    fn ground_continuous(
-        &mut self,
-        effects: &[problem::ContinuousEffect],
-        binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
-    ) -> Vec<ground::ContinuousEffect> {
-        let mut ground_effects = Vec::with_capacity(effects.len());
-        for effect in effects {
-            self.for_all(&effect.variables, binding, &mut |task, binding| {
-                if is_known_to_fail(&effect.guard, binding, known) {
-                    return;
-                }
-                ground_effects.push(ground::ContinuousEffect {
-                    guard: task.ground_guard(&effect.guard, binding, known),
-                    fluent: task.ground_fluent(&effect.fluent, binding),
-                    rate: task.ground_expression(&effect.rate, binding),
-                });
-            });
-        }
-        ground_effects
-    }
-
-    fn ground_guard(
-        &mut self,
-        guard: &problem::Guard,
-        binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
-    ) -> ground::Guard {
-        ground::Guard {
-            at_start: self.expand(&guard.at_start, binding, known),
-            over_all: self.expand(&guard.over_all, binding, known),
-            now: self.expand(&guard.now, binding, known),
-        }
-    }
-
-    fn ground_change(&mut self, change: &problem::Change, binding: &[ObjectId]) -> ground::Change {
-        match change {
-            problem::Change::Add(atom) => ground::Change::Add(self.ground_atom(atom, binding)),
-            problem::Change::Delete(atom) => {
-                ground::Change::Delete(self.ground_atom(atom, binding))
-            }
-            problem::Change::Update {
-                operator,
-                fluent,
-                value,
-            } => ground::Change::Update {
-                operator: *operator,
-                fluent: self.ground_fluent(fluent, binding),
-                value: self.ground_expression(value, binding),
-            },
-        }
-    }
-
-    /// The ground form of a condition, with variables bound to `binding` by position.
-    pub(crate) fn ground_condition(
-        &mut self,
-        condition: &Condition,
-        binding: &mut Vec<ObjectId>,
-    ) -> ground::Condition {
-        self.expand(condition, binding, &Nothing)
-    }
-
-    /// As [`Self::ground_condition`], with `known` as for [`Self::instantiate_knowing`].
-    fn expand(
-        &mut self,
-        condition: &Condition,
-        binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
-    ) -> ground::Condition {
-        match condition {
-            Condition::Atom(atom) => ground::Condition::Fact(self.ground_atom(atom, binding)),
-            Condition::Equal(left, right) => {
-                let are_equal = resolve(*left, binding) == resolve(*right, binding);
-                ground::Condition::always(are_equal)
-            }
-            Condition::Compare(comparison, left, right) => ground::Condition::Compare(
-                *comparison,
-                self.ground_expression(left, binding),
-                self.ground_expression(right, binding),
-            ),
-            Condition::Not(part) => {
-                ground::Condition::Not(Box::new(self.expand(part, binding, known)))
-            }
-            Condition::And(parts) => ground::Condition::And(
-                parts
-                    .iter()
-                    .map(|part| self.expand(part, binding, known))
-                    .collect(),
-            ),
-            Condition::Or(parts) => ground::Condition::Or(
-                parts
-                    .iter()
-                    .map(|part| self.expand(part, binding, known))
-                    .collect(),
-            ),
-            Condition::Forall(variables, part) => {
-                ground::Condition::And(self.expand_each(variables, part, binding, known))
-            }
-            Condition::Exists(variables, part) => {
-                ground::Condition::Or(self.expand_each(variables, part, binding, known))
-            }
-        }
-    }
-
-    fn expand_each(
-        &mut self,
-        variables: &[Variable],
-        part: &Condition,
-        binding: &mut Vec<ObjectId>,
-        known: &dyn Foreknowledge,
-    ) -> Vec<ground::Condition> {
-        let mut parts = Vec::new();
-        self.for_all(variables, binding, &mut |task, binding| {
-            parts.push(match known.truth(part, binding) {
-                Some(truth) => ground::Condition::always(truth),
-                None => task.expand(part, binding, known),
-            });
-        });
-        parts
-    }
-
-    pub(crate) fn ground_expression(
-        &mut self,
-        expression: &Expression,
-        binding: &[ObjectId],
-    ) -> ground::Expression {
-        expression.map_fluents(&mut |fluent| self.ground_fluent(fluent, binding))
-    }
-
-    fn ground_atom(&mut self, atom: &Atom, binding: &[ObjectId]) -> FactId {
-        with_arguments(&atom.arguments, binding, |arguments| {
-            self.fact(atom.predicate, arguments)
-        })
-    }
-
-    fn ground_fluent(&mut self, fluent: &Fluent, binding: &[ObjectId]) -> FluentId {
-        with_arguments(&fluent.arguments, binding, |arguments| {
-            self.fluent(fluent.function, arguments)
-        })
-    }
-
-    /// Calls `action` once for each way to append objects for `variables` to the binding.
-    pub(crate) fn for_all(
-        &mut self,
-        variables: &[Variable],
-        binding: &mut Vec<ObjectId>,
-        action: &mut dyn FnMut(&mut Self, &mut Vec<ObjectId>),
-    ) {
-        let Some((first, rest)) = variables.split_first() else {
-            action(self, binding);
-            return;
-        };
-        let domains = self.domains.clone();
-        for &object in &*domains.objects(&first.types) {
-            binding.push(object);
-            self.for_all(rest, binding, action);
-            binding.pop();
-        }
-    }
-
-    /// Adds the rules whose head is `fact`, and, through their bodies, all they depend on.
-    pub(crate) fn ground_rules(&mut self, fact: FactId) {
-        let (predicate, arguments) = self
-            .facts
-            .get_index(fact.index())
-            .cloned()
-            .expect("a fact of this task");
-        let problem = self.problem.clone();
-        let rules_of_predicate = Arc::clone(&self.rules_of_predicate);
-        let mut bodies = Vec::new();
-        for &position in &rules_of_predicate[predicate.index()] {
-            let rule = &problem.rules[position];
-            let fits = rule
-                .parameters
-                .iter()
-                .zip(&arguments)
-                .all(|(variable, &object)| problem.has_type(object, &variable.types));
-            if fits {
-                bodies.push(self.ground_condition(&rule.body, &mut arguments.clone()));
-            }
-        }
-        self.rules.add(fact, bodies);
-    }
-
-    /// The timed initials by time, those of one time together in the order of the file.
-    pub(crate) fn ground_timed(&mut self) -> Vec<TimedHappening> {
-        let problem = self.problem.clone();
-        let mut by_time: BTreeMap<Rational, Vec<ground::Change>> = BTreeMap::new();
-        for timed in &problem.timed {
-            let change = match &timed.change {
-                TimedChange::Add(predicate, arguments) => {
-                    ground::Change::Add(self.fact(*predicate, arguments))
-                }
-                TimedChange::Delete(predicate, arguments) => {
-                    ground::Change::Delete(self.fact(*predicate, arguments))
-                }
-                TimedChange::Assign(function, arguments, value) => ground::Change::Update {
-                    operator: UpdateOperator::Assign,
-                    fluent: self.fluent(*function, arguments),
-                    value: ground::Expression::Constant(value.clone()),
-                },
-            };
-            by_time.entry(timed.time.clone()).or_default().push(change);
-        }
-        by_time
-            .into_iter()
-            .map(|(time, changes)| TimedHappening { time, changes })
-            .collect()
-    }
-}
-
-fn is_known_to_fail(
-    guard: &problem::Guard,
-    binding: &[ObjectId],
-    known: &dyn Foreknowledge,
-) -> bool {
-    [&guard.at_start, &guard.over_all, &guard.now]
-        .into_iter()
-        .any(|part| known.truth(part, binding) == Some(false))
 }

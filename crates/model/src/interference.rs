@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::ground::{Action, Body, Change, Condition, Expression, FactId, FluentId, SnapAction};
-use crate::task::{Task, TimedHappening};
+use crate::state::TimedHappening;
+use crate::task::Task;
 
 /// What a happening reads and writes.
 ///
@@ -160,7 +161,7 @@ impl Task {
     /// Calls `visit` for each basic fact that a condition reads; a derived fact counts as all
     /// basic facts that its rules mention, directly or through other derived facts.
     pub fn visit_facts_of(&self, condition: &Condition, visit: &mut impl FnMut(FactId)) {
-        if self.rules().is_empty() {
+        if self.problem.rules.is_empty() || self.rules().is_empty() {
             return condition.visit_facts(visit);
         }
         for fact in self.closure(condition) {
@@ -173,11 +174,12 @@ impl Task {
     /// Calls `visit` for each fluent that a condition reads, also through derived facts.
     pub fn visit_fluents_of(&self, condition: &Condition, visit: &mut impl FnMut(FluentId)) {
         condition.visit_fluents(visit);
-        if self.rules().is_empty() {
+        let rules = self.rules();
+        if rules.is_empty() {
             return;
         }
         for fact in self.closure(condition) {
-            for rule in self.rules_of(fact) {
+            for rule in rules.of(fact) {
                 rule.body.visit_fluents(visit);
             }
         }
@@ -185,6 +187,7 @@ impl Task {
 
     /// The facts that a condition mentions and everything their rules mention, transitively.
     fn closure(&self, condition: &Condition) -> BTreeSet<FactId> {
+        let rules = self.rules();
         let mut reached = BTreeSet::new();
         let mut frontier = Vec::new();
         let mut reach = |condition: &Condition, frontier: &mut Vec<FactId>| {
@@ -196,7 +199,7 @@ impl Task {
         };
         reach(condition, &mut frontier);
         while let Some(fact) = frontier.pop() {
-            for rule in self.rules_of(fact) {
+            for rule in rules.of(fact) {
                 reach(&rule.body, &mut frontier);
             }
         }

@@ -17,12 +17,45 @@
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.
+//!
+//! ```
+//! use elbowroom_model::problem::{Body, Condition, Schema};
+//! use elbowroom_model::validate::{Settings, Verdict, validate};
+//! use elbowroom_model::{Problem, Step, Task, TimeTriggeredPlan};
+//!
+//! let mut problem = Problem::default();
+//! problem.schemas.push(Schema {
+//!     name: "beep".to_owned(),
+//!     parameters: Vec::new(),
+//!     unknowns: Vec::new(),
+//!     body: Body::Instantaneous {
+//!         condition: Condition::TRUE,
+//!         effects: Vec::new(),
+//!     },
+//! });
+//! let task = Task::new(problem);
+//! let beep = task.problem().schema("beep").ok_or("it is there")?;
+//! let action = task.instantiate(beep, &[])?;
+//!
+//! let mut plan = TimeTriggeredPlan::default();
+//! plan.steps.push(Step {
+//!     start: 2.into(),
+//!     action,
+//!     duration: None,
+//! });
+//! match validate(&task, &plan, &Settings::default()) {
+//!     Verdict::Valid(report) => assert_eq!(report.makespan, 2.into()),
+//!     _ => panic!("nothing speaks against it"),
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod derivation;
 mod describe;
 mod domains;
 pub mod expression;
 pub mod ground;
+mod grounder;
 mod hash;
 mod instantiate;
 mod interference;
@@ -33,15 +66,19 @@ pub mod reachability;
 mod residual;
 mod simplify;
 mod situation;
+mod state;
+mod table;
 mod task;
 mod terms;
 pub mod validate;
 
 pub use derivation::GroundRule;
+pub use instantiate::InstantiateError;
 pub use interference::Footprint;
 pub use plan::{Step, TimeTriggeredPlan};
 pub use problem::Problem;
 pub use simplify::Constants;
 pub use situation::{RunningAction, Situation};
-pub use task::{InstantiateError, State, Task, TimedHappening};
+pub use state::{State, TimedHappening};
+pub use task::Task;
 pub use validate::{Verdict, validate, validate_from};

@@ -1,25 +1,27 @@
-//! Facts and fluents that are mentioned by name, by somebody who watches the world.
+//! Facts and fluents by name, as somebody who watches the world gives them.
 
 use crate::ground::{FactId, FluentId};
 use crate::problem::{ObjectId, Problem, Variable};
 use crate::task::Task;
 
 impl Task {
-    /// The fact that `(predicate object …)` names; it enters the table if nothing has mentioned it
-    /// before. `None` if the problem has no such predicate or objects, or their types do not fit.
-    pub fn mention_fact(&mut self, name: &str) -> Option<FactId> {
+    /// The fact that `(predicate object …)` names, in any letter case. `None` if the problem has no
+    /// such predicate or objects, or their types do not fit.
+    pub fn fact_named(&self, name: &str) -> Option<FactId> {
         let (name, objects) = words(name, &self.problem)?;
         let predicate = self.problem.predicate(&name)?;
         let parameters = &self.problem.predicates[predicate.index()].parameters;
-        fit(&objects, parameters, &self.problem).then(|| self.fact(predicate, &objects))
+        fit(&objects, parameters, &self.problem)
+            .then(|| self.grounding(|grounder| grounder.fact(predicate, &objects)))
     }
 
     /// The fluent that `(function object …)` names, in the same way.
-    pub fn mention_fluent(&mut self, name: &str) -> Option<FluentId> {
+    pub fn fluent_named(&self, name: &str) -> Option<FluentId> {
         let (name, objects) = words(name, &self.problem)?;
         let function = self.problem.function(&name)?;
         let parameters = &self.problem.functions[function.index()].parameters;
-        fit(&objects, parameters, &self.problem).then(|| self.fluent(function, &objects))
+        fit(&objects, parameters, &self.problem)
+            .then(|| self.grounding(|grounder| grounder.fluent(function, &objects)))
     }
 }
 
@@ -36,4 +38,99 @@ fn fit(objects: &[ObjectId], parameters: &[Variable], problem: &Problem) -> bool
     let mut pairs = objects.iter().zip(parameters);
     objects.len() == parameters.len()
         && pairs.all(|(object, parameter)| problem.has_type(*object, &parameter.types))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use super::Task;
+    use crate::problem::{Object, Predicate, Problem, Type, TypeId, Variable};
+
+    /// A predicate of two objects, and a hundred objects; nothing holds.
+    fn task() -> Task {
+        let thing = |name: &str| Variable {
+            name: name.to_owned(),
+            types: vec![TypeId::from(0)],
+        };
+        Task::new(Problem {
+            types: vec![Type {
+                name: "object".to_owned(),
+                parents: Vec::new(),
+            }],
+            objects: (0..100)
+                .map(|number| Object {
+                    name: format!("o{number}"),
+                    types: vec![TypeId::from(0)],
+                })
+                .collect(),
+            predicates: vec![Predicate {
+                name: "near".to_owned(),
+                parameters: vec![thing("?a"), thing("?b")],
+                is_derived: false,
+            }],
+            ..Problem::default()
+        })
+    }
+
+    #[test]
+    fn a_fact_has_one_number_in_all_clones_whoever_mentions_it() {
+        let task = task();
+        let clone = task.clone();
+        let first = clone
+            .fact_named("(near o1 o2)")
+            .expect("objects of the problem");
+        let second = task
+            .fact_named("( NEAR O2  o1 )")
+            .expect("objects of the problem");
+        assert_eq!(task.fact_named("(near o1 o2)"), Some(first));
+        assert_eq!(clone.fact_name(second), "(near o2 o1)");
+        assert_eq!((task.fact_count(), clone.fact_count()), (2, 2));
+    }
+
+    #[test]
+    fn what_the_problem_does_not_have_gets_no_number() {
+        let task = task();
+        for name in [
+            "",
+            "()",
+            "(far o1 o2)",
+            "(near o1)",
+            "(near o1 o2 o3)",
+            "(near o1 o100)",
+        ] {
+            assert_eq!(task.fact_named(name), None, "{name}");
+            assert_eq!(task.fluent_named(name), None, "{name}");
+        }
+        assert_eq!(task.fact_count(), 0);
+    }
+
+    #[test]
+    fn a_table_of_ones_own_keeps_the_numbers_and_goes_its_own_way() {
+        let task = task();
+        let shared = task.fact_named("(near o1 o2)");
+        let own = task.with_own_table();
+        assert_eq!(
+            own.fact_named("(near o3 o4)"),
+            task.fact_named("(near o5 o6)")
+        );
+        assert_eq!(own.fact_named("(near o1 o2)"), shared);
+        assert_eq!((task.fact_count(), own.fact_count()), (2, 2));
+    }
+
+    #[test]
+    fn threads_that_share_a_table_agree() {
+        let task = task();
+        let all = || {
+            let pairs = (0..100).flat_map(|a| (0..100).map(move |b| (a, b)));
+            let facts = pairs.map(|(a, b)| task.fact_named(&format!("(near o{a} o{b})")));
+            facts.collect::<Vec<_>>()
+        };
+        let (one, two) = thread::scope(|scope| {
+            let (one, two) = (scope.spawn(all), scope.spawn(all));
+            (one.join().expect("no panic"), two.join().expect("no panic"))
+        });
+        assert_eq!(one, two);
+        assert_eq!(task.fact_count(), 10_000);
+    }
 }

@@ -7,7 +7,8 @@ use crate::ground::Action;
 /// Actions with start times and durations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeTriggeredPlan {
-    /// The steps in the order in which the plan lists them (not necessarily sorted by time).
+    /// The steps, not necessarily sorted by time. Of a plan for what is left to do, the first ones
+    /// are those that are under way ([`Situation`](crate::Situation)).
     pub steps: Vec<Step>,
 }
 
@@ -33,6 +34,19 @@ impl Step {
 }
 
 impl TimeTriggeredPlan {
+    /// The steps in order of start, by name and duration where they start together: the order in
+    /// which a file lists those says nothing.
+    #[must_use]
+    pub fn in_order(mut self) -> Self {
+        self.steps.sort_by(|one, other| {
+            let by_name = || one.action.name.cmp(&other.action.name);
+            let by_duration = || one.duration.cmp(&other.duration);
+            let by_start = one.start.cmp(&other.start);
+            by_start.then_with(by_name).then_with(by_duration)
+        });
+        self
+    }
+
     /// The time of the last happening of the plan's actions; 0 for an empty plan.
     pub fn makespan(&self) -> Rational {
         self.steps.iter().map(Step::end).max().unwrap_or_default()

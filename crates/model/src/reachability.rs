@@ -39,6 +39,7 @@ use std::ops::ControlFlow;
 use crate::derivation::GroundRule;
 use crate::domains::Domains;
 use crate::ground::{Action, Condition, FactId};
+use crate::grounder::Grounder;
 use crate::problem::{self, ObjectId, Problem, SchemaId, TimedChange};
 use crate::task::Task;
 
@@ -101,17 +102,13 @@ pub struct Grounding {
 
 /// Finds all ground actions that can be reached, and enters the facts and fluents that they
 /// mention into the task's table.
-pub fn ground(task: &mut Task, settings: &Settings) -> Answer {
+pub fn ground(task: &Task, settings: &Settings) -> Answer {
     ground_while(task, settings, &mut || true)
 }
 
 /// The same as [`ground`], as long as `goes_on` says so: it is asked every few thousand steps,
 /// which is about every millisecond, and not again once it has said no.
-pub fn ground_while(
-    task: &mut Task,
-    settings: &Settings,
-    goes_on: &mut dyn FnMut() -> bool,
-) -> Answer {
+pub fn ground_while(task: &Task, settings: &Settings, goes_on: &mut dyn FnMut() -> bool) -> Answer {
     let (problem, domains) = (task.problem.clone(), task.domains.clone());
     let mut steps = 0;
     let mut count = || {
@@ -130,30 +127,31 @@ pub fn ground_while(
     let Some(actions) = actions(task, &reachable, &mut memory, goes_on) else {
         return Answer::LimitReached;
     };
+    let all_rules = task.rules();
+    let table = task.table();
     let mut constants = Unwritten {
-        task,
+        table: &table,
         relaxation: &reachable.relaxation,
         memory: &mut memory,
     };
-    let rules = task
-        .rules()
-        .iter()
-        .filter(|rule| facts.contains(&rule.head));
+    let rules = all_rules.iter().filter(|rule| facts.contains(&rule.head));
     let rules = rules.map(|rule| GroundRule {
         head: rule.head,
         body: rule.body.clone().simplified(&mut constants),
     });
     let rules = rules.filter(|rule| !rule.body.is_contradiction()).collect();
     let goal = task.goal.clone().simplified(&mut constants);
+    drop(table);
     let mut unreachable_goals = Vec::new();
-    let goals = &problem.goal;
-    find_unreachable(
-        task,
-        &reachable.relaxation,
-        goals,
-        &mut Vec::new(),
-        &mut unreachable_goals,
-    );
+    task.grounding(|grounder| {
+        find_unreachable(
+            grounder,
+            &reachable.relaxation,
+            &problem.goal,
+            &mut Vec::new(),
+            &mut unreachable_goals,
+        );
+    });
     Answer::Complete(Grounding {
         actions,
         facts,
@@ -204,16 +202,18 @@ fn add_timed(relaxation: &mut Relaxation) {
     }
 }
 
-fn enter_facts(task: &mut Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
+fn enter_facts(task: &Task, relaxation: &Relaxation) -> BTreeSet<FactId> {
     let facts = relaxation.reached.facts();
-    facts
-        .map(|(predicate, arguments)| task.fact(predicate, arguments))
-        .collect()
+    task.grounding(|grounder| {
+        facts
+            .map(|(predicate, arguments)| grounder.fact(predicate, arguments))
+            .collect()
+    })
 }
 
 /// The reached instances as actions, by schema and arguments; `None` if told to stop.
 fn actions(
-    task: &mut Task,
+    task: &Task,
     reachable: &Reachable,
     memory: &mut Memory,
     goes_on: &mut dyn FnMut() -> bool,
@@ -225,11 +225,14 @@ fn actions(
         instances.sort_unstable();
         for arguments in instances {
             let schema = SchemaId::from(index);
-            let action = task.instantiate_knowing(schema, arguments, &reachable.relaxation);
-            let action = action.simplified(&mut Unwritten {
-                task,
-                relaxation: &reachable.relaxation,
-                memory,
+            let relaxation = &reachable.relaxation;
+            let action = task.grounding(|grounder| {
+                let action = grounder.action(schema, arguments, relaxation);
+                action.simplified(&mut Unwritten {
+                    table: grounder.table,
+                    relaxation,
+                    memory,
+                })
             });
             if !action.is_contradiction() {
                 actions.push(action);
@@ -245,7 +248,7 @@ fn actions(
 
 /// Collects the conjuncts of the condition that are not possible.
 fn find_unreachable(
-    task: &mut Task,
+    grounder: &mut Grounder<'_>,
     relaxation: &Relaxation,
     condition: &problem::Condition,
     binding: &mut Vec<ObjectId>,
@@ -257,14 +260,14 @@ fn find_unreachable(
     match condition {
         problem::Condition::And(parts) => {
             for part in parts {
-                find_unreachable(task, relaxation, part, binding, found);
+                find_unreachable(grounder, relaxation, part, binding, found);
             }
         }
         problem::Condition::Forall(variables, part) => {
-            task.for_all(variables, binding, &mut |task, binding| {
-                find_unreachable(task, relaxation, part, binding, found);
+            grounder.for_all(variables, binding, &mut |grounder, binding| {
+                find_unreachable(grounder, relaxation, part, binding, found);
             });
         }
-        other => found.push(task.ground_condition(other, binding)),
+        other => found.push(grounder.ground_condition(other, binding)),
     }
 }

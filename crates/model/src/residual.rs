@@ -8,7 +8,8 @@ use crate::ground::{
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::problem::Comparison;
 use crate::situation::{RunningAction, Situation};
-use crate::task::{Task, TimedHappening};
+use crate::state::TimedHappening;
+use crate::task::Task;
 
 impl Situation {
     /// The rest of `task`, with a clock of its own that reads 0 at [`Situation::time`].

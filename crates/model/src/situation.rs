@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use elbowroom_num::{Interval, Rational};
 
-use crate::ground::{Action, Change, FactId, FluentId};
+use crate::ground::{Action, Change, FluentId};
 use crate::plan::{Step, TimeTriggeredPlan};
-use crate::problem::{FunctionId, ObjectId, PredicateId, TimedChange, TimedInitial};
-use crate::task::{State, Task};
+use crate::problem::{TimedChange, TimedInitial};
+use crate::state::State;
+use crate::task::Task;
 
 /// Where things stand at one moment, and what is still under way.
 ///
@@ -64,11 +65,11 @@ impl Task {
     pub fn beginning_at(&self, situation: &Situation) -> Self {
         let mut problem = (*self.problem).clone();
         let facts = situation.state.facts.iter();
-        problem.initial_facts = facts.map(|&fact| self.symbol_of_fact(fact)).collect();
+        problem.initial_facts = facts.map(|&fact| self.atom(fact)).collect();
         let values = situation.state.values.iter();
         problem.initial_values = values
             .map(|(&fluent, value)| {
-                let (function, arguments) = self.symbol_of_fluent(fluent);
+                let (function, arguments) = self.application(fluent);
                 (function, arguments, value.clone())
             })
             .collect();
@@ -80,11 +81,11 @@ impl Task {
         for body in bodies {
             let at_end = body.end.effects.iter().map(|effect| match &effect.change {
                 Change::Add(fact) => {
-                    let (predicate, arguments) = self.symbol_of_fact(*fact);
+                    let (predicate, arguments) = self.atom(*fact);
                     TimedChange::Add(predicate, arguments)
                 }
                 Change::Delete(fact) => {
-                    let (predicate, arguments) = self.symbol_of_fact(*fact);
+                    let (predicate, arguments) = self.atom(*fact);
                     TimedChange::Delete(predicate, arguments)
                 }
                 Change::Update { fluent, .. } => self.some_value_of(*fluent),
@@ -107,21 +108,9 @@ impl Task {
         task
     }
 
-    /// The predicate and the objects of a fact.
-    pub fn symbol_of_fact(&self, fact: FactId) -> (PredicateId, Vec<ObjectId>) {
-        let symbol = self.facts.get_index(fact.index());
-        symbol.expect("a fact of this task").clone()
-    }
-
-    /// The function and the objects of a fluent.
-    pub fn symbol_of_fluent(&self, fluent: FluentId) -> (FunctionId, Vec<ObjectId>) {
-        let symbol = self.fluents.get_index(fluent.index());
-        symbol.expect("a fluent of this task").clone()
-    }
-
     /// Stands for any change of a fluent: whether it changes is all that reachability asks.
     fn some_value_of(&self, fluent: FluentId) -> TimedChange {
-        let (function, arguments) = self.symbol_of_fluent(fluent);
+        let (function, arguments) = self.application(fluent);
         TimedChange::Assign(function, arguments, Rational::ZERO)
     }
 }

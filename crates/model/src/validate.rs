@@ -11,7 +11,7 @@
 //! - Over-all conditions hold at every moment strictly between start and end. At the time of a
 //!   happening group in between, the state after the group counts.
 //! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
-//!   [`Settings::epsilon`] apart. Timed initials take part, but not against each other.
+//!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
 //! - The goal holds after the last happening of the plan's actions. Timed initials after that do
 //!   not count.
 //!
@@ -59,14 +59,15 @@ use crate::ground::{Body, Condition};
 use crate::plan::TimeTriggeredPlan;
 use crate::problem::Comparison;
 use crate::situation::Situation;
-use crate::task::{State, Task};
+use crate::state::State;
+use crate::task::Task;
 
 /// How strictly to judge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How far apart interfering happenings must be. `None`: they only must not fall into one
-    /// group, which is what VAL asks for.
-    pub epsilon: Option<Rational>,
+    /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
+    /// fall into one group, which is what VAL asks for.
+    pub needs_separation: bool,
     /// VAL's `-t`. Happenings no more than a tenth of it after the first of their group belong to
     /// that group, and happen at its time; durations may miss their bounds by it, strict bounds
     /// excepted.
@@ -77,10 +78,10 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// As exact as can be: tolerance 0, and interfering happenings 0.001 apart.
+    /// As exact as can be: tolerance 0, and interfering happenings ε apart.
     fn default() -> Self {
         Self {
-            epsilon: Some(Rational::new(1, 1000)),
+            needs_separation: true,
             tolerance: Rational::ZERO,
             slack: Rational::ZERO,
         }
@@ -91,7 +92,7 @@ impl Settings {
     /// What VAL does when called with `-t tolerance`.
     pub fn like_val(tolerance: Rational) -> Self {
         Self {
-            epsilon: None,
+            needs_separation: false,
             tolerance,
             slack: Rational::new(1, 10_000),
         }

@@ -72,7 +72,7 @@ const SIZES: [(usize, usize); 3] = [(5, 10), (10, 10), (25, 10)];
 fn dynamically_controllable(bencher: Bencher, (jobs, tasks): (usize, usize)) {
     let file = network(jobs, tasks, 20);
     assert!(file.network.is_dynamically_controllable());
-    bencher.bench_local(|| file.network.dynamic().is_ok());
+    bencher.bench_local(|| file.network.dispatchable().is_ok());
 }
 
 #[divan::bench(args = SIZES)]
@@ -97,7 +97,7 @@ fn not_dynamically_controllable(bencher: Bencher, (jobs, tasks): (usize, usize))
     let links = file.network.links().to_vec();
     file.network = UncertainNetwork::new(requirements, links).expect("sound");
     assert!(!file.network.is_dynamically_controllable());
-    bencher.bench_local(|| file.network.dynamic().is_err());
+    bencher.bench_local(|| file.network.dispatchable().is_err());
 }
 
 #[divan::bench(args = SIZES)]
@@ -134,7 +134,7 @@ fn published(bencher: Bencher, which: &str) {
     }
     println!("{} networks: {which}", files.len());
     bencher.bench_local(|| {
-        let verdicts = files.iter().map(|file| file.network.dynamic().is_ok());
+        let verdicts = files.iter().map(|file| file.network.dispatchable().is_ok());
         verdicts.filter(|&is_controllable| is_controllable).count()
     });
 }

@@ -59,7 +59,7 @@ impl Builder {
     }
 
     /// A new time point.
-    pub(crate) fn point(&mut self, name: &str, at: usize, report: &mut Report<'_>) {
+    pub(crate) fn point(&mut self, name: &str, at: usize, report: &mut Report) {
         if self.by_name.contains_key(name) {
             report.mistake(
                 at,
@@ -79,7 +79,7 @@ impl Builder {
     }
 
     /// The time point of that name; that there is none is a mistake.
-    pub(crate) fn named(&self, name: &str, at: usize, report: &mut Report<'_>) -> Option<NodeId> {
+    pub(crate) fn named(&self, name: &str, at: usize, report: &mut Report) -> Option<NodeId> {
         let node = self.find(name);
         if node.is_none() {
             report.mistake(
@@ -97,7 +97,7 @@ impl Builder {
         (from, to): (NodeId, NodeId),
         (lower, upper): (Bound, Bound),
         at: usize,
-        report: &mut Report<'_>,
+        report: &mut Report,
     ) {
         match upper {
             Bound::Finite(upper) => {
@@ -116,7 +116,7 @@ impl Builder {
     }
 
     /// Adds a contingent link; `None` after a mistake was noted.
-    pub(crate) fn link(&mut self, given: GivenLink, report: &mut Report<'_>) -> Option<LinkId> {
+    pub(crate) fn link(&mut self, given: GivenLink, report: &mut Report) -> Option<LinkId> {
         let GivenLink {
             at,
             activation,
@@ -205,7 +205,7 @@ impl Builder {
     }
 
     /// The network, unless there were mistakes.
-    pub(crate) fn finish(self, report: &mut Report<'_>) -> Option<NetworkFile> {
+    pub(crate) fn finish(self, report: &mut Report) -> Option<NetworkFile> {
         if report.is_failed() {
             return None;
         }
@@ -245,7 +245,7 @@ fn place_of(bad: &BadLink) -> LinkId {
     }
 }
 
-fn unreachable_bound(at: usize, report: &mut Report<'_>) {
+fn unreachable_bound(at: usize, report: &mut Report) {
     report.mistake(
         at,
         "no difference of times is as large as that",

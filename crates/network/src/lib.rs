@@ -3,7 +3,7 @@
 //! [`read`] takes the bytes of a file in any of them and answers with a [`NetworkFile`]: time
 //! points with names, requirements, contingent links, and how their durations are distributed.
 //! Numbers are exact. What cannot be read is refused with the place in the text and what to do
-//! ([`Mistakes`]). [`write_json`] and [`write_graphml`] write networks so that [`read()`] reads them
+//! ([`Diagnostics`]). [`write_json`] and [`write_graphml`] write networks so that [`read()`] reads them
 //! back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
 //! [`weak()`] decides whether there is a schedule for whatever the world does.
 //!
@@ -18,8 +18,8 @@
 //!     "links": [{ "activation": "start", "end": "done", "lower": 5, "upper": 8 }] }"#;
 //! let file = read("work.json", text.as_bytes())?;
 //! assert_eq!(file.points, ["start", "done", "late"]);
-//! assert!(file.network.dynamic().is_ok());
-//! # Ok::<(), elbowroom_network::Mistakes>(())
+//! assert!(file.network.dispatchable().is_ok());
+//! # Ok::<(), elbowroom_network::Diagnostics>(())
 //! ```
 
 mod builder;
@@ -34,8 +34,8 @@ mod words;
 mod write;
 mod xml;
 
+pub use elbowroom_text::{Diagnostics, Source};
 pub use file::{Correlation, Duration, Format, GivenWait, NetworkFile};
-pub use mistake::{Mistake, Mistakes};
 pub use read::read;
 pub use weak::{Weak, weak};
 pub use words::number;

@@ -10,14 +10,12 @@ mod plain;
 mod pstn_lib;
 
 use elbowroom_num::Rational;
+use elbowroom_text::{Diagnostics, Source};
 
 use crate::file::NetworkFile;
 use crate::json::{self, Json, Value};
-use crate::mistake::{Mistakes, Report};
+use crate::mistake::Report;
 use crate::number::Bound;
-
-/// Some editors put it before a text.
-const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// Endings of files that describe conditional networks or more, and what these are.
 const REFUSED: [(&str, &str); 6] = [
@@ -44,21 +42,16 @@ const REFUSED_HELP: &str =
 ///
 /// # Errors
 /// When the bytes are no network, or one of a kind that is not supported.
-pub fn read(name: &str, bytes: &[u8]) -> Result<NetworkFile, Mistakes> {
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&text);
-    let mut report = Report::new(text);
-    let file = any(name, text, &mut report);
-    match file {
-        Some(mut file) if !report.is_failed() => {
-            file.remarks = report.into_remarks();
-            Ok(file)
-        }
-        _ => Err(report.into_mistakes(name)),
-    }
+pub fn read(name: &str, bytes: &[u8]) -> Result<NetworkFile, Diagnostics> {
+    let source = Source::from_bytes(name, bytes);
+    let mut report = Report::new(&source);
+    let file = any(name, source.text(), &mut report);
+    let (mut file, remarks) = report.finish(file)?;
+    file.remarks = remarks;
+    Ok(file)
 }
 
-fn any(name: &str, text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
     let ending = ending(name);
     if let Some((_, kind)) = REFUSED.iter().find(|(refused, _)| *refused == ending) {
         report.mistake(
@@ -119,7 +112,7 @@ fn is_trace(line: &str) -> bool {
     line.split(',').next().and_then(is_event).is_some()
 }
 
-fn any_json(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+fn any_json(text: &str, report: &mut Report) -> Option<NetworkFile> {
     let document = json::parse(text, report)?;
     if document.member("format").and_then(Json::text) == Some(elbowroom::FORMAT) {
         return elbowroom::read(&document, report);
@@ -143,7 +136,7 @@ fn any_json(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
 }
 
 /// The list under a name; that it is missing is a mistake.
-fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report<'_>) -> &'j [Json<'a>] {
+fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> &'j [Json<'a>] {
     let Some(member) = required(parent, name, report) else {
         return &[];
     };
@@ -159,11 +152,7 @@ fn list<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report<'_>) -> &'
 }
 
 /// The member of that name; that it is missing is a mistake.
-fn required<'j, 'a>(
-    parent: &'j Json<'a>,
-    name: &str,
-    report: &mut Report<'_>,
-) -> Option<&'j Json<'a>> {
+fn required<'j, 'a>(parent: &'j Json<'a>, name: &str, report: &mut Report) -> Option<&'j Json<'a>> {
     let member = parent.member(name);
     if member.is_none() {
         report.mistake(
@@ -176,7 +165,7 @@ fn required<'j, 'a>(
 }
 
 /// A number or an infinity, as a number or a text.
-fn bound(json: &Json<'_>, report: &mut Report<'_>) -> Option<Bound> {
+fn bound(json: &Json<'_>, report: &mut Report) -> Option<Bound> {
     let read = match &json.value {
         Value::Number(number) => Bound::parse(number),
         Value::Text(text) => Bound::parse(text),
@@ -193,7 +182,7 @@ fn bound(json: &Json<'_>, report: &mut Report<'_>) -> Option<Bound> {
 }
 
 /// A finite number.
-fn number(json: &Json<'_>, report: &mut Report<'_>) -> Option<Rational> {
+fn number(json: &Json<'_>, report: &mut Report) -> Option<Rational> {
     match bound(json, report)? {
         Bound::Finite(number) => Some(number),
         Bound::Infinity | Bound::NegativeInfinity => {
@@ -204,12 +193,7 @@ fn number(json: &Json<'_>, report: &mut Report<'_>) -> Option<Rational> {
 }
 
 /// A bound under a name, or that one if there is none of that name.
-fn bound_or(
-    parent: &Json<'_>,
-    name: &str,
-    missing: Bound,
-    report: &mut Report<'_>,
-) -> Option<Bound> {
+fn bound_or(parent: &Json<'_>, name: &str, missing: Bound, report: &mut Report) -> Option<Bound> {
     match parent.member(name) {
         Some(json) if !matches!(json.value, Value::Null) => bound(json, report),
         _ => Some(missing),
@@ -217,7 +201,7 @@ fn bound_or(
 }
 
 /// The name of a time point: a number or a text.
-fn point_name(json: &Json<'_>, report: &mut Report<'_>) -> Option<String> {
+fn point_name(json: &Json<'_>, report: &mut Report) -> Option<String> {
     match &json.value {
         Value::Number(number) => Some((*number).to_owned()),
         Value::Text(text) => Some(text.clone().into_owned()),
@@ -237,7 +221,7 @@ fn correlation_matrix(
     parent: &Json<'_>,
     name: &str,
     size: usize,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<Vec<Vec<Rational>>> {
     let matrix: Vec<Vec<Rational>> = list(parent, name, report)
         .iter()

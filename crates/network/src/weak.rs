@@ -3,29 +3,19 @@
 //! Weak controllability (Vidal & Fargier 1999): for each choice of durations of the contingent
 //! links there are times for the other points, perhaps such that had to know the durations
 //! beforehand. The durations with a schedule form a convex set, so the corners decide, where each
-//! link is as short or as long as it may be. There are 2ⁿ of them, and nothing avoids that
-//! altogether: the question is co-NP-complete (Morris & Muscettola 1999). But few links need both
-//! ends looked at:
+//! link is as short or as long as it may be; those that matter are found by [`branching`].
 //!
-//! 1. Each link is first taken at its worst on both sides: it ends early and it ends late. If no
-//!    cycle is negative even so, there is always a schedule.
-//! 2. A negative cycle that takes no link both ways is a corner without a schedule.
-//! 3. Only where a negative cycle takes a link both ways, that link is set to the one end, and
-//!    then to the other.
-//!
-//! No simple cycle takes a link there and straight back, so walks that do are not looked at.
 //! A link that may last for ever needs no branching: if anything at all limits its end from
 //! above, some duration is too long.
-
-mod walks;
+//!
+//! [`branching`]: elbowroom_stn::branching
 
 use std::collections::BTreeMap;
 
-use elbowroom_num::Rational;
+use elbowroom_num::{Rational, Side};
+use elbowroom_stn::branching::{Branching, Corner, OpenBound, TooManyBranches};
 use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, ConstraintId, Network, NodeId};
-
-use walks::Walks;
 
 /// What the bounds of a network say about weak controllability.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,26 +64,18 @@ pub enum Given {
     Link(LinkId),
 }
 
-/// One end of what a link may take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Side {
-    Lower,
-    Upper,
-}
-
 /// Whether there is a schedule for whatever the world does; after `most_branches` the question is
 /// given up.
 pub fn weak(network: &UncertainNetwork<Rational>, most_branches: usize) -> Weak {
     if let Some(conflict) = endless(network).or_else(|| own_limit(network)) {
         return Weak::Uncontrollable(conflict);
     }
-    let mut branching = Branching::new(network);
-    match branching.corner_without_schedule(most_branches) {
-        Found::None => Weak::Controllable,
-        Found::TooMany => Weak::Undecided {
+    match corner_without_schedule(network, most_branches) {
+        Ok(None) => Weak::Controllable,
+        Err(TooManyBranches) => Weak::Undecided {
             branches: most_branches,
         },
-        Found::Corner(sides) => {
+        Ok(Some(sides)) => {
             let durations = sides
                 .into_iter()
                 .map(|(link, side)| (link, duration(network.link(link), side)))
@@ -237,188 +219,85 @@ fn own_limit(network: &UncertainNetwork<Rational>) -> Option<WeakConflict> {
     None
 }
 
-/// A bound that depends on the duration of a link, or not.
-#[derive(Clone, Debug)]
-struct Edge {
-    from: NodeId,
-    to: NodeId,
-    /// What it says, where it depends on no link.
-    constant: Rational,
-    /// The link, and whether its duration bounds from above (`to` is the link's end) or from
-    /// below.
-    end: Option<(LinkId, Side)>,
-}
-
-/// Looks for a corner without a schedule.
-struct Branching<'a> {
-    network: &'a UncertainNetwork<Rational>,
-    edges: Vec<Edge>,
-    walks: Walks,
-}
-
-/// The ends that links are set to.
-type Sides = BTreeMap<LinkId, Side>;
-
-enum Found {
-    None,
-    Corner(Sides),
-    TooMany,
-}
-
-impl<'a> Branching<'a> {
-    fn new(network: &'a UncertainNetwork<Rational>) -> Self {
-        let mut edges = Vec::new();
-        for constraint in network.requirements().constraints() {
-            // What a link says of its own difference is as tight; see `own_limit`.
-            let is_own = [
-                (constraint.to, constraint.from),
-                (constraint.from, constraint.to),
-            ]
-            .iter()
-            .any(|&(node, other)| {
-                let link = network.ending_at(node).map(|id| network.link(id));
-                link.is_some_and(|link| link.activation == other)
-            });
-            if !is_own {
-                edges.push(Edge {
-                    from: constraint.from,
-                    to: constraint.to,
-                    constant: constraint.bound.clone(),
-                    end: None,
-                });
-            }
-        }
+/// A corner without a schedule: the links that matter, and at which end each is.
+fn corner_without_schedule(
+    network: &UncertainNetwork<Rational>,
+    most_branches: usize,
+) -> Result<Option<Corner<LinkId>>, TooManyBranches> {
+    let mut bounds = bounds(network);
+    let node_count = network.requirements().node_count();
+    let mut all = Network::with_nodes(node_count);
+    for bound in &bounds {
+        all.add(Constraint::at_most(bound.from, bound.to, Rational::ZERO));
+    }
+    let component = all.components();
+    bounds.retain(|bound| component[bound.from.index()] == component[bound.to.index()]);
+    let branching = Branching {
+        bounds,
+        node_count,
+        is_pair: &|_| true,
+        value: &|link, side| duration(network.link(link), side),
+        most_branches,
+    };
+    let mut corner = branching.corner_without_schedule()?;
+    if let Some(corner) = &mut corner {
+        // Links of one duration, or without an upper bound, are on the cycle as they are.
         for id in network.link_ids() {
             let link = network.link(id);
-            let is_point = link.upper.as_ref() == Some(&link.lower);
-            let mut push = |from, to, constant, side| {
-                edges.push(Edge {
-                    from,
-                    to,
-                    constant,
-                    end: (!is_point && link.upper.is_some()).then_some((id, side)),
-                });
-            };
-            push(link.activation, link.end, link.lower.clone(), Side::Upper);
-            // The other way, a link that may last for ever lies on no cycle; see `endless`.
-            if let Some(upper) = &link.upper {
-                push(link.end, link.activation, -upper, Side::Lower);
-            }
-        }
-        let count = network.requirements().node_count();
-        let walks = Walks::new(&edges, count);
-        Self {
-            network,
-            edges,
-            walks,
-        }
-    }
-
-    fn corner_without_schedule(&mut self, most_branches: usize) -> Found {
-        let mut branches: Vec<Sides> = vec![Sides::new()];
-        let mut looked_at = 0;
-        while let Some(chosen) = branches.pop() {
-            if looked_at == most_branches {
-                return Found::TooMany;
-            }
-            looked_at += 1;
-            let weights: Vec<Rational> = self
-                .edges
-                .iter()
-                .map(|edge| self.weight(edge, &chosen))
-                .collect();
-            let Some(walk) = self.walks.negative(&self.edges, &weights) else {
-                continue;
-            };
-            let mut torn = None;
-            for cycle in simple_cycles(&self.edges, &walk) {
-                let weight: Rational = cycle.iter().map(|&edge| &weights[edge]).sum();
-                if !weight.is_negative() {
-                    continue;
-                }
-                match self.sides(&cycle, &chosen) {
-                    Ok(sides) => return Found::Corner(sides),
-                    Err(link) => torn = torn.or(Some(link)),
-                }
-            }
-            let torn = torn.expect("a negative walk has a negative cycle");
-            for side in [Side::Upper, Side::Lower] {
-                let mut branch = chosen.clone();
-                branch.insert(torn, side);
-                branches.push(branch);
-            }
-        }
-        Found::None
-    }
-
-    /// The bound of an edge, at its worst where nothing is chosen.
-    fn weight(&self, edge: &Edge, chosen: &Sides) -> Rational {
-        let Some((link, side)) = edge.end else {
-            return edge.constant.clone();
-        };
-        let worst = other(side);
-        let value = duration(
-            self.network.link(link),
-            chosen.get(&link).copied().unwrap_or(worst),
-        );
-        match side {
-            Side::Upper => value,
-            Side::Lower => -value,
-        }
-    }
-
-    /// The ends at which a cycle takes its links, beside those chosen before.
-    ///
-    /// # Errors
-    /// A link that it takes at both.
-    fn sides(&self, cycle: &[usize], chosen: &Sides) -> Result<Sides, LinkId> {
-        let mut sides = chosen.clone();
-        for &edge in cycle {
-            let Some((link, side)) = self.edges[edge].end else {
-                continue;
-            };
-            if chosen.contains_key(&link) {
-                continue;
-            }
-            let worst = other(side);
-            if *sides.entry(link).or_insert(worst) != worst {
-                return Err(link);
-            }
-        }
-        // Links of one duration, or without an upper bound, are on the cycle as they are.
-        for id in self.network.link_ids() {
-            let link = self.network.link(id);
             if link.upper.as_ref().is_none_or(|upper| *upper == link.lower) {
-                sides.insert(id, Side::Lower);
+                corner.insert(id, Side::Lower);
             }
         }
-        Ok(sides)
     }
+    Ok(corner)
 }
 
-fn other(side: Side) -> Side {
-    match side {
-        Side::Lower => Side::Upper,
-        Side::Upper => Side::Lower,
-    }
-}
-
-/// Takes a closed walk apart.
-fn simple_cycles(edges: &[Edge], walk: &[usize]) -> Vec<Vec<usize>> {
-    let mut cycles = Vec::new();
-    // Where on the path each node has been left.
-    let mut path: Vec<usize> = Vec::new();
-    let mut at: BTreeMap<NodeId, usize> = BTreeMap::new();
-    for &edge in walk {
-        at.insert(edges[edge].from, path.len());
-        path.push(edge);
-        if let Some(&start) = at.get(&edges[edge].to) {
-            let cycle = path.split_off(start);
-            for &edge in &cycle {
-                at.remove(&edges[edge].from);
-            }
-            cycles.push(cycle);
+/// The bounds of the network, those of links depending on how long the links take.
+fn bounds(network: &UncertainNetwork<Rational>) -> Vec<OpenBound<LinkId>> {
+    let mut bounds = Vec::new();
+    for constraint in network.requirements().constraints() {
+        // What a link says of its own difference is as tight; see `own_limit`.
+        let is_own = [
+            (constraint.to, constraint.from),
+            (constraint.from, constraint.to),
+        ]
+        .iter()
+        .any(|&(node, other)| {
+            let link = network.ending_at(node).map(|id| network.link(id));
+            link.is_some_and(|link| link.activation == other)
+        });
+        if !is_own {
+            bounds.push(OpenBound {
+                from: constraint.from,
+                to: constraint.to,
+                constant: constraint.bound.clone(),
+                quantity: None,
+            });
         }
     }
-    cycles
+    for id in network.link_ids() {
+        let link = network.link(id);
+        if link.upper.is_none() {
+            // The other way, a link that may last for ever lies on no cycle; see `endless`.
+            bounds.push(OpenBound {
+                from: link.activation,
+                to: link.end,
+                constant: link.lower.clone(),
+                quantity: None,
+            });
+            continue;
+        }
+        for (from, to, side) in [
+            (link.activation, link.end, Side::Upper),
+            (link.end, link.activation, Side::Lower),
+        ] {
+            bounds.push(OpenBound {
+                from,
+                to,
+                constant: Rational::ZERO,
+                quantity: Some((id, side)),
+            });
+        }
+    }
+    bounds
 }

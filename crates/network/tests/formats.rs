@@ -143,7 +143,7 @@ fn the_dispatchable_form_is_read_back_with_its_waits() {
         "requirements": [{"from": "X", "to": "C", "lower": -1, "upper": 1}],
         "links": [{"activation": "A", "end": "C", "lower": 2, "upper": 5}] }"#;
     let file = read("f.json", text.as_bytes()).expect("a network");
-    let form = file.network.dynamic().expect("controllable");
+    let form = file.network.dispatchable().expect("controllable");
     let dispatchable = file.dispatchable(&form);
     assert!(!dispatchable.waits.is_empty());
     let again = read("f.json", write_json(&dispatchable).as_bytes()).expect("what was written");
@@ -176,7 +176,7 @@ fn other_kinds_are_refused_by_name() {
     let conditional = samples::GRAPHML.replace(">STNU<", ">CSTNU<");
     let message = refused("f.stnu", &conditional);
     assert!(
-        message.starts_with("f.stnu:5:25: a network of the type CSTNU"),
+        message.starts_with("f.stnu:5:25: error: a network of the type CSTNU"),
         "{message}"
     );
     assert!(refused("f.cstn", samples::GRAPHML).contains("a conditional network (CSTN)"));
@@ -193,7 +193,7 @@ fn other_kinds_are_refused_by_name() {
     assert!(refused("f.stnu", &labelled).contains("values for several cases"));
     assert!(refused("0054", "Z=0, A=3, C(A)=7\n").contains("execution traces, not a network"));
     let kind = samples::PLAIN.replace("STNU", "DTNU");
-    assert!(refused("f.txt", &kind).starts_with("f.txt:2:1: networks of the kind DTNU"));
+    assert!(refused("f.txt", &kind).starts_with("f.txt:2:1: error: networks of the kind DTNU"));
 }
 
 #[test]
@@ -280,46 +280,46 @@ fn mistakes_say_where_and_what_to_do() {
         &[("hello", ""), ("hello", "goodbye"), ("hello", "{}")],
     );
     insta::assert_snapshot!(messages.join("\n"), @r###"
-    f.json:5:49: this type of constraint is not known; known are "stc", "stcu" and "pstc"
-    f.json:7:57: the distribution `X_4.5_0.5` is not known; known are N_mean_deviation, U_from_to, E_rate_from and G_shape_(rate,from)
-    f.json:5:73: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
-    f.json:5:5: the contingent link from `1` to `2` has a lower bound above its upper bound; write the smaller number first; durations are not negative
-    f.json:2:96: there are two time points `3`; give each a name of its own
-    f.json:4:38: there is no time point `1`; list it with the others, or correct the name
-    f.json:5:20: there is no time point `1`; list it with the others, or correct the name
-    f.json:8:20: there is no time point `1`; list it with the others, or correct the name
-    f.json:8:38: there is no time point `7`; list it with the others, or correct the name
-    f.json:6:5: the contingent link from `3` ends where it begins; a link leads from one time point to another
-    f.json:4:75: expected `,` or `}`, found `;`; the file may be cut off or a comma missing
-    f.stnu:10:88: this value is no number; write a number
-    f.stnu:9:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:9:1: this contingent edge and its counterpart do not say which node is the end; the value of the edge from the end back to the beginning is negative or 0
-    f.stnu:12:95: `UC(D)` is no labelled value; write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link
-    f.stnu:11:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:15:1: this wait is for no contingent link that begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
-    f.stnu:11:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:12:1: this contingent edge has no counterpart; a contingent link is one edge there and one back
-    f.stnu:16:1: `</graphml>` stands where `</graph>` should; close elements in the order in which they nest
-    f.plainstnu:12:1: there is no time point `Y`; list it with the others, or correct the name
-    f.plainstnu:12:3: `a` is no number; write a decimal such as 12.5
-    f.plainstnu:15:1: this is no contingent link; write `A 1 3 C`: C comes 1 to 3 after A
-    f.plainstnu:11:1: this heading is not known; known are the kind of network, the numbers and the names of time points, ordinary edges and contingent links
-    f.plainstnu:6:1: the file says that there are 2 ordinary edges, but has none; the file may be cut off
-    f.txt:8:1: there is no node 4; nodes count from 1 to what the line `p sp NODES ARCS` says
-    f.txt:1:1: there is no problem line; add `p sp NODES ARCS` before the arcs
-    f.json:6:22: the deviation is negative; write it without its sign
-    f.json:13:7: this is none of the probabilistic constraints, or one that was named before; list it under `constraints` with its distribution
-    f.json:12:20: this is no correlation matrix of these durations; it has a row and a column for each, is symmetric, and has 1 in its diagonal
-    f.json:10:40: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
-    f.json:1:8: this is no inequality; write `[u, v, w]` for `v - u <= w`
-    f.json:1:72: there is no time point `7`; list it with the others, or correct the name
-    f.json:1:45: this version of the format is not known; version 1 is read
-    f.json:7:18: the distribution `beta` is not known; known are normal, uniform, exponential and gamma
-    f.json:9:13: this wait is for no end of a contingent link; name the end of a link under `until`
-    f.json:7:18: the numbers of this distribution make no sense; deviations and means are not negative, shapes and scales positive, and from <= to
-    f:1:1: the file is empty; give a file with a network
-    f:1:1: this is no format of networks that is known; known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, and DIMACS text
-    f:1:1: this JSON describes no network of a known form; known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), lists of inequalities under the numbers of nodes, and `"format": "elbowroom-network"`
+    f.json:5:49: error: this type of constraint is not known; known are "stc", "stcu" and "pstc"
+    f.json:7:57: error: the distribution `X_4.5_0.5` is not known; known are N_mean_deviation, U_from_to, E_rate_from and G_shape_(rate,from)
+    f.json:5:73: error: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:5:5: error: the contingent link from `1` to `2` has a lower bound above its upper bound; write the smaller number first; durations are not negative
+    f.json:2:96: error: there are two time points `3`; give each a name of its own
+    f.json:4:38: error: there is no time point `1`; list it with the others, or correct the name
+    f.json:5:20: error: there is no time point `1`; list it with the others, or correct the name
+    f.json:8:20: error: there is no time point `1`; list it with the others, or correct the name
+    f.json:8:38: error: there is no time point `7`; list it with the others, or correct the name
+    f.json:6:5: error: the contingent link from `3` ends where it begins; a link leads from one time point to another
+    f.json:4:75: error: expected `,` or `}`, found `;`; the file may be cut off or a comma missing
+    f.stnu:9:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:10:88: error: this value is no number; write a number
+    f.stnu:9:1: error: this contingent edge and its counterpart do not say which node is the end; the value of the edge from the end back to the beginning is negative or 0
+    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:12:95: error: `UC(D)` is no labelled value; write `LC(C):4` or `UC(C):-7`, where C is the end of a contingent link
+    f.stnu:15:1: error: this wait is for no contingent link that begins at the edge's target; `UC(C):-7` on an edge to A needs a contingent link from A to C
+    f.stnu:11:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:12:1: error: this contingent edge has no counterpart; a contingent link is one edge there and one back
+    f.stnu:16:1: error: `</graphml>` stands where `</graph>` should; close elements in the order in which they nest
+    f.plainstnu:12:1: error: there is no time point `Y`; list it with the others, or correct the name
+    f.plainstnu:12:3: error: `a` is no number; write a decimal such as 12.5
+    f.plainstnu:15:1: error: this is no contingent link; write `A 1 3 C`: C comes 1 to 3 after A
+    f.plainstnu:6:1: error: the file says that there are 2 ordinary edges, but has none; the file may be cut off
+    f.plainstnu:11:1: error: this heading is not known; known are the kind of network, the numbers and the names of time points, ordinary edges and contingent links
+    f.txt:8:1: error: there is no node 4; nodes count from 1 to what the line `p sp NODES ARCS` says
+    f.txt:1:1: error: there is no problem line; add `p sp NODES ARCS` before the arcs
+    f.json:6:22: error: the deviation is negative; write it without its sign
+    f.json:13:7: error: this is none of the probabilistic constraints, or one that was named before; list it under `constraints` with its distribution
+    f.json:12:20: error: this is no correlation matrix of these durations; it has a row and a column for each, is symmetric, and has 1 in its diagonal
+    f.json:10:40: error: this is no number; write a decimal such as 12.5, a fraction such as "25/2", "inf" or "-inf"
+    f.json:1:8: error: this is no inequality; write `[u, v, w]` for `v - u <= w`
+    f.json:1:72: error: there is no time point `7`; list it with the others, or correct the name
+    f.json:1:45: error: this version of the format is not known; version 1 is read
+    f.json:7:18: error: the distribution `beta` is not known; known are normal, uniform, exponential and gamma
+    f.json:9:13: error: this wait is for no end of a contingent link; name the end of a link under `until`
+    f.json:7:18: error: the numbers of this distribution make no sense; deviations and means are not negative, shapes and scales positive, and from <= to
+    f:1:1: error: the file is empty; give a file with a network
+    f:1:1: error: this is no format of networks that is known; known are JSON, GraphML, plain STNU text that begins with `# KIND OF NETWORK`, and DIMACS text
+    f:1:1: error: this JSON describes no network of a known form; known are `nodes` and `constraints` (HEATlab), `timepoints` and `constraints` (PSTN-lib), lists of inequalities under the numbers of nodes, and `"format": "elbowroom-network"`
     "###);
 }
 

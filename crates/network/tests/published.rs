@@ -2,11 +2,15 @@
 
 #![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use elbowroom_network::{Format, NetworkFile, read};
+use skipped::skipped;
 
 /// The folder with the networks; `None`, and a word about it, where it is not there.
 fn folder() -> Option<PathBuf> {
@@ -14,7 +18,7 @@ fn folder() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: {} is not there", folder.display());
+    skipped(format_args!("{} is not there", folder.display()));
     None
 }
 
@@ -92,7 +96,7 @@ fn the_published_verdicts_are_reproduced() {
         let file = read_file(&folder.join(name)).expect(name);
         assert_eq!(file.network.links().len().to_string(), links, "{name}");
         let _ = (points, edges);
-        let is_controllable = file.network.clone().dynamic().is_ok();
+        let is_controllable = file.network.clone().dispatchable().is_ok();
         assert_eq!(is_controllable, verdict == "DC", "{name}");
         checked += 1;
     }

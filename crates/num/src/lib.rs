@@ -6,6 +6,7 @@
 //!
 //! - [`Rational`]: an exact fraction.
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
+//! - [`CommonDenominator`]: the unit in which given fractions are whole numbers.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
 //!
@@ -22,10 +23,12 @@
 //! ```
 
 mod delta;
+mod denominator;
 mod interval;
 mod rational;
 pub mod simplex;
 
 pub use delta::Delta;
-pub use interval::{End, Interval};
+pub use denominator::CommonDenominator;
+pub use interval::{End, Interval, Side};
 pub use rational::{ParseRationalError, Rational};

@@ -1,5 +1,6 @@
 //! The exact fraction, with a fast path for small numbers.
 
+mod float;
 mod operators;
 mod text;
 
@@ -245,7 +246,7 @@ impl Rational {
 }
 
 /// The greatest common divisor; `gcd(0, b) = b`.
-fn gcd(a: u128, b: u128) -> u128 {
+pub(crate) fn gcd(a: u128, b: u128) -> u128 {
     // Nearly all operands fit 64 bits, where a division is several times cheaper.
     if let (Ok(a), Ok(b)) = (u64::try_from(a), u64::try_from(b)) {
         return u128::from(gcd_u64(a, b));

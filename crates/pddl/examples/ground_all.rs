@@ -43,10 +43,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             continue;
         };
         let start = Instant::now();
-        let mut task = Task::new(lifted);
+        let task = Task::new(lifted);
         total[1] += start.elapsed();
         let start = Instant::now();
-        let answer = ground(&mut task, &Settings::default());
+        let answer = ground(&task, &Settings::default());
         let seconds = start.elapsed();
         total[2] += seconds;
         let seconds = seconds.as_secs_f64();

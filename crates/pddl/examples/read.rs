@@ -34,9 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         problem.objects.len(),
         problem.initial_facts.len()
     );
-    let mut task = Task::new(problem);
+    let task = Task::new(problem);
     for plan in plan {
-        match read_plan(plan, &mut task) {
+        match read_plan(plan, &task) {
             Ok((plan, warnings)) => {
                 for warning in warnings {
                     println!("{}\n", warning.render(false));

@@ -1,5 +1,7 @@
 //! Features of PDDL that are understood but not executed.
 
+use elbowroom_text::{Diagnostic, Diagnostics};
+
 /// A feature that is refused, or ignored with a warning where it cannot affect validity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Feature {
@@ -68,6 +70,32 @@ impl Feature {
         }
     }
 
+    /// What programs know it by: the [`code`](Diagnostic::code) of diagnostics about it.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::Processes => "processes",
+            Self::Events => "events",
+            Self::GlobalConstraints => "global-constraints",
+            Self::ObjectFluents => "object-fluents",
+            Self::ControlParameters => "control-parameters",
+            Self::TrajectoryConstraints => "trajectory-constraints",
+            Self::Preferences => "preferences",
+            Self::NonlinearTime => "nonlinear-time",
+            Self::StrictDurations => "strict-durations",
+            Self::MixedTimes => "mixed-times",
+            Self::Modules => "modules",
+            Self::OtherSections => "other-sections",
+            Self::UnknownRequirements => "unknown-requirements",
+        }
+    }
+
+    /// The feature that a diagnostic refuses or ignores; `None` for a mistake in the text.
+    pub fn of(diagnostic: &Diagnostic) -> Option<Self> {
+        let code = diagnostic.code?;
+        let mut all = Self::ALL.iter().copied();
+        all.find(|feature| feature.code() == code)
+    }
+
     /// How it is written, and what becomes of it.
     pub fn summary(self) -> &'static str {
         match self {
@@ -98,4 +126,10 @@ impl Feature {
             Self::UnknownRequirements => "requirement flags not known: ignored with a warning",
         }
     }
+}
+
+/// Whether the texts are right as far as we can tell, and only use what is not executed.
+pub fn is_unsupported(diagnostics: &Diagnostics) -> bool {
+    let mut errors = diagnostics.errors();
+    errors.all(|error| Feature::of(error).is_some())
 }

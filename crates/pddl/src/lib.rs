@@ -33,29 +33,25 @@
 //! let (problem, warnings) = read_problem(&domain, &problem)?;
 //! assert!(warnings.is_empty());
 //!
-//! let mut task = Task::new(problem);
-//! let (plan, _) = read_plan(&Source::new("plan", "0.5: (GLOW)"), &mut task)?;
+//! let task = Task::new(problem);
+//! let (plan, _) = read_plan(&Source::new("plan", "0.5: (GLOW)"), &task)?;
 //! assert_eq!(write_plan(&task, &plan), "0.500: (glow) [5.000]\n");
 //!
-//! let mistaken = read_plan(&Source::new("plan", "0.5: (glwo)"), &mut task).unwrap_err();
-//! assert_eq!(mistaken.to_string(), "plan:1:7: error: unknown action `glwo`");
+//! let mistaken = read_plan(&Source::new("plan", "0.5: (glwo)"), &task).unwrap_err();
+//! assert_eq!(mistaken.to_string(), "plan:1:7: error: unknown action `glwo`; did you mean `glow`?");
 //! # Ok::<(), elbowroom_pddl::Diagnostics>(())
 //! ```
 
-mod diagnostic;
 mod feature;
 mod lower;
 mod plan_text;
 mod problem_text;
-mod render;
 mod report;
 mod source;
-mod suggest;
 mod syntax;
 
-pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity};
-pub use feature::Feature;
+pub use elbowroom_text::{Diagnostic, Diagnostics, Label, Severity, Source};
+pub use feature::{Feature, is_unsupported};
 pub use lower::read_problem;
 pub use plan_text::{LineKind, read_plan, write_plan};
 pub use problem_text::{ProblemText, WriteProblemError, end_times, write_problem};
-pub use source::Source;

@@ -26,13 +26,14 @@ mod typed_list;
 use elbowroom_model::Problem;
 use elbowroom_model::problem::TypeId;
 
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::lower::names::Names;
 use crate::lower::sections::Sections;
 use crate::lower::typed_list::TypeNames;
 use crate::report::Report;
-use crate::source::{FileId, Source, Span};
+use crate::source::{FileId, Span};
 use crate::syntax;
+use elbowroom_text::Source;
+use elbowroom_text::{Diagnostic, Diagnostics};
 
 /// Reads a planning problem from the texts of its domain and problem files.
 ///
@@ -40,7 +41,7 @@ use crate::syntax;
 ///
 /// # Errors
 /// When the texts contain mistakes, or features that are not executed
-/// ([`Diagnostics::is_unsupported`]). All that were found are in the diagnostics, and the
+/// ([`is_unsupported`](crate::is_unsupported)). All that were found are in the diagnostics, and the
 /// warnings too.
 pub fn read_problem(
     domain: &Source,

@@ -1,9 +1,10 @@
 //! Collects diagnostics while texts are read.
 
-use crate::diagnostic::{Diagnostic, Label, Severity};
 use crate::feature::Feature;
-use crate::source::{FileId, Source, Span};
-use crate::suggest::nearest;
+use crate::source::{FileId, Span};
+use elbowroom_text::Source;
+use elbowroom_text::nearest;
+use elbowroom_text::{Diagnostic, Label, Severity};
 
 /// More would help nobody; a text with so many mistakes is not PDDL.
 const MOST_DIAGNOSTICS: usize = 200;
@@ -49,7 +50,7 @@ impl Report {
         message: impl Into<String>,
     ) -> &mut Diagnostic {
         let diagnostic = self.error(span, message);
-        diagnostic.feature = Some(feature);
+        diagnostic.code = Some(feature.code());
         diagnostic.label("not supported")
     }
 
@@ -61,7 +62,7 @@ impl Report {
         message: impl Into<String>,
     ) -> &mut Diagnostic {
         let diagnostic = self.warning(span, message);
-        diagnostic.feature = Some(feature);
+        diagnostic.code = Some(feature.code());
         diagnostic.label("ignored")
     }
 
@@ -97,20 +98,23 @@ impl Report {
 
     /// A label for another place that explains the mistake.
     pub(crate) fn label(&self, span: Span, text: impl Into<String>) -> Label {
-        let source = match span.file {
-            FileId::Domain => &self.domain,
-            FileId::Problem => &self.problem,
-        };
         Label {
-            source: source.clone(),
-            range: span.start..span.end,
+            source: self.source(span.file).clone(),
+            span: span.start..span.end,
             text: text.into(),
         }
     }
 
+    fn source(&self, file: FileId) -> &Source {
+        match file {
+            FileId::Domain => &self.domain,
+            FileId::Problem => &self.problem,
+        }
+    }
+
     fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Diagnostic {
-        let label = self.label(span, "");
-        let diagnostic = Diagnostic::new(severity, message, label);
+        let source = self.source(span.file);
+        let diagnostic = Diagnostic::new(severity, source, span.start..span.end, message);
         // An error that is not kept must not turn the outcome into a success: the first error
         // is kept even when warnings have used up the room.
         let is_first_error = severity == Severity::Error

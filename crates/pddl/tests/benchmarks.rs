@@ -3,15 +3,18 @@
 #[allow(dead_code, reason = "the test needs a part of what the example shows")]
 #[path = "../examples/pddl_support/document.rs"]
 mod document;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 #[path = "../examples/pddl_support/survey.rs"]
 mod survey;
 
 use insta::assert_snapshot;
+use skipped::skipped;
 
 #[test]
 fn every_benchmark_is_read_unless_it_is_wrong_or_uses_a_refused_feature() {
     let Some(folder) = survey::folder() else {
-        println!("skipped: there is no benchmark set; set ELBOWROOM_SHARED to its folder");
+        skipped("there is no benchmark set; set ELBOWROOM_SHARED to its folder");
         return;
     };
     let survey = survey::survey(&folder);

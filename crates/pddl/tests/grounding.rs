@@ -1,5 +1,7 @@
 //! Grounds the benchmark set, where it is at hand.
-#![allow(clippy::print_stdout, reason = "it says when it is skipped")]
+
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -7,6 +9,7 @@ use std::path::{Path, PathBuf};
 use elbowroom_model::Task;
 use elbowroom_model::reachability::{Answer, Settings, ground};
 use elbowroom_pddl::{Source, read_plan, read_problem};
+use skipped::skipped;
 
 /// `pddl` in the folder that `ELBOWROOM_SHARED` names, or beside the workspace.
 fn benchmarks() -> Option<PathBuf> {
@@ -17,7 +20,7 @@ fn benchmarks() -> Option<PathBuf> {
         .into_iter()
         .find(|folder| folder.join("manifest.csv").exists());
     if folder.is_none() {
-        println!("skipped: no benchmarks in {}", shared.display());
+        skipped(format_args!("no benchmarks in {}", shared.display()));
     }
     folder
 }
@@ -48,10 +51,10 @@ fn all_readable_instances_are_grounded_within_the_limits() {
     let Some(folder) = benchmarks() else { return };
     let (mut grounded, mut hopeless) = (0, Vec::new());
     for row in rows(&folder, "manifest.csv") {
-        let Some(mut task) = read(&folder, &row[3], &row[4]) else {
+        let Some(task) = read(&folder, &row[3], &row[4]) else {
             continue;
         };
-        let Answer::Complete(grounding) = ground(&mut task, &Settings::default()) else {
+        let Answer::Complete(grounding) = ground(&task, &Settings::default()) else {
             panic!("{} passes a limit", row[4]);
         };
         grounded += 1;
@@ -82,13 +85,13 @@ fn each_action_of_a_valid_plan_is_reached() {
         if !row[8..].iter().any(|verdict| verdict == "valid") {
             continue;
         }
-        let Some(mut task) = read(&folder, &row[3], &row[4]) else {
+        let Some(task) = read(&folder, &row[3], &row[4]) else {
             continue;
         };
-        let Ok((plan, _)) = read_plan(&load(&folder, &row[5]), &mut task) else {
+        let Ok((plan, _)) = read_plan(&load(&folder, &row[5]), &task) else {
             continue;
         };
-        let Answer::Complete(grounding) = ground(&mut task, &Settings::default()) else {
+        let Answer::Complete(grounding) = ground(&task, &Settings::default()) else {
             panic!("{} passes a limit", row[4]);
         };
         let names: BTreeSet<_> = grounding

@@ -70,12 +70,12 @@ fn all_mistakes_of_an_action_are_reported() {
          (:action b :precondition (>= (level) ?z))",
     ));
     assert_snapshot!(found, @r"
-    domain.pddl:6:48: error: `(= …)` does not bound the duration
-    domain.pddl:7:34: error: unknown predicate `blue`
-    domain.pddl:8:40: error: unknown object `nowhere`
-    domain.pddl:8:50: error: `(lit)` does not say when it happens
-    domain.pddl:8:56: error: `(at …)` does not say when it happens
-    domain.pddl:9:47: error: unknown number `?z`
+    domain.pddl:6:48: error: `(= …)` does not bound the duration; expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such
+    domain.pddl:7:34: error: unknown predicate `blue`; declare it under `:predicates`
+    domain.pddl:8:40: error: unknown object `nowhere`; declare it under `:objects` or `:constants`
+    domain.pddl:8:50: error: `(lit)` does not say when it happens; expected `(at start …)` or `(at end …)`, or for continuous change `(increase (f) (* #t rate))`
+    domain.pddl:8:56: error: `(at …)` does not say when it happens; did you mean `at start`?
+    domain.pddl:9:47: error: unknown number `?z`; numbers that stay open are declared under `:synth-parameters`
     ");
 }
 
@@ -102,8 +102,8 @@ fn a_forgotten_parenthesis_is_found_where_the_next_section_begins() {
 fn files_in_the_wrong_order_are_recognized() {
     let read = read_problem(&problem("(:init) (:goal (and))"), &domain(""));
     assert_snapshot!(mistakes(read), @r"
-    problem.pddl:1:9: error: this is a problem, not a domain
-    domain.pddl:1:9: error: this is a domain, not a problem
+    problem.pddl:1:9: error: this is a problem, not a domain; are the two files given in the wrong order?
+    domain.pddl:1:9: error: this is a domain, not a problem; are the two files given in the wrong order?
     ");
 }
 
@@ -111,7 +111,7 @@ fn files_in_the_wrong_order_are_recognized() {
 fn an_empty_file_is_no_domain() {
     let empty = Source::new("empty.pddl", "");
     let read = read_problem(&empty, &problem("(:init) (:goal (and))"));
-    assert_snapshot!(mistakes(read), @"empty.pddl:1:1: error: this is not a PDDL domain");
+    assert_snapshot!(mistakes(read), @"empty.pddl:1:1: error: this is not a PDDL domain; expected `(define (domain name) …)`");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn a_condition_of_a_durative_action_is_not_called_a_precondition() {
     let found = read_actions("(:durative-action a :duration () :precondition (at start (lit)))");
     let found = found.unwrap_err();
     let first = found.errors().next().unwrap();
-    assert_eq!(first.help.as_deref(), Some("did you mean `:condition`?"));
+    assert_eq!(first.advice.as_deref(), Some("did you mean `:condition`?"));
     assert_eq!((first.line(), first.column()), (6, 34));
 }
 
@@ -128,7 +128,7 @@ fn an_effect_cannot_depend_on_what_comes_later() {
     let found = mistakes(read_actions(
         "(:durative-action a :duration () :effect (when (at end (lit)) (at start (open hall))))",
     ));
-    assert_snapshot!(found, @"domain.pddl:6:48: error: a condition that is read after its effect happens");
+    assert_snapshot!(found, @"domain.pddl:6:48: error: a condition that is read after its effect happens; only effects `at end` may depend on conditions `at end`");
 }
 
 #[test]
@@ -139,9 +139,9 @@ fn derived_predicates_cannot_be_set_nor_negate_themselves() {
          (:action a :effect (lit))",
     ));
     assert_snapshot!(found, @r"
-    domain.pddl:8:29: error: `lit` is defined by rules, and cannot be set
-    domain.pddl:6:11: error: `lit` depends on its own negation
-    domain.pddl:7:20: error: `dark` depends on its own negation
+    domain.pddl:8:29: error: `lit` is defined by rules, and cannot be set; change what its rules depend on
+    domain.pddl:6:11: error: `lit` depends on its own negation; a derived predicate may not be negated in what it is derived from
+    domain.pddl:7:20: error: `dark` depends on its own negation; a derived predicate may not be negated in what it is derived from
     ");
 }
 
@@ -167,11 +167,11 @@ fn the_initial_state_is_facts_and_numbers() {
         "(:init (in b1 kitchn) (= (size b1) (level)) (>= (level) 3) (at -3 (lit)) lit) (:goal (and))",
     ));
     assert_snapshot!(found, @r"
-    problem.pddl:2:15: error: unknown object `kitchn`
-    problem.pddl:2:36: error: `(level)` is not a constant
-    problem.pddl:2:45: error: unexpected `(>= …)`
-    problem.pddl:2:64: error: a time before 0
-    problem.pddl:2:74: error: unexpected `lit`
+    problem.pddl:2:15: error: unknown object `kitchn`; did you mean `kitchen`?
+    problem.pddl:2:36: error: `(level)` is not a constant; expected a number
+    problem.pddl:2:45: error: unexpected `(>= …)`; expected `(predicate object …)`, `(= (function object …) number)`, or one of these in `(at time …)`
+    problem.pddl:2:64: error: a time before 0; the plan begins at time 0
+    problem.pddl:2:74: error: unexpected `lit`; expected `(predicate object …)`, `(= (function object …) number)`, or one of these in `(at time …)`
     ");
 }
 
@@ -191,8 +191,8 @@ fn bytes_that_are_not_text_are_reported_unless_commented_out() {
     let text = b"(define (problem p) ;\xff\n (:domain d) (:init \xff\xfe \0) (:goal (and)))";
     let read = read_problem(&domain(""), &Source::from_bytes("problem.pddl", text));
     assert_snapshot!(mistakes(read), @r"
-    problem.pddl:2:21: error: this is not UTF-8 text
-    problem.pddl:2:24: error: unexpected character U+0000
+    problem.pddl:2:21: error: this is not UTF-8 text; PDDL is plain text: parentheses, words, numbers and `;` comments
+    problem.pddl:2:24: error: unexpected character U+0000; PDDL is plain text: parentheses, words, numbers and `;` comments
     ");
 }
 
@@ -201,4 +201,53 @@ fn colored_output_says_the_same() {
     let diagnostics = read_actions("(:action a :effect (opne hall))").unwrap_err();
     assert!(diagnostics.render(true).contains("\u{1b}["));
     assert!(!diagnostics.render(false).contains('\u{1b}'));
+}
+
+/// Two functions, a predicate, and an action that assigns one of the functions.
+const ROOM: &str = "(define (domain room)
+  (:requirements :durative-actions :fluents :timed-initial-literals)
+  (:predicates (lit))
+  (:functions (speed) (level))
+  (:action measure :parameters () :effect (assign (level) 3)))";
+
+/// What is said of a problem with these sections.
+fn said_of(sections: &str) -> String {
+    let problem = format!("(define (problem p) (:domain room) {sections})");
+    let read = read_problem(
+        &Source::new("room", ROOM),
+        &Source::new("problem", problem.as_str()),
+    );
+    let found = match read {
+        Ok((_, warnings)) => warnings,
+        Err(wrong) => wrong.into(),
+    };
+    let lines: Vec<String> = found.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}
+
+#[test]
+fn a_timed_initial_without_parentheses_shows_its_form() {
+    assert_snapshot!(said_of("(:init (at 120 not (lit))) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (not (lit)))`");
+    assert_snapshot!(said_of("(:init (at 120 lit)) (:goal (lit))"), @"problem:1:43: error: this timed initial cannot be understood; write `(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`");
+}
+
+#[test]
+fn a_decimal_comma_is_told() {
+    assert_snapshot!(said_of("(:init (= (speed) 1,5)) (:goal (lit))"), @"problem:1:54: error: unknown function `1,5`; write 1.5");
+}
+
+#[test]
+fn a_goal_on_what_never_gets_a_value_is_told() {
+    assert_snapshot!(said_of("(:init) (:goal (and (lit) (>= (speed) 2)))"), @"problem:1:45: warning: the goal reads `(speed)`, which never gets a value; say `(= (speed) …)` under `:init`");
+    assert_eq!(said_of("(:init) (:goal (>= (level) 2))"), "");
+    assert_eq!(said_of("(:init (= (speed) 1)) (:goal (>= (speed) 2))"), "");
+}
+
+#[test]
+fn a_plan_in_the_place_of_the_problem_is_recognized() {
+    let read = read_problem(
+        &Source::new("room", ROOM),
+        &Source::new("a.plan", "0.000: (measure)\n1.000: (measure)"),
+    );
+    assert_snapshot!(read.unwrap_err().to_string(), @"a.plan:1:1: error: this is not a PDDL problem; it looks like a plan; the order is DOMAIN PROBLEM PLAN");
 }

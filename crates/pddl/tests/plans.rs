@@ -23,13 +23,13 @@ fn house() -> Task {
 }
 
 fn read(text: &str) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics> {
-    read_plan(&Source::new("plan", text), &mut house())
+    read_plan(&Source::new("plan", text), &house())
 }
 
 /// The plan in a text, written out again.
 fn rewritten(text: &str) -> String {
-    let mut task = house();
-    match read_plan(&Source::new("plan", text), &mut task) {
+    let task = house();
+    match read_plan(&Source::new("plan", text), &task) {
         Ok((plan, _)) => write_plan(&task, &plan),
         Err(diagnostics) => panic!("{}", diagnostics.render(false)),
     }
@@ -102,7 +102,7 @@ fn actions_without_times_happen_one_after_the_other() {
 fn a_time_is_not_left_out_for_some_actions_only() {
     assert_snapshot!(
         mistakes("0: (snap b1)\n(snap b2)"),
-        @"plan:2:2: error: an action without a time"
+        @"plan:2:2: error: an action without a time; expected `time: (action argument …) [duration]`"
     );
 }
 
@@ -173,10 +173,10 @@ fn a_broken_line_is_a_mistake_not_noise() {
     assert_snapshot!(
         mistakes("0.0: (snap b1\n1: snap b1\n2: (wait) [3\n-1: (snap b1)\n4: (wait) [x]\n1e999: (snap b1)"),
         @r"
-    plan:1:14: error: this is not an action of a plan
-    plan:2:1: error: this is not an action of a plan
-    plan:3:13: error: this is not an action of a plan
-    plan:4:1: error: a negative time
+    plan:1:14: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
+    plan:2:1: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
+    plan:3:13: error: this is not an action of a plan; expected `time: (action argument …) [duration]`
+    plan:4:1: error: a negative time; times and durations are at least 0
     plan:5:12: error: `x` is not a number: write a decimal such as 12.5 or a fraction such as 25/2
     plan:6:1: error: `1e999` is not a number: write a decimal such as 12.5 or a fraction such as 25/2
     "
@@ -204,10 +204,35 @@ fn a_text_without_actions_is_an_empty_plan_with_a_warning() {
 #[test]
 fn numbers_survive_writing_and_reading() {
     let text = "1/3: (wait) [22/7]\n0.1: (wait) [1.000000000000000000000000000001]\n";
-    let mut task = house();
-    let (plan, _) = read_plan(&Source::new("plan", text), &mut task).unwrap();
+    let task = house();
+    let (plan, _) = read_plan(&Source::new("plan", text), &task).unwrap();
     let written = write_plan(&task, &plan);
-    let (mut again, _) = read_plan(&Source::new("plan", written), &mut task).unwrap();
-    again.steps.reverse();
+    let (again, _) = read_plan(&Source::new("plan", written), &task).unwrap();
     assert_eq!(again, plan);
+}
+
+/// What is said of a plan that is read all the same.
+fn remarks(text: &str) -> String {
+    let (_, warnings) = read(text).unwrap_or_else(|wrong| panic!("{wrong}"));
+    let lines: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}
+
+#[test]
+fn what_is_read_leniently_is_said() {
+    // A unit of time.
+    assert_snapshot!(remarks("0: (wait) [9 min]"), @"plan:1:14: warning: `min` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`");
+    // No brackets.
+    assert_snapshot!(remarks("0: (walk hall kitchen) 4"), @r"
+    plan:1:24: warning: `4` is ignored; a duration is a number in brackets, in the domain's unit: `[10.000]`
+    plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all
+    ");
+    // No duration at all, said once.
+    assert_snapshot!(remarks("0: (walk hall kitchen)\n9: (walk kitchen hall)"), @"plan:1:5: warning: `walk` has no duration here: 4 is taken, as the domain says; write it behind the action, as in `[10.000]`; this is said once for all");
+    // No times.
+    assert_snapshot!(remarks("(snap b1)\n(snap b2)"), @"plan:1:2: warning: no action has a time: they are taken to start at 0, 1, 2, …; write the time before the action: `0.000: (action argument …) [10.000]`");
+    assert_eq!(
+        remarks("0: (wait) [9]\n1: (snap b1)\n2: (wait) [D:2.0; C:0.1]"),
+        ""
+    );
 }

@@ -3,7 +3,7 @@
 mod reading;
 
 use elbowroom_model::problem::{ObjectId, TimedChange};
-use elbowroom_pddl::{Source, read_problem};
+use elbowroom_pddl::{Feature, Source, read_problem};
 use insta::assert_snapshot;
 use reading::{Printer, read_sections};
 
@@ -112,7 +112,10 @@ fn sections_that_say_nothing_about_validity_are_ignored_with_a_warning() {
         "(:requirements :strips :mystery) (:init) (:goal (and)) (:length (:serial 3)) (:wibble 1)",
     )
     .unwrap();
-    let features: Vec<_> = warnings.iter().map(|w| w.feature.unwrap().name()).collect();
+    let features: Vec<_> = warnings
+        .iter()
+        .map(|w| Feature::of(w).unwrap().name())
+        .collect();
     assert_eq!(
         features,
         ["unknown requirements", "other sections", "other sections"]

@@ -32,8 +32,8 @@ impl World {
     }
 
     fn ground(&self) -> (Task, Grounding) {
-        let mut task = self.task();
-        match ground(&mut task, &Settings::default()) {
+        let task = self.task();
+        match ground(&task, &Settings::default()) {
             Answer::Complete(grounding) => (task, grounding),
             Answer::LimitReached => panic!("the problem is small"),
         }
@@ -207,7 +207,7 @@ fn a_parameter_of_either_type_takes_objects_of_both() {
         (:objects b - boat c - car t - tree) (:init) (:goal (ready b)))";
     let (domain, problem) = (Source::new("d", domain), Source::new("p", problem));
     let (problem, _) = read_problem(&domain, &problem).expect("a correct problem");
-    let Answer::Complete(grounding) = ground(&mut Task::new(problem), &Settings::default()) else {
+    let Answer::Complete(grounding) = ground(&Task::new(problem), &Settings::default()) else {
         panic!("the problem is small");
     };
     let names: Vec<_> = grounding.actions.iter().map(|a| a.name.as_str()).collect();
@@ -284,7 +284,7 @@ fn too_many_actions_are_an_answer() {
             action_limit,
             ..Settings::default()
         };
-        ground(&mut world.task(), &settings)
+        ground(&world.task(), &settings)
     };
     assert_eq!(answer(26), Answer::LimitReached);
     assert_ne!(answer(27), Answer::LimitReached);
@@ -303,5 +303,5 @@ fn too_much_work_is_an_answer() {
         ..Settings::default()
     };
     assert_eq!(world.reached(), "");
-    assert_eq!(ground(&mut world.task(), &settings), Answer::LimitReached);
+    assert_eq!(ground(&world.task(), &settings), Answer::LimitReached);
 }

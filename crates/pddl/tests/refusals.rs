@@ -2,16 +2,16 @@
 
 mod reading;
 
-use elbowroom_pddl::{Diagnostics, Feature};
+use elbowroom_pddl::{Diagnostics, Feature, is_unsupported};
 use reading::{read_actions, read_sections};
 
 /// The refused features with their lines; panics if there is a mistake among them.
 fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, usize)> {
     let diagnostics = read.expect_err("refused");
-    assert!(diagnostics.is_unsupported(), "{diagnostics}");
+    assert!(is_unsupported(&diagnostics), "{diagnostics}");
     diagnostics
         .errors()
-        .map(|d| (d.feature.expect("a feature"), d.line()))
+        .map(|d| (Feature::of(d).expect("a feature"), d.line()))
         .collect()
 }
 
@@ -88,7 +88,7 @@ fn trajectory_constraints_are_refused_unless_they_are_preferences() {
         "(and (preference (always (lit))) (forall (?b - ball) (preference p (sometime (lit)))))",
     )
     .unwrap();
-    assert_eq!(warnings[0].feature, Some(Feature::Preferences));
+    assert_eq!(Feature::of(&warnings[0]), Some(Feature::Preferences));
     assert!(sections("(and)").unwrap().1.is_empty());
 }
 
@@ -123,5 +123,5 @@ fn strict_bounds_on_a_duration_are_refused() {
 #[test]
 fn a_mistake_beside_a_refused_feature_is_still_a_mistake() {
     let read = read_actions("(:process p) (:action a :effect (opne hall))");
-    assert!(!read.unwrap_err().is_unsupported());
+    assert!(!is_unsupported(&read.unwrap_err()));
 }

@@ -36,8 +36,8 @@ fn read_all(domain: &[u8], problem: &[u8], plan: &[u8]) {
             for warning in warnings {
                 warning.render(true);
             }
-            let mut task = Task::new(problem);
-            if let Err(diagnostics) = read_plan(&Source::from_bytes("plan", plan), &mut task) {
+            let task = Task::new(problem);
+            if let Err(diagnostics) = read_plan(&Source::from_bytes("plan", plan), &task) {
                 diagnostics.render(false);
             }
         }

@@ -2,12 +2,16 @@
 //!
 //! What the two disagree on, and why, is told in `docs/val-agreement.md`.
 
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
+
 use std::path::PathBuf;
 
 use elbowroom_model::Task;
 use elbowroom_model::validate::{Mistake, Settings, Verdict, validate};
 use elbowroom_num::Rational;
-use elbowroom_pddl::{Source, read_plan, read_problem};
+use elbowroom_pddl::{Source, is_unsupported, read_plan, read_problem};
+use skipped::skipped;
 
 /// Where VAL's answer depends on how it rounds; see the document.
 const DISAGREEMENTS: [&str; 1] =
@@ -84,11 +88,11 @@ enum Reading {
 fn read(row: &Row<'_>, load: impl Fn(&str) -> Source) -> Reading {
     let problem = match read_problem(&load(row.domain), &load(row.problem)) {
         Ok((problem, _)) => problem,
-        Err(diagnostics) if diagnostics.is_unsupported() => return Reading::Unsupported,
+        Err(diagnostics) if is_unsupported(&diagnostics) => return Reading::Unsupported,
         Err(_) => return Reading::Mistaken,
     };
-    let mut task = Task::new(problem);
-    match read_plan(&load(row.plan), &mut task) {
+    let task = Task::new(problem);
+    match read_plan(&load(row.plan), &task) {
         Ok((plan, _)) => Reading::Read(Box::new(task), plan),
         Err(_) => Reading::Mistaken,
     }
@@ -113,7 +117,7 @@ fn answer(reading: &Reading, tolerance: Rational) -> &'static str {
 #[test]
 fn the_judge_agrees_with_val_up_to_what_the_document_explains() {
     let Some(root) = benchmarks() else {
-        println!("skipped: no benchmark set; set ELBOWROOM_SHARED to where it is");
+        skipped("no benchmark set; set ELBOWROOM_SHARED to where it is");
         return;
     };
     let load = |path: &str| {

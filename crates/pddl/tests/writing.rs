@@ -1,6 +1,8 @@
 //! Problems written as text, at time 0 and in mid-execution.
 
 mod reading;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
 #[allow(dead_code, reason = "the test needs a part of what the example shows")]
 #[path = "../examples/pddl_support/survey.rs"]
 mod survey;
@@ -14,6 +16,7 @@ use elbowroom_pddl::{
 };
 use insta::assert_snapshot;
 use reading::task;
+use skipped::skipped;
 
 /// What a problem says, whatever the order in which it says it.
 fn normalized(mut problem: Problem) -> Problem {
@@ -32,7 +35,7 @@ fn order(timed: &TimedInitial) -> (Rational, String) {
 #[test]
 fn every_benchmark_is_the_same_problem_after_writing_and_reading() {
     let Some(folder) = survey::folder() else {
-        println!("skipped: there is no benchmark set; set ELBOWROOM_SHARED to its folder");
+        skipped("there is no benchmark set; set ELBOWROOM_SHARED to its folder");
         return;
     };
     let mut count = 0;
@@ -94,7 +97,7 @@ fn rover() -> (Source, Task) {
 
 /// The running action of a plan line, and where things stand `elapsed` after its start at 0, with
 /// its start's changes as given.
-fn under_way(task: &mut Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
+fn under_way(task: &Task, line: &str, elapsed: i64, duration: Interval) -> Situation {
     let (plan, _) = read_plan(&Source::new("plan", line), task).expect("a plan");
     let step = plan.steps.into_iter().next().expect("one step");
     let mut state = task.initial().clone();
@@ -132,9 +135,9 @@ fn written(task: &Task, situation: &Situation) -> String {
 
 #[test]
 fn an_action_under_way_becomes_what_it_will_do_at_its_end() {
-    let (_, mut task) = rover();
+    let (_, task) = rover();
     let duration = Interval::point(Rational::from(10));
-    let situation = under_way(&mut task, "0: (drive base rock) [10]", 4, duration);
+    let situation = under_way(&task, "0: (drive base rock) [10]", 4, duration);
     assert_snapshot!(written(&task, &situation), @r"
     (define (problem trip)
     (:domain rover)
@@ -159,19 +162,19 @@ fn an_action_under_way_becomes_what_it_will_do_at_its_end() {
 
 #[test]
 fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
-    let (domain, mut task) = rover();
+    let (domain, task) = rover();
     let duration = Interval::point(Rational::from(10));
-    let situation = under_way(&mut task, "0: (drive base rock) [10]", 4, duration);
+    let situation = under_way(&task, "0: (drive base rock) [10]", 4, duration);
     let text = written(&task, &situation);
-    let mut rest = reading::task(&domain, &Source::new("rest.pddl", text));
+    let rest = reading::task(&domain, &Source::new("rest.pddl", text));
     for (start, expected) in [("6.001", true), ("5.9", false), ("33.1", false)] {
         let line = format!("{start}: (dig rock) [4]");
-        let (plan, _) = read_plan(&Source::new("plan", line.as_str()), &mut rest).unwrap();
+        let (plan, _) = read_plan(&Source::new("plan", line.as_str()), &rest).unwrap();
         let verdict = validate(&rest, &plan, &Settings::default());
         // Base closes, and the rover is not away: the goal wants it open.
         assert_eq!(verdict.is_valid(), expected, "{start}: {verdict:?}");
 
-        let (mut whole, _) = read_plan(&Source::new("plan", line.as_str()), &mut task).unwrap();
+        let (mut whole, _) = read_plan(&Source::new("plan", line.as_str()), &task).unwrap();
         whole.steps[0].start += &situation.time;
         let drive = situation.running[0].step(Rational::from(10));
         whole.steps.insert(0, drive);
@@ -182,31 +185,31 @@ fn a_plan_for_the_written_problem_is_a_plan_from_the_situation() {
 
 #[test]
 fn the_earliest_possible_end_is_chosen() {
-    let (_, mut task) = rover();
-    let ends = |task: &mut Task, elapsed, duration| {
+    let (_, task) = rover();
+    let ends = |task: &Task, elapsed, duration| {
         let situation = under_way(task, "0: (dig base) [3]", elapsed, duration);
         end_times(&situation, &Rational::new(1, 1000)).map(|ends| ends[0].to_decimal(4))
     };
     let between = |low: i64, high: i64| Interval::closed(low.into(), high.into());
-    assert_eq!(ends(&mut task, 1, between(3, 8)).unwrap(), "3");
-    assert_eq!(ends(&mut task, 5, between(3, 8)).unwrap(), "5.001");
-    let late = ends(&mut task, 8, between(3, 8)).unwrap_err();
+    assert_eq!(ends(&task, 1, between(3, 8)).unwrap(), "3");
+    assert_eq!(ends(&task, 5, between(3, 8)).unwrap(), "5.001");
+    let late = ends(&task, 8, between(3, 8)).unwrap_err();
     assert_snapshot!(late, @"(dig base) would end now or earlier: let its end happen, and plan from the state after");
 }
 
 #[test]
 fn what_timed_initials_cannot_say_is_refused_with_its_reason() {
-    let (_, mut task) = rover();
-    let mut refusal = |line: &str| {
-        let situation = under_way(&mut task, line, 1, Interval::point(Rational::from(5)));
+    let (_, task) = rover();
+    let refusal = |line: &str| {
+        let situation = under_way(&task, line, 1, Interval::point(Rational::from(5)));
         let ends = vec![Rational::from(5)];
         let how = ProblemText { ends, digits: None };
         write_problem(&task, &situation, &how).unwrap_err()
     };
     assert_snapshot!(refusal("0: (bask) [5]"), @"a problem file cannot say that (bask) is under way: it changes (charge) while it runs; the embedded planner takes it as it is");
     assert_snapshot!(refusal("0: (hope) [5]"), @"a problem file cannot say that (hope) is under way: whether it changes (free) at its end is still open; the embedded planner takes it as it is");
-    let (_, mut task) = rover();
-    let situation = under_way(&mut task, "0: (bask) [5]", 1, Interval::point(5.into()));
+    let (_, task) = rover();
+    let situation = under_way(&task, "0: (bask) [5]", 1, Interval::point(5.into()));
     let without = write_problem(&task, &situation, &ProblemText::default()).unwrap_err();
     assert_snapshot!(without, @"1 actions are under way, but 0 ends are given for them");
     let ends = vec![Rational::from(7)];
@@ -217,8 +220,8 @@ fn what_timed_initials_cannot_say_is_refused_with_its_reason() {
 
 #[test]
 fn numbers_without_a_finite_decimal_are_rounded_only_on_demand() {
-    let (_, mut task) = rover();
-    let (plan, _) = read_plan(&Source::new("plan", "0: (bask) [5]"), &mut task).unwrap();
+    let (_, task) = rover();
+    let (plan, _) = read_plan(&Source::new("plan", "0: (bask) [5]"), &task).unwrap();
     assert_eq!(write_plan(&task, &plan), "0.000: (bask) [5.000]\n");
     let situation = Situation {
         time: Rational::new(1, 3),

@@ -1,6 +1,6 @@
 //! Boxes: an interval for each parameter.
 
-use elbowroom_num::{End, Interval, Rational};
+use elbowroom_num::{End, Interval, Rational, Side};
 
 use crate::parameter::{ParameterId, Valuation};
 
@@ -59,55 +59,6 @@ impl DecoupledEnvelope {
             .iter()
             .zip(&other.intervals)
             .all(|(mine, theirs)| mine.intersection(theirs) == *theirs)
-    }
-}
-
-/// The lower or the upper end of an interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Side {
-    /// The lower end.
-    Lower,
-    /// The upper end.
-    Upper,
-}
-
-impl Side {
-    /// Both, the lower first: the order of an array with one entry for each.
-    pub const BOTH: [Self; 2] = [Self::Lower, Self::Upper];
-
-    /// The other one.
-    #[must_use]
-    pub fn opposite(self) -> Self {
-        match self {
-            Self::Lower => Self::Upper,
-            Self::Upper => Self::Lower,
-        }
-    }
-
-    /// Its position in [`BOTH`](Self::BOTH).
-    pub fn index(self) -> usize {
-        match self {
-            Self::Lower => 0,
-            Self::Upper => 1,
-        }
-    }
-
-    /// This end of an interval.
-    pub fn of(self, interval: &Interval) -> &End {
-        match self {
-            Self::Lower => &interval.lower,
-            Self::Upper => &interval.upper,
-        }
-    }
-
-    /// How far out this end of an interval lies: the upper end itself, minus the lower end, `None`
-    /// if infinite. Widening the interval makes it greater.
-    pub fn reach(self, interval: &Interval) -> Option<Rational> {
-        let value = self.of(interval).value()?;
-        Some(match self {
-            Self::Lower => -value,
-            Self::Upper => value.clone(),
-        })
     }
 }
 

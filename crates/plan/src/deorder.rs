@@ -40,30 +40,16 @@ pub use implied::without_implied;
 pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};
-use crate::stn_plan::{Instance, Node, NodeId, StnPlan};
+use crate::stn_plan::{Instance, InstanceId, Node, NodeId, StnPlan};
 use order::{Order, Timeline};
-
-/// How to deorder.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// The least separation of interfering happenings (ε); positive.
-    pub epsilon: Rational,
-}
-
-impl Default for Settings {
-    /// One thousandth.
-    fn default() -> Self {
-        Self {
-            epsilon: Rational::new(1, 1000),
-        }
-    }
-}
 
 /// A plan with room, and a schedule of it: the original one, if it is one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deordered {
     /// The plan; its instances are labelled `n0`, `n1`, … in order of their start.
     pub plan: StnPlan,
+    /// For each step of the original plan, its instance.
+    pub instances: Vec<InstanceId>,
     /// The times of the original plan. Where they do not satisfy the constraints, because they
     /// were rounded, times close to them that do.
     pub nominal: Schedule,
@@ -100,12 +86,12 @@ pub enum DeorderError {
 ///
 /// # Errors
 /// When the plan is not valid, as far as that shows here; ask the judge first.
-pub fn deorder(
-    task: &Task,
-    plan: &TimeTriggeredPlan,
-    settings: &Settings,
-) -> Result<Deordered, DeorderError> {
-    let (mut stn_plan, times) = labelled(task, plan);
+pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
+    let Labelled {
+        plan: mut stn_plan,
+        instances,
+        times,
+    } = labelled(task, plan);
     let footprints: Vec<Footprint> = stn_plan
         .nodes()
         .map(|(node, _)| stn_plan.footprint(task, node))
@@ -113,22 +99,15 @@ pub fn deorder(
     let timeline = Timeline::new(&times, &footprints);
     let mut order = Order::default();
     timeline
-        .interference(&stn_plan, &settings.epsilon, &mut order)
+        .interference(&stn_plan, task.epsilon(), &mut order)
         .map_err(|(first, second)| DeorderError::Simultaneous {
             first: stn_plan.node_words(task, first),
             second: stn_plan.node_words(task, second),
             time: times[first.index()].to_decimal(6),
         })?;
     let mut sides = Order::default();
-    over_all::order(
-        task,
-        &stn_plan,
-        &timeline,
-        &settings.epsilon,
-        &mut order,
-        &mut sides,
-    );
-    goal::order(task, &stn_plan, &times, &settings.epsilon, &mut order);
+    over_all::order(task, &stn_plan, &timeline, &mut order, &mut sides);
+    goal::order(task, &stn_plan, &times, &mut order);
     stn_plan
         .constraints
         .extend(durations::constraints(task, &stn_plan, &times));
@@ -136,17 +115,33 @@ pub fn deorder(
     let sides: Vec<_> = sides.into_constraints().collect();
     let mut kept = stn_plan.clone();
     kept.constraints.extend(sides.iter().cloned());
-    let nominal = nominal(task, &kept, times, settings)?;
+    let nominal = nominal(task, &kept, times)?;
     Ok(Deordered {
         plan: implied::with_sides(without_implied(stn_plan), sides),
+        instances,
         nominal,
     })
 }
 
-/// The plan without order, and the time that each of its nodes has in the original.
-pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> (StnPlan, Schedule) {
-    let mut steps: Vec<_> = plan.steps.iter().collect();
-    steps.sort_by(|a, b| a.start.cmp(&b.start));
+/// A plan without order.
+pub(crate) struct Labelled {
+    /// The plan, without constraints.
+    pub(crate) plan: StnPlan,
+    /// For each step of the original, its instance.
+    pub(crate) instances: Vec<InstanceId>,
+    /// The time that each node has in the original.
+    pub(crate) times: Schedule,
+}
+
+/// The plan without order; instances are numbered by start.
+pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> Labelled {
+    let mut order: Vec<usize> = (0..plan.steps.len()).collect();
+    order.sort_by(|&a, &b| plan.steps[a].start.cmp(&plan.steps[b].start));
+    let mut instance_of = vec![InstanceId(0); order.len()];
+    for (position, &step) in order.iter().enumerate() {
+        instance_of[step] = InstanceId::from(position);
+    }
+    let steps: Vec<_> = order.iter().map(|&step| &plan.steps[step]).collect();
     let instances = steps
         .iter()
         .enumerate()
@@ -166,17 +161,16 @@ pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> (StnPlan, Sched
             Node::Timed(index) => task.timed()[index].time.clone(),
         })
         .collect();
-    (stn_plan, times)
+    Labelled {
+        plan: stn_plan,
+        instances: instance_of,
+        times,
+    }
 }
 
 /// The original times, or the earliest that start nothing sooner than the original does, as far
 /// as that is possible.
-fn nominal(
-    task: &Task,
-    plan: &StnPlan,
-    times: Schedule,
-    settings: &Settings,
-) -> Result<Schedule, DeorderError> {
+fn nominal(task: &Task, plan: &StnPlan, times: Schedule) -> Result<Schedule, DeorderError> {
     let network = plan.network(&[]);
     let original = elbowroom_stn::Schedule::new(times);
     if original.holds_in(&network) {
@@ -191,7 +185,7 @@ fn nominal(
                 .filter(|&node| node != NodeId::ZERO)
                 .map(|node| plan.node_words(task, node))
                 .collect(),
-            epsilon: settings.epsilon.to_string(),
+            epsilon: task.epsilon().to_string(),
         })?;
     let zero = network_node(NodeId::ZERO);
     for (node, what) in plan.nodes() {

@@ -34,6 +34,7 @@ mod tokens;
 mod write;
 
 use elbowroom_model::Task;
+use elbowroom_text::{Diagnostics, Source};
 
 pub(crate) use syntax::{Limit, limit};
 pub(crate) use tokens::{Token, tokens};
@@ -41,61 +42,16 @@ pub use write::{WriteError, write};
 
 use crate::parameter::ParametrizedPlan;
 
-/// One mistake in an STN plan file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}, column {column}: {message}")]
-pub struct FormatError {
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-    /// How many characters the mistake spans; 0 at the end of the file.
-    pub length: usize,
-    /// The text of the line around the mistake.
-    pub excerpt: String,
-    /// What is wrong.
-    pub message: String,
-    /// What was expected there, or what to do.
-    pub expected: Option<String>,
-}
-
-/// The mistakes found in an STN plan file, by position. At least one.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", listed(.errors))]
-pub struct FormatErrors {
-    /// Each mistake; the first hundred of them.
-    pub errors: Vec<FormatError>,
-}
-
-fn listed(errors: &[FormatError]) -> String {
-    let mut text = String::new();
-    for error in errors {
-        if !text.is_empty() {
-            text.push('\n');
-        }
-        text.push_str(&error.to_string());
-        if let Some(expected) = &error.expected {
-            text.push_str(": ");
-            text.push_str(expected);
-        }
-    }
-    text
-}
-
-/// Reads an STN plan file: any bytes, which must be UTF-8 outside of comments.
+/// Reads an STN plan file: a text, or any bytes, which must be UTF-8 outside of comments.
 ///
 /// # Errors
 /// All mistakes found, those of syntax and those of names that the task does not know.
-pub fn read(bytes: &[u8], task: &mut Task) -> Result<ParametrizedPlan, FormatErrors> {
-    let text = String::from_utf8_lossy(bytes);
-    let (file, mut mistakes) = syntax::parse(&text);
+pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
+    let source = source.into();
+    let (file, mut mistakes) = syntax::parse(&source);
     let plan = resolve::resolve(&file, task, &mut mistakes);
-    match plan {
-        Some(plan) if mistakes.is_empty() => Ok(plan),
-        _ => Err(FormatErrors {
-            errors: mistakes.located(&text),
-        }),
-    }
+    // A reader that gives up has noted why.
+    mistakes.finish(plan).map(|(plan, _warnings)| plan)
 }
 
 /// `(did you mean …)`, or nothing.

@@ -10,6 +10,37 @@
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
 //! - [`uncertain`]: the network of a plan, with what the world decides in it.
 //! - [`mod@format`]: STN plan files.
+//!
+//! ```
+//! use elbowroom_model::problem::{Body, Condition, Schema};
+//! use elbowroom_model::{Problem, Task};
+//! use elbowroom_plan::format;
+//!
+//! let mut problem = Problem::default();
+//! problem.schemas.push(Schema {
+//!     name: "beep".to_owned(),
+//!     parameters: Vec::new(),
+//!     unknowns: Vec::new(),
+//!     body: Body::Instantaneous {
+//!         condition: Condition::TRUE,
+//!         effects: Vec::new(),
+//!     },
+//! });
+//! let task = Task::new(problem);
+//! let text = "
+//!     parameter latest default 3;
+//!     action instance b : (beep);
+//!     c: b - .zero in [1, latest];";
+//! let plan = format::read(text, &task)?;
+//! assert_eq!(plan.parameters[0].name, "latest");
+//!
+//! let mistaken = format::read("action instance b : (bep);", &task).unwrap_err();
+//! assert_eq!(
+//!     mistaken.to_string(),
+//!     "text:1:22: error: the domain has no action `bep`; did you mean `beep`?"
+//! );
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod decoupled;
 pub mod deorder;
@@ -20,15 +51,14 @@ mod parameter;
 pub mod parametrize;
 pub mod partial_order;
 mod stn_plan;
-mod suggestion;
 #[cfg(test)]
 mod testing;
 pub mod uncertain;
 mod unknowns;
 
-pub use decoupled::{BoxEnd, DecoupledEnvelope, Side};
-pub use network::{Schedule, network_node};
+pub use decoupled::{BoxEnd, DecoupledEnvelope};
+pub use elbowroom_num::Side;
+pub use network::{Origin, Schedule, network_node};
 pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
 pub use partial_order::{Link, LinkKind, PartialOrderPlan};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
-pub use suggestion::nearest;

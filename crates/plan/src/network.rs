@@ -16,18 +16,33 @@ pub fn network_node(node: NodeId) -> elbowroom_stn::NodeId {
     elbowroom_stn::NodeId(node.0)
 }
 
+/// Where a constraint of [`StnPlan::network`] comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// A node comes at 0 or later.
+    Beginning,
+    /// The lower bound of the plan's constraint at this position.
+    AtLeast(usize),
+    /// The upper bound of the plan's constraint at this position.
+    AtMost(usize),
+}
+
 impl StnPlan {
     /// The plan as a network, when the parameters have these values. Nodes keep their positions.
-    ///
-    /// Constraint by constraint: first that each node but zero comes at 0 or later, then the
-    /// plan's own, each of which makes as many as it has finite bounds.
     pub fn network(&self, valuation: &[Rational]) -> Network {
+        self.network_with_origins(valuation).0
+    }
+
+    /// The same, with where each of the network's constraints comes from, by
+    /// [`ConstraintId`](elbowroom_stn::ConstraintId).
+    pub fn network_with_origins(&self, valuation: &[Rational]) -> (Network, Vec<Origin>) {
         let value = |bound: &Bound| match bound {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
             Bound::Parameter(id) => Some(valuation[id.index()].clone()),
         };
         let mut network = Network::with_nodes(self.nodes.len());
+        let mut origins = Vec::with_capacity(self.nodes.len() + 2 * self.constraints.len());
         let zero = network_node(NodeId::ZERO);
         for (node, _) in self.nodes().skip(1) {
             network.add(elbowroom_stn::Constraint::at_least(
@@ -35,17 +50,20 @@ impl StnPlan {
                 network_node(node),
                 Rational::ZERO,
             ));
+            origins.push(Origin::Beginning);
         }
-        for constraint in &self.constraints {
+        for (index, constraint) in self.constraints.iter().enumerate() {
             let (from, to) = (network_node(constraint.from), network_node(constraint.to));
             if let Some(lower) = value(&constraint.lower) {
                 network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
+                origins.push(Origin::AtLeast(index));
             }
             if let Some(upper) = value(&constraint.upper) {
                 network.add(elbowroom_stn::Constraint::at_most(from, to, upper));
+                origins.push(Origin::AtMost(index));
             }
         }
-        network
+        (network, origins)
     }
 
     /// The plan with these values in place of its parameters.

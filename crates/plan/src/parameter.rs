@@ -68,6 +68,9 @@ pub struct ParametrizedPlan {
     pub parameters: Vec<Parameter>,
     /// Initial values that are parameters.
     pub initial: BTreeMap<FluentId, ParameterId>,
+    /// How long those actions are planned to take whose durations are left neither to the world nor
+    /// fixed by the domain: the executor tells them at their start.
+    pub told: BTreeMap<InstanceId, Rational>,
     /// What must hold at the end: the task's goal, with the domain's unknowns as parameters.
     pub goal: Condition,
 }
@@ -96,6 +99,7 @@ impl ParametrizedPlan {
             plan,
             parameters: Vec::new(),
             initial: BTreeMap::new(),
+            told: BTreeMap::new(),
             goal: task.goal().clone(),
         }
     }

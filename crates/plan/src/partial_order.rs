@@ -19,7 +19,7 @@ use elbowroom_model::ground::{Action, Body, Condition, Effect, FactId, SnapActio
 use elbowroom_model::{Footprint, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::deorder::{Settings, durations, labelled};
+use crate::deorder::{Labelled, durations, labelled};
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 
 /// Actions, and the few orderings among their happenings that are kept whatever is skipped.
@@ -27,6 +27,8 @@ use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Rea
 pub struct PartialOrderPlan {
     /// The actions, labelled `n0`, `n1`, … in order of their start.
     pub instances: Vec<Instance>,
+    /// For each step of the plan that this was made of, its instance.
+    pub instance_of_step: Vec<InstanceId>,
     /// [`Node::Zero`], then each instance's start and end, or instant, in order, then the timed
     /// initials in order of time: the nodes of the [`StnPlan`] of the same instances.
     pub nodes: Vec<Node>,
@@ -70,7 +72,11 @@ impl PartialOrderPlan {
         let plan = TimeTriggeredPlan {
             steps: steps.collect(),
         };
-        let (stn_plan, times) = labelled(task, &plan);
+        let Labelled {
+            plan: stn_plan,
+            instances,
+            times,
+        } = labelled(task, &plan);
         let constraints = durations::constraints(task, &stn_plan, &times);
         let is_known = |reason: &Reason| matches!(reason, Reason::Duration(_));
         let links = constraints.into_iter().map(|mut constraint| {
@@ -82,6 +88,7 @@ impl PartialOrderPlan {
         });
         Self {
             links: links.collect(),
+            instance_of_step: instances,
             instances: stn_plan.instances,
             nodes: stn_plan.nodes,
         }
@@ -120,12 +127,12 @@ impl PartialOrderPlan {
 ///
 /// Durations get the domain's interval; the plan's own number where the domain's bounds depend on
 /// the schedule.
-pub fn partial_order(
-    task: &Task,
-    plan: &TimeTriggeredPlan,
-    settings: &Settings,
-) -> PartialOrderPlan {
-    let (stn_plan, times) = labelled(task, plan);
+pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan {
+    let Labelled {
+        plan: stn_plan,
+        instances,
+        times,
+    } = labelled(task, plan);
     let mut links: Vec<Link> = durations::constraints(task, &stn_plan, &times)
         .into_iter()
         .map(duration_link)
@@ -147,7 +154,7 @@ pub fn partial_order(
                 links.push(Link {
                     from,
                     to,
-                    lower: settings.epsilon.clone(),
+                    lower: task.epsilon().clone(),
                     upper: None,
                     kind: LinkKind::Interference,
                 });
@@ -155,6 +162,7 @@ pub fn partial_order(
         }
     }
     PartialOrderPlan {
+        instance_of_step: instances,
         instances: stn_plan.instances,
         nodes: stn_plan.nodes,
         links,

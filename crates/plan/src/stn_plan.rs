@@ -78,6 +78,16 @@ pub enum Bound {
     Parameter(ParameterId),
 }
 
+impl Bound {
+    /// The parameter whose value it is, if it is one's.
+    pub fn parameter(&self) -> Option<ParameterId> {
+        match self {
+            Self::Parameter(id) => Some(*id),
+            Self::Infinite | Self::Finite(_) => None,
+        }
+    }
+}
+
 impl From<Rational> for Bound {
     fn from(value: Rational) -> Self {
         Self::Finite(value)
@@ -185,6 +195,15 @@ impl StnPlan {
     /// The node at which the instance ends, or happens.
     pub fn end(&self, id: InstanceId) -> NodeId {
         self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
+    }
+
+    /// The instance whose duration a constraint bounds; `None` if it bounds something else.
+    pub fn duration_of(&self, constraint: &Constraint) -> Option<InstanceId> {
+        let node = |id: NodeId| self.nodes[id.index()];
+        match (node(constraint.from), node(constraint.to)) {
+            (Node::Start(start), Node::End(end)) if start == end => Some(start),
+            _ => None,
+        }
     }
 
     /// The node of a group of timed initials.

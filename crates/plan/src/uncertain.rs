@@ -32,6 +32,16 @@ pub enum Reading {
     Impossible,
 }
 
+impl Reading {
+    /// The difference is that one, and has to be seen to.
+    pub fn exactly(difference: &Rational) -> Self {
+        Self::Requirement {
+            lower: Some(difference.clone()),
+            upper: Some(difference.clone()),
+        }
+    }
+}
+
 /// A plan's network, and what its parts come from. Nodes keep their positions.
 #[derive(Clone, Debug)]
 pub struct PlanNetwork {
@@ -136,12 +146,16 @@ impl StnPlan {
 
 impl ParametrizedPlan {
     /// What a constraint means to an executor who knows that each parameter is in its interval,
-    /// and learns the value of a duration when the action ends, of the time of a timed initial
+    /// tells actions how long to take where that is not left to the world (as long as planned:
+    /// [`told`](Self::told)), and learns the value of a duration when the action ends, of the time of a timed initial
     /// when that happens, and of any other bound never.
     ///
     /// A parameter that bounds several differences may be another value in each, which asks for
     /// more than need be.
     pub fn reading(&self, constraint: &Constraint, envelope: &DecoupledEnvelope) -> Reading {
+        if let Some(planned) = self.told_by(constraint) {
+            return Reading::exactly(planned);
+        }
         let least = |id: ParameterId| envelope.interval(id).lower.value().cloned();
         let greatest = |id: ParameterId| envelope.interval(id).upper.value().cloned();
         if let (Bound::Parameter(lower), Bound::Parameter(upper)) =
@@ -173,6 +187,16 @@ impl ParametrizedPlan {
             },
         };
         Reading::Requirement { lower, upper }
+    }
+
+    /// How long the action is told at its start to take, if that is what the constraint bounds: an
+    /// executor that has told it cannot have it end on an event.
+    pub fn told_by(&self, constraint: &Constraint) -> Option<&Rational> {
+        let node = |id: NodeId| self.plan.nodes[id.index()];
+        match (node(constraint.from), node(constraint.to)) {
+            (Node::Start(start), Node::End(end)) if start == end => self.told.get(&start),
+            _ => None,
+        }
     }
 
     /// The plan's network for an executor who relies on a box: see [`ParametrizedPlan::reading`].

@@ -76,7 +76,7 @@ pub(crate) fn mentioned(task: &Task, plan: &StnPlan) -> Vec<OpenNumber> {
 /// Whether a rule of a derived predicate mentions an open number.
 pub(crate) fn occur_in_rules(task: &Task) -> bool {
     let mut found = false;
-    for rule in task.rules() {
+    for rule in task.rules().iter() {
         visit_condition(&rule.body, &mut |leaf| {
             found |= open_number(leaf, None).is_some();
         });

@@ -56,7 +56,7 @@ fn task((domain, problem): (&str, &str)) -> Option<Task> {
     Some(Task::new(problem))
 }
 
-fn first_plan(task: &mut Task, situation: &Situation) -> Answer {
+fn first_plan(task: &Task, situation: &Situation) -> Answer {
     let settings = Settings {
         first_plan_only: true,
         ..Settings::default()
@@ -80,7 +80,7 @@ fn time_to_first_plan(bencher: divan::Bencher<'_, '_>, problem: usize) {
     let situation = Situation::initial(&task);
     bencher
         .with_inputs(|| task.clone())
-        .bench_values(|mut task| first_plan(&mut task, &situation));
+        .bench_values(|task| first_plan(&task, &situation));
 }
 
 /// Numbers that look random and are the same each time (Marsaglia's xorshift).
@@ -102,12 +102,12 @@ fn latencies() {
     let (mut plans, mut proofs, mut unanswered) = (0, 0, 0);
     let mut starts: Vec<(Task, TimeTriggeredPlan)> = Vec::new();
     for problem in PROBLEMS {
-        let Some(mut task) = task(*problem) else {
+        let Some(task) = task(*problem) else {
             println!("skipped: no {}", problem.1);
             continue;
         };
         let situation = Situation::initial(&task);
-        if let Some(found) = first_plan(&mut task, &situation).found() {
+        if let Some(found) = first_plan(&task, &situation).found() {
             starts.push((task, found.plan.clone()));
         }
     }
@@ -120,9 +120,9 @@ fn latencies() {
         let Some(situation) = situation_at(task, plan, &cut, &mut dice) else {
             continue;
         };
-        let mut task = task.clone();
+        let task = task.clone();
         let begin = Instant::now();
-        let answer = first_plan(&mut task, &situation);
+        let answer = first_plan(&task, &situation);
         times.push(begin.elapsed().as_secs_f64() * 1e3);
         states.push(match &answer {
             Answer::Plan { counts, .. }

@@ -18,23 +18,28 @@
 
 mod answer;
 mod apply;
+mod bound;
 mod compile;
+mod expressions;
 mod extract;
 mod formula;
-mod guide;
 mod hash;
+mod needless;
 mod network;
 mod pairs;
 mod reasons;
 mod relaxed;
 mod relevance;
+mod root;
 mod run;
 mod search;
 mod spans;
 mod state;
+mod step_costs;
 mod symbolic;
 mod symmetry;
 mod time;
+mod tuning;
 
 use std::ops::ControlFlow;
 
@@ -43,6 +48,7 @@ use elbowroom_model::{Situation, Task};
 
 pub use answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
 pub use compile::Unsupported;
+pub use tuning::{Member, Technique, Tuning, TuningError};
 
 use compile::{Failure, Wanted};
 use reasons::Names;
@@ -56,7 +62,7 @@ use symmetry::Symmetry;
 /// [`elbowroom_model::validate_from`], exactly, with the given ε. The same input gives the same
 /// answer, and the same sequence of reports.
 pub fn plan(
-    task: &mut Task,
+    task: &Task,
     situation: &Situation,
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
@@ -65,12 +71,12 @@ pub fn plan(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let mut continued;
+    let continued;
     let grounded = if *situation == Situation::initial(task) {
-        &mut *task
+        task
     } else {
         continued = task.beginning_at(situation);
-        &mut continued
+        &continued
     };
     let limits = reachability::Settings::default();
     let mut is_stopped = false;
@@ -94,12 +100,15 @@ pub fn plan(
             counts: progress.counts,
         };
     }
-    relevance::keep_relevant(grounded, &mut grounding, situation);
+    let tuning = &settings.tuning;
+    if tuning.uses(Technique::Relevance) {
+        relevance::keep_relevant(grounded, &mut grounding, situation);
+    }
     progress.counts.actions = grounding.actions.len() as u64;
     let mut goes_on = || observe(&progress).is_continue();
     let wanted = Wanted {
         situation,
-        epsilon: &settings.epsilon,
+        tuning,
         metric: !settings.first_plan_only && settings.objective == Objective::Metric,
     };
     let compiled = match compile::compile(grounded, &grounding, wanted, &mut goes_on) {
@@ -119,7 +128,11 @@ pub fn plan(
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
-    let symmetry = Symmetry::of(grounded, &compiled);
+    let symmetry = if tuning.uses(Technique::Symmetry) {
+        Symmetry::of(grounded, &compiled)
+    } else {
+        Symmetry::default()
+    };
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }
@@ -133,7 +146,8 @@ pub fn plan(
         compiled: &compiled,
         progress,
         best: None,
-        has_resources: !relaxed::floors(&compiled).is_empty(),
+        has_reservoirs: tuning.uses(Technique::Reservoirs)
+            && !relaxed::floors(&compiled).is_empty(),
     }
     .run()
 }

@@ -1,9 +1,46 @@
-//! Finds plans: an embedded temporal planner, and any external planner as a supervised process.
+//! Finds plans: an embedded temporal planner.
+//!
+//! It reads no clock, no file and no random number: its caller says, every few milliseconds, whether
+//! to go on, and the same task gives the same plan. Other people's planners are run by the crate
+//! `elbowroom-external`.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use elbowroom_model::{Situation, Task};
+//! use elbowroom_pddl::{Source, read_problem};
+//! use elbowroom_planner::{Settings, plan};
+//!
+//! let domain = Source::new(
+//!     "post.pddl",
+//!     "(define (domain post)
+//!        (:requirements :durative-actions :timed-initial-literals)
+//!        (:predicates (open) (delivered))
+//!        (:durative-action deliver :parameters () :duration (= ?duration 10)
+//!          :condition (at end (open)) :effect (at end (delivered))))",
+//! );
+//! let problem = Source::new(
+//!     "letter.pddl",
+//!     "(define (problem letter) (:domain post)
+//!        (:init (open) (at 30 (not (open)))) (:goal (delivered)))",
+//! );
+//! let (problem, _warnings) = read_problem(&domain, &problem)?;
+//! let task = Task::new(problem);
+//!
+//! let settings = Settings {
+//!     first_plan_only: true,
+//!     ..Settings::default()
+//! };
+//! let begin = Situation::initial(&task);
+//! let answer = plan(&task, &begin, &settings, &mut |_| ControlFlow::Continue(()));
+//! let found = answer.found().ok_or("there is a plan")?;
+//! assert_eq!(found.makespan, 10.into());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod embedded;
-#[cfg(feature = "external")]
-pub mod external;
 
 pub use embedded::{
-    Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped, Unsupported, plan,
+    Answer, Counts, Found, Member, Objective, Phase, Progress, Proof, Settings, Stopped, Technique,
+    Tuning, TuningError, Unsupported, plan,
 };

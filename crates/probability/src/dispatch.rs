@@ -16,8 +16,8 @@ use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::network::TooCoupled;
-use crate::search::{OrderSearch, Progress, Slot};
-use crate::total_order::TotalOrderPlan;
+use crate::search::{OrderSearch, Progress};
+use crate::total_order::{Slot, TotalOrderPlan};
 
 /// What to do next.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,8 +26,8 @@ pub enum Choice {
     GoalReached,
     /// This happening.
     Next(NextHappening),
-    /// Let this action go; its end is not worth waiting for. Only [`Lookahead`](crate::Lookahead)
-    /// says so.
+    /// Let this action go; its end is not worth waiting for. Only a
+    /// [`Table`](crate::optimum::Table) says so.
     Abandon(InstanceId),
     /// No order of the plan leads to the goal from here.
     Replan,

@@ -9,8 +9,7 @@
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, as things stand.
-//! 6. [`optimum`]: the best that any executor can reach in a small world, and [`Lookahead`], which
-//!    does it.
+//! 6. [`optimum`]: the best that any executor can reach in a small world, and its [`optimum::Table`].
 //!
 //! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws
 //! random numbers or looks at a clock: time limits come in as callbacks, and the same input gives
@@ -39,9 +38,9 @@
 //!     "(define (problem evening) (:domain lamp) (:init (whole)) (:goal (lit)))",
 //! );
 //! let (problem, _) = read_problem(&domain, &problem)?;
-//! let mut task = Task::new(problem);
-//! let (plan, _) = read_plan(&Source::new("plan", "0: (screw) [5]"), &mut task)?;
-//! let plan = partial_order(&task, &plan, &Default::default());
+//! let task = Task::new(problem);
+//! let (plan, _) = read_plan(&Source::new("plan", "0: (screw) [5]"), &task)?;
+//! let plan = partial_order(&task, &plan);
 //!
 //! let text = "
 //!     format = \"elbowroom-likelihoods\"
@@ -60,23 +59,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod actions;
 mod belief;
 mod circumstances;
 pub mod dispatch;
 pub mod likelihoods;
-mod lookahead;
 mod model;
 mod network;
 pub mod optimum;
 pub mod search;
 mod total_order;
 
+pub use actions::{Unsupported, all_actions};
 pub use belief::Belief;
 pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
 pub use likelihoods::{Flip, Likelihoods};
-pub use lookahead::Lookahead;
 pub use model::{Model, Semantics};
 pub use network::{PrunedNetwork, TooCoupled};
-pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop, Slot};
-pub use total_order::{Layer, TotalOrderPlan};
+pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};
+pub use total_order::{Layer, Slot, TotalOrderPlan};

@@ -2,7 +2,6 @@
 
 mod authors;
 mod file;
-mod mistakes;
 mod names;
 mod write;
 
@@ -16,7 +15,6 @@ use crate::belief::Belief;
 
 pub use authors::read as read_authors;
 pub use file::read;
-pub use mistakes::{LikelihoodError, LikelihoodErrors};
 pub use write::write;
 
 /// How a fact changes by itself while one snap action is done.
@@ -124,7 +122,7 @@ impl Likelihoods {
     /// When nothing is said of it.
     pub fn flip(&self, task: &Task, fact: FactId) -> Result<Flip, Missing> {
         let (predicate, arguments) = task.atom(fact);
-        self.flip_of(predicate, arguments).ok_or_else(|| Missing {
+        self.flip_of(predicate, &arguments).ok_or_else(|| Missing {
             what: task.fact_name(fact),
         })
     }

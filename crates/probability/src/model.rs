@@ -122,10 +122,7 @@ impl Model {
 
     /// The facts that matter to the plan.
     pub fn facts(&self) -> impl Iterator<Item = FactId> + '_ {
-        self.facts
-            .iter()
-            .copied()
-            .take_while(|&fact| self.is_fact(fact))
+        self.facts.iter().copied().take_while(|&fact| is_fact(fact))
     }
 
     pub(crate) fn event(&self, node: NodeId) -> &Event {
@@ -139,11 +136,6 @@ impl Model {
 
     pub(crate) fn fluent_position(&self, fluent: FluentId) -> Option<usize> {
         self.fluents.binary_search(&fluent).ok()
-    }
-
-    /// Whether this is a fact of the task, not a memory.
-    pub(crate) fn is_fact(&self, fact: FactId) -> bool {
-        fact.index() < self.task.fact_count()
     }
 
     /// The start node of an instance, or its only node.
@@ -174,4 +166,9 @@ impl Model {
             }
         }
     }
+}
+
+/// Whether this is a fact of the task, not a memory.
+pub(crate) fn is_fact(fact: FactId) -> bool {
+    fact < FactId::FIRST_FREE
 }

@@ -24,6 +24,7 @@
 //! whoever does something, no matter what, for long enough succeeds for certain.
 
 mod process;
+mod small_world;
 mod sweeps;
 mod table;
 
@@ -32,9 +33,10 @@ use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::dispatch::{Choice, NextHappening, goal_holds};
-use crate::search::Slot;
+use crate::total_order::Slot;
 
 pub use process::Perturbed;
+pub use small_world::Table;
 
 /// How many steps a run may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

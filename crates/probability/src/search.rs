@@ -29,13 +29,12 @@ mod timing;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
 use crate::circumstances::Circumstances;
 use crate::model::Model;
 use crate::network::{PrunedNetwork, TooCoupled};
-use crate::total_order::TotalOrderPlan;
+use crate::total_order::{Slot, TotalOrderPlan};
 use bound::Bounds;
 use cache::Cache;
 use nominal::Nominal;
@@ -58,8 +57,6 @@ pub enum Candidates {
 /// How to search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchSettings {
-    /// The least separation of interfering happenings (ε).
-    pub epsilon: Rational,
     /// Which sequences count.
     pub candidates: Candidates,
     /// Whether happenings keep the order of the plan's interference links, as in the paper. If
@@ -68,10 +65,9 @@ pub struct SearchSettings {
 }
 
 impl Default for SearchSettings {
-    /// The paper's, with ε one thousandth.
+    /// The paper's.
     fn default() -> Self {
         Self {
-            epsilon: Rational::new(1, 1000),
             candidates: Candidates::Working,
             keeps_interference: true,
         }
@@ -125,7 +121,7 @@ impl OrderSearch {
     /// A search for orders of the model's plan.
     pub fn new(model: impl Into<Arc<Model>>, settings: SearchSettings) -> Self {
         let model = model.into();
-        let separations = Separations::of(&model, &settings.epsilon, settings.keeps_interference);
+        let separations = Separations::of(&model, settings.keeps_interference);
         let bounds = Bounds::of(&model, &separations);
         Self {
             symmetry: Symmetry::of(&model, &separations),
@@ -287,15 +283,4 @@ impl OrderSearch {
         };
         Some(timing.windows().into_iter().map(slot).collect())
     }
-}
-
-/// When a happening may be.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Slot {
-    /// Which one.
-    pub node: NodeId,
-    /// Not before.
-    pub earliest: Rational,
-    /// Not after; `None` if as late as one likes.
-    pub latest: Option<Rational>,
 }

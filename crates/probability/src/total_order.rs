@@ -9,7 +9,6 @@ use elbowroom_plan::{InstanceId, Node, NodeId};
 use crate::circumstances::Circumstances;
 use crate::model::{Model, evaluate};
 use crate::network::PrunedNetwork;
-use crate::search::Slot;
 
 /// Happenings in a row, and the layers of the pruned network between them.
 #[doc(alias = "Γ")]
@@ -40,6 +39,17 @@ pub struct Layer {
     pub conditions: Vec<Condition>,
     /// The actions under way there, sorted.
     pub running: Vec<InstanceId>,
+}
+
+/// When a happening may be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Slot {
+    /// Which one.
+    pub node: NodeId,
+    /// Not before.
+    pub earliest: Rational,
+    /// Not after; `None` if as late as one likes.
+    pub latest: Option<Rational>,
 }
 
 impl TotalOrderPlan {

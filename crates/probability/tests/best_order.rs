@@ -119,7 +119,6 @@ fn no_order_is_more_likely_to_succeed_than_the_one_found() {
         let mut settings = SearchSettings {
             keeps_interference,
             candidates: Candidates::All,
-            ..SearchSettings::default()
         };
         let semantics = [Semantics::Paper, Semantics::World][round % 2];
         let mut compare = |case: &Case, settings| {

@@ -57,7 +57,7 @@ fn the_more_specific_entry_counts() {
         (flip.becomes_true, flip.becomes_false)
     };
     assert_eq!(flip("a"), (0.1, 0.5));
-    let mut task = task.clone();
+    let task = task.clone();
     let shut = task.problem().schema("shut").unwrap();
     let a = task.instantiate(shut, &[object("a")]).unwrap();
     let b = task.instantiate(shut, &[object("b")]).unwrap();
@@ -90,76 +90,76 @@ fn mistakes_are_reported_with_their_place_and_what_to_do() {
     for (text, expected) in [
         (
             "",
-            "line 1, column 1: the file does not say what it is: format = \"elbowroom-likelihoods\"
-line 1, column 1: the version of the format is missing: version = 1",
+            "text:1:1: error: the file does not say what it is; format = \"elbowroom-likelihoods\"
+text:1:1: error: the version of the format is missing; version = 1",
         ),
         (
             "format = \"other\"\nversion = 1",
-            "line 1, column 10: this is another kind of file: format = \"elbowroom-likelihoods\"",
+            "text:1:10: error: this is another kind of file; format = \"elbowroom-likelihoods\"",
         ),
         (
             "format = \"elbowroom-likelihoods\"\nversion = 2",
-            "line 2, column 11: this version is not known: version = 1",
+            "text:2:11: error: this version is not known; version = 1",
         ),
         (
             "format = ",
-            "line 1, column 10: string values must be quoted, expected literal string",
+            "text:1:10: error: string values must be quoted, expected literal string",
         ),
         (
             &format!("{HEAD}{complete}[fact.open]\n"),
-            "line 8, column 2: unknown entry `fact`: did you mean `facts`?",
+            "text:8:2: error: unknown entry `fact`; did you mean `facts`?",
         ),
         (
             &format!("{HEAD}{complete}[facts.opn]\n"),
-            "line 8, column 8: unknown predicate `opn`: did you mean `open`?",
+            "text:8:8: error: unknown predicate `opn`; did you mean `open`?",
         ),
         (
             &format!("{HEAD}{complete}[facts.quiet]\n"),
-            "line 8, column 8: `quiet` follows from rules, so it has no likelihood of its own: state those of the facts that its rules read",
+            "text:8:8: error: `quiet` follows from rules, so it has no likelihood of its own; state those of the facts that its rules read",
         ),
         (
             &format!("{HEAD}{complete}[facts.\"open c\"]\n"),
-            "line 8, column 8: unknown object `c`",
+            "text:8:8: error: unknown object `c`",
         ),
         (
             &format!("{HEAD}{complete}[facts.\"near a\"]\n"),
-            "line 8, column 8: `near` takes 2 arguments, not 1",
+            "text:8:8: error: `near` takes 2 arguments, not 1",
         ),
         (
             &format!("{HEAD}{complete}[facts.open]\nbecomes_true = 1.5\n"),
-            "line 9, column 16: 1.5 is not a probability: a number from 0 to 1",
+            "text:9:16: error: 1.5 is not a probability; a number from 0 to 1",
         ),
         (
             &format!("{HEAD}{complete}[facts.open]\nbecomes_true = nan\n"),
-            "line 9, column 16: nan is not a probability: a number from 0 to 1",
+            "text:9:16: error: nan is not a probability; a number from 0 to 1",
         ),
         (
             &format!("{HEAD}{complete}[facts.open]\nbecomes_tru = 0\n"),
-            "line 9, column 1: unknown entry `becomes_tru`: did you mean `becomes_true`?",
+            "text:9:1: error: unknown entry `becomes_tru`; did you mean `becomes_true`?",
         ),
         (
             &format!("{HEAD}{complete}[actions.shut]\neffects.near = 0.5\n"),
-            "line 9, column 9: `shut` has no effect `near`: it has effects on open, painted",
+            "text:9:9: error: `shut` has no effect `near`; it has effects on open, painted",
         ),
         (
             &format!("{HEAD}{complete}[actions.shut]\neffects.\"not painted\" = 0.5\n"),
-            "line 9, column 9: `shut` has no effect `not painted`: it has effects on open, painted",
+            "text:9:9: error: `shut` has no effect `not painted`; it has effects on open, painted",
         ),
         (
             &format!("{HEAD}{complete}[actions.shutt]\n"),
-            "line 8, column 10: unknown action `shutt`: did you mean `shut`?",
+            "text:8:10: error: unknown action `shutt`; did you mean `shut`?",
         ),
         (
             &format!("{HEAD}{complete}[facts.open]\n[facts.OPEN]\n"),
-            "line 9, column 8: `OPEN` is there twice",
+            "text:9:8: error: `OPEN` is there twice",
         ),
         (
             &format!("{HEAD}{complete}[beliefs]\nopen = 0.5\n"),
-            "line 9, column 1: `open` is a predicate, not a fact: a predicate with its objects",
+            "text:9:1: error: `open` is a predicate, not a fact; a predicate with its objects",
         ),
         (
             &format!("{HEAD}[facts.open]\n"),
-            "line 1, column 1: the file does not say how likely (shut a) is to start: [actions.shut], or [defaults]",
+            "text:1:1: error: the file does not say how likely (shut a) is to start; [actions.shut], or [defaults]",
         ),
     ] {
         let found = mistakes(text);
@@ -186,51 +186,51 @@ fn the_authors_format_is_read_and_its_mistakes_reported() {
     for (text, expected) in [
         (
             "open#a 0.1\n-\n",
-            "line 1, column 1: 1 numbers after the fact `open#a`: two: P(false becomes true) P(true becomes false)",
+            "text:1:1: error: 1 numbers after the fact `open#a`; two: P(false becomes true) P(true becomes false)",
         ),
         (
             "open#a 0.1 x\n-\n",
-            "line 1, column 12: `x` is not a number: a probability, from 0 to 1",
+            "text:1:12: error: `x` is not a number; a probability, from 0 to 1",
         ),
         (
             "open#a 0.1 -0.2\n-\n",
-            "line 1, column 12: -0.2 is not a probability: a number from 0 to 1",
+            "text:1:12: error: -0.2 is not a probability; a number from 0 to 1",
         ),
         (
             "opne#a 0.1 0.2\n-\n",
-            "line 1, column 1: unknown predicate `opne`: did you mean `open`?",
+            "text:1:1: error: unknown predicate `opne`; did you mean `open`?",
         ),
         (
             facts,
-            "line 4, column 14: the line `-` between facts and actions is missing",
+            "text:4:14: error: the line `-` between facts and actions is missing",
         ),
         (
             "open#a 0 0\n-\n",
-            "line 2, column 1: the file says nothing of (open b): one line for each fact, before this one",
+            "text:2:1: error: the file says nothing of (open b); one line for each fact, before this one",
         ),
         (
             &format!("{facts}-\nshut#a 0.75 open%0.5"),
-            "line 6, column 1: the effect of `shut#a` on painted has no probability: add `painted%P`",
+            "text:6:1: error: the effect of `shut#a` on painted has no probability; add `painted%P`",
         ),
         (
             &format!("{facts}-\nshut#a 0.75 near%0.5"),
-            "line 6, column 13: `shut` has no effect `near`: it has effects on open, painted",
+            "text:6:13: error: `shut` has no effect `near`; it has effects on open, painted",
         ),
         (
             &format!("{facts}-\nshut#a 0.75 open=0.5"),
-            "line 6, column 13: `open=0.5` is not an effect with its probability: predicate%P",
+            "text:6:13: error: `open=0.5` is not an effect with its probability; predicate%P",
         ),
         (
             &format!("{facts}-\nshut#a 0.75 open%1.5 painted%1"),
-            "line 6, column 18: 1.5 is not a probability: a number from 0 to 1",
+            "text:6:18: error: 1.5 is not a probability; a number from 0 to 1",
         ),
         (
             &format!("{facts}-\nshot#a 0.75"),
-            "line 6, column 1: unknown action `shot`: did you mean `shut`?",
+            "text:6:1: error: unknown action `shot`; did you mean `shut`?",
         ),
         (
             &format!("{facts}open#a 0 0\n-\n"),
-            "line 5, column 1: `open#a` is listed twice",
+            "text:5:1: error: `open#a` is listed twice",
         ),
     ] {
         let found = read(text).unwrap_err().to_string();

@@ -3,7 +3,6 @@
 //! Runs where `python3`, or the program that `ELBOWROOM_PYTHON` names, has pgmpy; says that it is
 //! skipped elsewhere.
 #![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
-#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
 mod shared;
 mod twin;
@@ -17,6 +16,7 @@ use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::{Model, PrunedNetwork, Semantics};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use shared::skipped;
 use twin::random::{Case, Taste, case, order};
 
 /// Builds the network with all its nodes, unpruned, and asks for P(A) and P(A ∩ G).
@@ -117,7 +117,7 @@ fn exact_inference_of_the_whole_network_gives_the_same() {
         .status()
         .is_ok_and(|status| status.success());
     if !has_pgmpy {
-        println!("skipped: {python} has no pgmpy");
+        skipped(format_args!("{python} has no pgmpy"));
         return;
     }
     let mut rng = ChaCha8Rng::seed_from_u64(8);

@@ -4,15 +4,27 @@
 //!   a stored one back.
 //! - [`wire`]: commands and observations as JSON, for traces and for worlds that are processes
 //!   (`docs/formats/world-protocol.md`).
+//! - [`exact`]: exact numbers in JSON.
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
 //! - [`plot`]: plots as SVG.
+//!
+//! ```
+//! use elbowroom_report::table::Table;
+//!
+//! let table = Table {
+//!     caption: "Success".to_owned(),
+//!     headings: vec!["executor".to_owned(), "success %".to_owned()],
+//!     keys: 1,
+//!     rows: vec![vec!["guarded".to_owned(), "95".to_owned()]],
+//!     notes: Vec::new(),
+//! };
+//! assert_eq!(table.csv(), "executor,success %\r\nguarded,95\r\n");
+//! ```
 
-mod names;
+pub mod exact;
 pub mod plot;
 pub mod statistics;
 pub mod table;
 pub mod trace;
 pub mod wire;
-
-pub use names::Names;

@@ -71,7 +71,7 @@ impl IntervalPlot {
         let columns = u32::try_from(self.groups.len())
             .unwrap_or(u32::MAX)
             .clamp(1, 60);
-        let width = (90 + 64 * columns).max(560);
+        let width = (90 + 64 * columns).max(560).max(self.legend_width());
         let root = SVGBackend::with_string(&mut svg, (width, HEIGHT)).into_drawing_area();
         let drawn = self.draw(&root).and_then(|()| root.present().map_err(text));
         drop(root);
@@ -159,6 +159,17 @@ impl IntervalPlot {
         Ok(())
     }
 
+    /// Room for title and legend.
+    fn legend_width(&self) -> u32 {
+        let series = self.series.iter();
+        let names = series.map(|series| 10 + name_width(&series.name));
+        let reference = self.reference.iter();
+        let names = names.chain(reference.map(|reference| 20 + name_width(&reference.name)));
+        let legend = names.fold(20, i32::saturating_add);
+        let title = name_width(&self.title).saturating_add(16);
+        u32::try_from(legend.max(title)).unwrap_or(u32::MAX)
+    }
+
     /// A round number above everything.
     fn top(&self) -> f64 {
         let series = self.series.iter().chain(&self.reference);
@@ -181,9 +192,14 @@ fn legend_name(
 ) -> Result<i32, String> {
     root.draw(&Text::new(name.to_owned(), (x, 42), font(13)))
         .map_err(text)?;
+    Ok(x.saturating_add(name_width(name)))
+}
+
+/// How wide a name is, with the space after it. Letters of 13 pixels' height are at most about 8
+/// wide on average.
+fn name_width(name: &str) -> i32 {
     let length = i32::try_from(name.chars().count()).unwrap_or(i32::MAX);
-    Ok(x.saturating_add(length.saturating_mul(8))
-        .saturating_add(22))
+    length.saturating_mul(8).saturating_add(22)
 }
 
 fn font(size: i32) -> TextStyle<'static> {

@@ -9,6 +9,9 @@ pub struct Table {
     pub caption: String,
     /// One for each column.
     pub headings: Vec<String>,
+    /// How many of the first columns say together what a row is about; they are repeated where a
+    /// table is folded. At least 1.
+    pub keys: usize,
     /// Rows.
     pub rows: Vec<Vec<String>>,
     /// What the rows mean; only in Markdown, below the table.
@@ -70,7 +73,7 @@ impl Table {
     }
 
     /// For a terminal of `width` columns: headings are broken between words, and columns that do not
-    /// fit follow below, each time after the first one.
+    /// fit follow below, each time after the keys.
     pub fn within(&self, width: usize) -> String {
         let longest_word = |heading: &String| {
             let words = heading.split(' ').map(|word| word.chars().count());
@@ -88,7 +91,7 @@ impl Table {
         for line in self.caption.lines() {
             let _ = writeln!(text, "{}", broken(line, width).join("\n"));
         }
-        for columns in blocks(&widths, width) {
+        for columns in blocks(&widths, self.keys.max(1), width) {
             text.push('\n');
             self.write_block(&mut text, &columns, &widths);
         }
@@ -129,17 +132,20 @@ impl Table {
     }
 }
 
-/// Which columns stand side by side: the first one, and as many others as fit, but at least one.
-fn blocks(widths: &[usize], width: usize) -> Vec<Vec<usize>> {
-    let Some(&first) = widths.first() else {
+/// Which columns stand side by side: the keys, and as many others as fit, but at least one.
+fn blocks(widths: &[usize], keys: usize, width: usize) -> Vec<Vec<usize>> {
+    let keys = keys.min(widths.len());
+    if keys == 0 {
         return Vec::new();
-    };
+    }
+    let start = || (0..keys).collect::<Vec<usize>>();
+    let of_keys = widths[..keys].iter().sum::<usize>() + 2 * (keys - 1);
     let mut blocks = Vec::new();
-    let (mut block, mut used) = (vec![0], first);
-    for (column, own) in widths.iter().enumerate().skip(1) {
-        if block.len() > 1 && used + 2 + own > width {
-            blocks.push(std::mem::replace(&mut block, vec![0]));
-            used = first;
+    let (mut block, mut used) = (start(), of_keys);
+    for (column, own) in widths.iter().enumerate().skip(keys) {
+        if block.len() > keys && used + 2 + own > width {
+            blocks.push(std::mem::replace(&mut block, start()));
+            used = of_keys;
         }
         block.push(column);
         used += 2 + own;
@@ -182,6 +188,7 @@ mod tests {
         let table = Table {
             caption: "How often it works".to_owned(),
             headings: headings.map(str::to_owned).to_vec(),
+            keys: 1,
             rows: vec![row.map(str::to_owned).to_vec()],
             notes: Vec::new(),
         };
@@ -194,10 +201,30 @@ mod tests {
     }
 
     #[test]
+    fn folded_rows_are_told_apart() {
+        let cells = |row: [&str; 4]| row.map(str::to_owned).to_vec();
+        let table = Table {
+            caption: "Who wins".to_owned(),
+            headings: cells(["case", "executor", "success", "replans"]),
+            keys: 2,
+            rows: vec![
+                cells(["p1", "stn", "10", "1"]),
+                cells(["p1", "live", "20", "2"]),
+            ],
+            notes: Vec::new(),
+        };
+        let expected = "Who wins\n\n\
+                        case  executor  success\np1    stn       10\np1    live      20\n\n\
+                        case  executor  replans\np1    stn       1\np1    live      2\n";
+        assert_eq!(table.within(24), expected);
+    }
+
+    #[test]
     fn cells_line_up_and_commas_are_quoted() {
         let table = Table {
             caption: "Two".to_owned(),
             headings: vec!["a".to_owned(), "long".to_owned()],
+            keys: 1,
             rows: vec![vec!["x, y".to_owned(), "1".to_owned()]],
             notes: vec!["1 is one".to_owned()],
         };

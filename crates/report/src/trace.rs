@@ -2,52 +2,70 @@
 //!
 //! A trace holds all that came in from outside: what the world reported and which plans the
 //! planner made. Everything else follows from that, and a [`Replay`] shows that it does.
+//!
+//! Whoever reads a trace has its lines as types ([`mod@line`]), from [`Stored::read`].
 
-mod entry;
+pub mod line;
+mod of;
 mod replay;
 
 use std::sync::Arc;
 
 use elbowroom_execution::{Entry, Recorder};
 use elbowroom_model::Task;
-use serde_json::Value;
+use serde::Serialize;
 
-pub use entry::{entry, report};
+pub use line::Line;
 pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
 
 /// What the first line says the trace is.
 pub const FORMAT: &str = "elbowroom-trace";
 /// The version of the format.
 pub const VERSION: u64 = 1;
+/// What the first line is called.
+const HEADER: &str = "header";
 
 /// Writes each entry of a run as one line.
 pub struct TraceWriter<'a> {
     task: Arc<Task>,
-    sink: &'a mut dyn FnMut(&str),
+    sink: &'a mut (dyn FnMut(&str) + Send),
 }
 
 impl<'a> TraceWriter<'a> {
     /// A writer that gives each line, with its line feed, to `sink`, which keeps it at once.
-    pub fn new(task: Arc<Task>, sink: &'a mut dyn FnMut(&str)) -> Self {
+    pub fn new(task: Arc<Task>, sink: &'a mut (dyn FnMut(&str) + Send)) -> Self {
         Self { task, sink }
     }
 
-    /// The first line: what is run, by fields of the caller's choice.
-    pub fn header(&mut self, mut fields: Value) {
-        fields["event"] = "header".into();
-        fields["format"] = FORMAT.into();
-        fields["version"] = VERSION.into();
-        (self.sink)(&format!("{fields}\n"));
+    /// The first line: what is run, as an object of the caller's choice.
+    ///
+    /// # Errors
+    /// When `spec` cannot be written as an object.
+    pub fn header(&mut self, spec: &impl Serialize) -> Result<(), serde_json::Error> {
+        let header = serde_json::to_string(&Header {
+            spec,
+            event: HEADER,
+            format: FORMAT,
+            version: VERSION,
+        })?;
+        (self.sink)(&format!("{header}\n"));
+        Ok(())
     }
+}
+
+/// The first line.
+#[derive(Serialize)]
+struct Header<'a, T> {
+    #[serde(flatten)]
+    spec: &'a T,
+    event: &'static str,
+    format: &'static str,
+    version: u64,
 }
 
 impl Recorder for TraceWriter<'_> {
     fn record(&mut self, recorded: &Entry<'_>) {
-        let line = entry(&self.task, recorded);
-        (self.sink)(&format!("{line}\n"));
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.task = Arc::clone(task);
+        let line = Line::of(&self.task, recorded);
+        (self.sink)(&format!("{}\n", line.text()));
     }
 }

@@ -3,14 +3,13 @@
 //! Numbers are written as `{"exact": "1393/2", "decimal": 696.5}`, and read as that, as a number,
 //! or as a text.
 
-use std::sync::Arc;
-
 use elbowroom_execution::{Command, Ending, Event, Measured, Observation, Ticket};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
+use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::Names;
+use crate::trace::line::{GivenLine, ObservationLine};
 
 /// A message that cannot be understood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -31,21 +30,15 @@ pub fn number(value: &Rational) -> Value {
     json!({ "exact": value.to_string(), "decimal": value.to_f64() })
 }
 
-/// A number or `null`.
-pub fn optional(value: Option<&Rational>) -> Value {
-    value.map_or(Value::Null, number)
-}
-
 /// Reads a number in any of its forms.
 pub fn read_number(value: &Value) -> Option<Rational> {
     match value {
         Value::Object(fields) => fields.get("exact")?.as_str()?.parse().ok(),
         Value::String(text) => text.parse().ok(),
-        // The shortest text that gives the float back is what somebody wrote.
         Value::Number(number) => number
             .as_i64()
             .map(Rational::from)
-            .or_else(|| number.as_f64()?.to_string().parse().ok()),
+            .or_else(|| Rational::from_f64_as_written(number.as_f64()?)),
         _ => None,
     }
 }
@@ -76,95 +69,23 @@ pub fn field_text<'a>(message: &'a Value, name: &str) -> Result<&'a str, WireErr
 
 /// A command.
 pub fn command(command: &Command) -> Value {
-    match command {
-        Command::Start {
-            ticket,
-            action,
-            duration,
-        } => json!({
-            "type": "start",
-            "ticket": ticket.0,
-            "action": action.name,
-            "duration": optional(duration.as_ref()),
-        }),
-        Command::Cancel { ticket } => json!({ "type": "cancel", "ticket": ticket.0 }),
-    }
+    value(&GivenLine::of(command))
 }
 
 /// An observation.
 pub fn observation(task: &Task, observation: &Observation) -> Value {
-    let mut message = match &observation.event {
-        Event::Started { ticket, measured } => json!({
-            "type": "started",
-            "ticket": ticket.0,
-            "measured": amounts(task, measured),
-        }),
-        Event::Ended {
-            ticket,
-            ending,
-            measured,
-        } => {
-            let mut message = json!({
-                "type": "ended",
-                "ticket": ticket.0,
-                "outcome": ending.name(),
-                "measured": amounts(task, measured),
-            });
-            if let Ending::Failed { why } = ending {
-                message["why"] = json!(why);
-            }
-            message
-        }
-        Event::Fact { fact, truth } => json!({
-            "type": "fact",
-            "fact": task.fact_name(*fact),
-            "becomes": truth,
-        }),
-        Event::Value { fluent, value } => json!({
-            "type": "value",
-            "fluent": task.fluent_name(*fluent),
-            "value": number(value),
-        }),
-        Event::Unintelligible { said, why } => json!({
-            "type": "unintelligible",
-            "said": said,
-            "why": why,
-        }),
-    };
-    message["time"] = number(&observation.time);
-    message
+    value(&ObservationLine::of(task, observation))
 }
 
-/// Enters what an observation mentions in the table, if the problem has it and nothing has mentioned
-/// it before; whether the table has grown. Who watches the world cannot know what plans mention.
-pub fn mention(message: &Value, names: &mut Names, task: &mut Arc<Task>) -> bool {
-    let text = |name: &str| message.get(name).and_then(Value::as_str);
-    let before = (task.fact_count(), task.fluent_count());
-    match text("type") {
-        Some("fact") => {
-            if let Some(name) = text("fact").filter(|name| names.fact(name).is_none()) {
-                Arc::make_mut(task).mention_fact(name);
-            }
-        }
-        Some("value") => {
-            if let Some(name) = text("fluent").filter(|name| names.fluent(name).is_none()) {
-                Arc::make_mut(task).mention_fluent(name);
-            }
-        }
-        _ => {}
-    }
-    let has_grown = (task.fact_count(), task.fluent_count()) != before;
-    if has_grown {
-        names.learn(task);
-    }
-    has_grown
+fn value(line: &impl Serialize) -> Value {
+    serde_json::to_value(line).unwrap_or(Value::Null)
 }
 
-/// Reads an observation.
+/// Reads an observation. It may be of facts and fluents that nothing has mentioned before.
 ///
 /// # Errors
 /// When it is none, or names what the problem does not have.
-pub fn read_observation(message: &Value, names: &Names) -> Result<Observation, WireError> {
+pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, WireError> {
     let ticket = || {
         let ticket = message.get("ticket").and_then(Value::as_u64);
         let ticket = ticket.ok_or_else(|| wrong("`ticket` must be the number of a start"));
@@ -173,16 +94,16 @@ pub fn read_observation(message: &Value, names: &Names) -> Result<Observation, W
     let event = match field_text(message, "type")? {
         "started" => Event::Started {
             ticket: ticket()?,
-            measured: read_amounts(message, names)?,
+            measured: read_amounts(message, task)?,
         },
         "ended" => Event::Ended {
             ticket: ticket()?,
             ending: ending(message)?,
-            measured: read_amounts(message, names)?,
+            measured: read_amounts(message, task)?,
         },
         "fact" => {
             let name = field_text(message, "fact")?;
-            let fact = names.fact(name);
+            let fact = task.fact_named(name);
             Event::Fact {
                 fact: fact.ok_or_else(|| wrong(format!("the problem has no fact `{name}`")))?,
                 truth: message
@@ -193,7 +114,7 @@ pub fn read_observation(message: &Value, names: &Names) -> Result<Observation, W
         }
         "value" => {
             let name = field_text(message, "fluent")?;
-            let fluent = names.fluent(name);
+            let fluent = task.fluent_named(name);
             Event::Value {
                 fluent: fluent
                     .ok_or_else(|| wrong(format!("the problem has no fluent `{name}`")))?,
@@ -232,14 +153,7 @@ fn ending(message: &Value) -> Result<Ending, WireError> {
     })
 }
 
-fn amounts(task: &Task, measured: &[Measured]) -> Value {
-    let entries = measured
-        .iter()
-        .map(|measured| (task.fluent_name(measured.fluent), number(&measured.amount)));
-    Value::Object(entries.collect())
-}
-
-fn read_amounts(message: &Value, names: &Names) -> Result<Vec<Measured>, WireError> {
+fn read_amounts(message: &Value, task: &Task) -> Result<Vec<Measured>, WireError> {
     let Some(measured) = message.get("measured") else {
         return Ok(Vec::new());
     };
@@ -247,7 +161,7 @@ fn read_amounts(message: &Value, names: &Names) -> Result<Vec<Measured>, WireErr
         .as_object()
         .ok_or_else(|| wrong("`measured` must be an object: fluent to amount"))?;
     let read = |(name, value): (&String, &Value)| {
-        let fluent = names.fluent(name);
+        let fluent = task.fluent_named(name);
         Ok(Measured {
             fluent: fluent.ok_or_else(|| wrong(format!("the problem has no fluent `{name}`")))?,
             amount: read_number(value)

@@ -178,7 +178,7 @@ impl Distribution {
 pub fn rounded(value: f64, resolution: &Rational) -> Rational {
     let steps = (value / resolution.to_f64()).round();
     if steps.abs() > MOST_STEPS
-        && let Ok(exact) = value.to_string().parse()
+        && let Some(exact) = Rational::from_f64_as_written(value)
     {
         return exact;
     }

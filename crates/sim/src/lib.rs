@@ -8,7 +8,6 @@
 //! - [`SimWorld`]: one trajectory of it. It is PDDL that happens: conditions are read in the true
 //!   state, and an action whose conditions do not hold fails.
 //! - [`Unreliable`]: loses, repeats, delays and contradicts the reports of another world.
-//! - [`perturbed`]: worlds without time in which anything can fail (paper 2).
 //!
 //! Randomness is keyed ([`draw`]): the duration of the second time that `(pick rover box)` starts
 //! depends on the seed, on `(pick rover box)` and on 2, and on nothing else. Two executors that
@@ -30,21 +29,18 @@
 //! "#;
 //! let model = WorldModel::read(text, &Problem::default())?;
 //! assert!(model.reports.is_perfect());
-//! # Ok::<(), elbowroom_sim::WorldFileError>(())
+//! # Ok::<(), elbowroom_text::Diagnostics>(())
 //! ```
 
 pub mod draw;
 mod model;
 mod paced;
 mod pattern;
-pub mod perturbed;
 mod sim;
 mod unreliable;
 
 pub use draw::{Distribution, Purpose};
-pub use model::{
-    Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldFileError, WorldModel,
-};
+pub use model::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldModel};
 pub use paced::{Begun, Durations, Pace, Paced};
 pub use pattern::ActionPattern;
 pub use sim::SimWorld;

@@ -4,6 +4,7 @@ mod text;
 
 use elbowroom_model::Problem;
 use elbowroom_num::Rational;
+use elbowroom_text::{Diagnostics, Source};
 use rand::Rng;
 
 use crate::draw::{Distribution, rounded};
@@ -111,14 +112,10 @@ pub struct Reports {
     pub contradicted: f64,
 }
 
-/// A world file that cannot be understood.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {message}")]
-pub struct WorldFileError {
-    /// The line, from 1 on.
-    pub line: usize,
-    /// What is wrong, and what to write instead.
-    pub message: String,
+impl Default for WorldModel {
+    fn default() -> Self {
+        Self::as_planned()
+    }
 }
 
 impl WorldModel {
@@ -138,9 +135,9 @@ impl WorldModel {
     /// Reads a world file for a problem.
     ///
     /// # Errors
-    /// The first mistake, with its line.
-    pub fn read(text: &str, problem: &Problem) -> Result<Self, WorldFileError> {
-        text::read(text, problem)
+    /// The first mistake, with its place.
+    pub fn read(source: impl Into<Source>, problem: &Problem) -> Result<Self, Diagnostics> {
+        text::read(&source.into(), problem).map_err(Diagnostics::from)
     }
 
     /// How long an action takes that is planned to take `planned`.

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_execution::{Command, Event, Observation, Passage, Ticket, World, WorldError};
-use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, FactId, FluentId};
 use elbowroom_num::Rational;
 
 use crate::sim::SimWorld;
 
 /// Decides when actions end that are under way.
-pub trait Pace {
+pub trait Pace: Send {
     /// An action has started.
     fn begun(&mut self, now: &Rational, begun: &Begun<'_>);
 
@@ -160,14 +159,6 @@ impl<P: Pace> World for Paced<'_, P> {
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
         self.world.look(facts, fluents)
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.world.know(task);
-    }
-
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        self.world.grown()
     }
 }
 

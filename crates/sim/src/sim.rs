@@ -8,9 +8,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::{Ending, Event, Measured, Observation, Progression, Ticket};
 use elbowroom_model::Task;
-use elbowroom_model::ground::{
-    Action, Body, Change, Condition, Effect, FactId, FluentId, SnapAction,
-};
+use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, SnapAction};
 use elbowroom_num::Rational;
 use rand::Rng;
 
@@ -310,8 +308,8 @@ impl<'a> SimWorld<'a> {
         let task = Arc::clone(self.truth.task());
         let event = match &exogenous.change {
             ExogenousChange::Fact(name, truth) => {
-                // What nothing in the problem mentions cannot matter.
-                let Some(fact) = fact_named(&task, name) else {
+                // What the problem does not have cannot matter.
+                let Some(fact) = task.fact_named(name) else {
                     return;
                 };
                 self.truth.change_fact(fact, *truth);
@@ -321,7 +319,7 @@ impl<'a> SimWorld<'a> {
                 }
             }
             ExogenousChange::Value(name, value) => {
-                let Some(fluent) = fluent_named(&task, name) else {
+                let Some(fluent) = task.fluent_named(name) else {
                     return;
                 };
                 self.truth.change_value(fluent, value);
@@ -335,16 +333,4 @@ impl<'a> SimWorld<'a> {
             self.tell(event);
         }
     }
-}
-
-fn fact_named(task: &Task, name: &str) -> Option<FactId> {
-    let count = u32::try_from(task.fact_count()).unwrap_or(u32::MAX);
-    let mut facts = (0..count).map(FactId);
-    facts.find(|fact| task.fact_name(*fact).eq_ignore_ascii_case(name))
-}
-
-fn fluent_named(task: &Task, name: &str) -> Option<FluentId> {
-    let count = u32::try_from(task.fluent_count()).unwrap_or(u32::MAX);
-    let mut fluents = (0..count).map(FluentId);
-    fluents.find(|fluent| task.fluent_name(*fluent).eq_ignore_ascii_case(name))
 }

@@ -13,7 +13,8 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::draw::{Purpose, keyed};
-use crate::model::Reports;
+use crate::model::{Reports, WorldModel};
+use crate::sim::SimWorld;
 
 /// Loses, repeats, delays and contradicts the reports of another world. What is looked at on
 /// purpose ([`World::look`]) is seen as it is.
@@ -27,6 +28,18 @@ pub struct Unreliable<W> {
     /// Reports on their way, by the time of their arrival.
     coming: BTreeMap<(Rational, u64), Observation>,
     count: u64,
+}
+
+impl WorldModel {
+    /// One trajectory of the world, which reports as well or badly as the model says.
+    pub fn world(&self, task: &Arc<Task>, seed: u64) -> Box<dyn World + '_> {
+        let sim = SimWorld::new(Arc::clone(task), self, seed);
+        if self.reports.is_perfect() {
+            return Box::new(sim);
+        }
+        let (reports, resolution) = (self.reports.clone(), self.resolution.clone());
+        Box::new(Unreliable::new(sim, reports, seed, resolution))
+    }
 }
 
 impl<W: World> Unreliable<W> {
@@ -115,14 +128,6 @@ impl<W: World> World for Unreliable<W> {
             now: self.now.clone(),
             observations: told,
         })
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.inner.know(task);
-    }
-
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        self.inner.grown()
     }
 
     fn look(

@@ -24,7 +24,12 @@ fn problem() -> Problem {
 fn mistake(sections: &str) -> (usize, String) {
     let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
     let error = WorldModel::read(&text, &problem()).expect_err(sections);
-    (error.line, error.message)
+    let error = error.errors().next().expect("a mistake");
+    let advice = error.advice.as_deref().unwrap_or_default();
+    (
+        error.line(),
+        format!("{} {advice}", error.message).trim().to_owned(),
+    )
 }
 
 #[test]
@@ -225,7 +230,7 @@ fn numbers_that_make_no_sense_are_mistakes() {
         (
             "[[duration]]\naction = \"go\"\nvalues = [1, \"a\"]\n",
             5,
-            "expected a number",
+            "where a number belongs",
         ),
     ];
     for (sections, line, words) in cases {

@@ -20,7 +20,8 @@
 //! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
 //! - [`MovingWindows`]: windows that follow as one time after another becomes known.
 //!
-//! Where the world decides some of the times, [`uncertain`] asks which promises can be kept.
+//! Where the world decides some of the times, [`uncertain`] asks which promises can be kept, and
+//! [`branching`] whether there is a schedule for all values of quantities that bounds depend on.
 //!
 //! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
 //! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a
@@ -47,6 +48,7 @@
 //! # Ok::<(), elbowroom_stn::NegativeCycle>(())
 //! ```
 
+pub mod branching;
 mod consistency;
 mod consistent;
 mod implied;

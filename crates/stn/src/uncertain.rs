@@ -23,8 +23,11 @@ mod dispatchable;
 mod dispatcher;
 mod dynamic;
 mod extended;
+mod graph;
+mod recheck;
 mod spoiler;
 mod strong;
+mod whole;
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -37,8 +40,10 @@ pub use conflict::{Conflict, Ground, Step};
 pub use dispatchable::{Dispatchable, DispatchableEdge, Wait};
 pub use dispatcher::{Dispatcher, Missed};
 pub use extended::Extended;
+pub use recheck::Recheck;
 pub use spoiler::Spoiler;
 pub use strong::StrongConflict;
+pub use whole::{Unit, WholeNetwork};
 
 /// `lower <= end - activation <= upper`, where the world decides how much it is.
 #[derive(Clone, Debug, PartialEq, Eq)]

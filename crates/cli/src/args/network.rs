@@ -10,23 +10,23 @@ pub(crate) struct NetworkArgs {
     /// The network, in any of the formats below
     #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
-    /// Write the minimal network there: all bounds that follow, each as tight as it is. Only for
-    /// consistent networks without contingent links
+    /// Write the minimal network, with the tightest implied bound between each two time points; only
+    /// for consistent networks without contingent links
     #[arg(long, value_name = "OUT")]
     pub(crate) minimal: Option<PathBuf>,
-    /// Write the dispatchable network there, waits included, if there is one
+    /// Write the dispatchable network, including its waits, if there is one
     #[arg(long, value_name = "OUT")]
     pub(crate) dispatchable: Option<PathBuf>,
-    /// Execute the network so many times, with durations drawn by chance
+    /// Simulate N executions with random durations
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub(crate) simulate: Option<u64>,
-    /// Which of the possible durations to draw
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0, requires = "simulate")]
     pub(crate) seed: u64,
-    /// How to draw them
+    /// How durations are drawn
     #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
     pub(crate) durations: DurationsChoice,
-    /// Give up the question of weak controllability, which can be hard, after so many branches
+    /// Number of branches after which weak controllability, which can be hard, is left undecided
     #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES)]
     pub(crate) branches: usize,
     /// Print the answer as one JSON document

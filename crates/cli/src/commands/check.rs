@@ -24,9 +24,9 @@ const MARGINS_SHOWN: usize = 8;
 
 /// Checks a problem, or a plan for it.
 pub(crate) fn run(arguments: &CheckArgs) -> Answer {
-    let mut task = input::task(&arguments.problem)?;
+    let task = input::task(&arguments.problem, &arguments.epsilon)?;
     let plan = match &arguments.plan {
-        Some(path) => Some(plan(&mut task, path)?),
+        Some(path) => Some(plan(&task, path)?),
         None => None,
     };
     let name = arguments
@@ -40,10 +40,7 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
         name: name.clone(),
         settings: match &arguments.tolerance {
             Some(tolerance) => Settings::like_val(tolerance.clone()),
-            None => Settings {
-                epsilon: Some(arguments.epsilon.clone()),
-                ..Settings::default()
-            },
+            None => Settings::default(),
         },
     };
     let answer = check(&request).map_err(|error| match error {
@@ -67,7 +64,7 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
 }
 
 /// The plan, with fixed times.
-fn plan(task: &mut Task, path: &Path) -> Result<TimeTriggeredPlan, Failure> {
+fn plan(task: &Task, path: &Path) -> Result<TimeTriggeredPlan, Failure> {
     match input::any_plan(task, path)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
@@ -87,6 +84,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
         CheckAnswer::Plan(checked) => match &checked.finding {
             CheckFinding::Valid {
                 makespan,
+                metric,
                 values,
                 margins,
             } => {
@@ -96,6 +94,9 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
                     checked.plan,
                     number::nearest(makespan)
                 );
+                if let Some(metric) = metric {
+                    let _ = writeln!(text, "  metric: {}", number::nearest(metric));
+                }
                 push_values(&mut text, values);
                 push_margins(&mut text, margins, look);
                 text

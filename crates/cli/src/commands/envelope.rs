@@ -18,18 +18,16 @@ use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
-    refuse_what_is_not_there_yet(arguments)?;
     let mut watch = Watch::start(arguments);
-    let mut task = input::task(&arguments.problem)?;
+    let task = input::task(&arguments.problem, &arguments.epsilon)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
     ))?);
-    let plan = input::any_plan(&mut task, &arguments.plan)?;
+    let plan = input::any_plan(&task, &arguments.plan)?;
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
-        epsilon: arguments.epsilon.clone(),
         guarantee: arguments.guarantee.into(),
         enforce: arguments.enforce,
         contains: arguments.contains.clone(),
@@ -74,19 +72,4 @@ fn failure(error: RequestError) -> Failure {
         RequestError::Box(error) => Failure::new(format!("--contains: {error}"), ""),
         error => Failure::new(error, ""),
     }
-}
-
-fn refuse_what_is_not_there_yet(arguments: &EnvelopeArgs) -> Result<(), Failure> {
-    let method = match arguments.method {
-        args::Method::Irr => None,
-        args::Method::Best => Some("best"),
-        args::Method::Exact => Some("exact"),
-    };
-    if let Some(method) = method {
-        return Err(Failure::new(
-            format!("--method {method} is not available in this version"),
-            "use --method irr, which widens one end at a time",
-        ));
-    }
-    Ok(())
 }

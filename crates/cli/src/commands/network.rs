@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use elbowroom::network::{
-    self, Answer as Found, Durations, Mistakes, NetworkFile, Promise, Reason, Request, Simulated,
-    Simulation, Verdict,
+    self, Answer as Found, Durations, NetworkFile, Promise, Reason, Request, Simulated, Simulation,
+    Verdict,
 };
 use serde_json::Value;
 
@@ -34,10 +34,9 @@ pub(crate) fn run(arguments: &NetworkArgs) -> Answer {
         ));
     }
     let text = input::source(&arguments.file, "network")?;
-    let file = network::read(text.name(), text.text().as_bytes())
-        .map_err(|mistakes| Failure::rendered(rendered(&mistakes)))?;
+    let file = network::read(text.name(), text.text().as_bytes())?;
     for remark in &file.remarks {
-        output::tell(&format!("{}: {remark}", styled(HINT, "warning")));
+        output::warn(remark);
     }
     if arguments.minimal.is_some() && !file.is_certain() {
         return Err(Failure::new(
@@ -89,7 +88,7 @@ fn write_forms(arguments: &NetworkArgs, file: &NetworkFile) -> Result<(), Failur
         }
     }
     if let Some(path) = &arguments.dispatchable {
-        match file.network.dynamic() {
+        match file.network.dispatchable() {
             Ok(form) => write_network(path, &file.dispatchable(&form))?,
             Err(_) => not_written(path, "the network is not dynamically controllable"),
         }
@@ -267,28 +266,4 @@ fn push_simulated(text: &mut String, simulated: &Simulated, look: Look) {
             push_wrapped(text, &line, 2, look.width);
         }
     }
-}
-
-/// The mistakes in a file, with excerpts.
-fn rendered(mistakes: &Mistakes) -> String {
-    let mut text = String::new();
-    for mistake in &mistakes.mistakes {
-        let line = mistake.line.to_string();
-        let margin = " ".repeat(line.len());
-        let offset = " ".repeat(mistake.offset);
-        let _ = write!(
-            text,
-            "{}: {}\n{margin}--> {}:{line}:{}\n{margin} |\n{line} | {}\n{margin} | {offset}^\n\
-             {margin} = {}: {}\n\n",
-            styled(BAD, "error"),
-            mistake.message,
-            mistakes.name,
-            mistake.column,
-            mistake.excerpt,
-            styled(HINT, "help"),
-            mistake.help,
-        );
-    }
-    text.push_str(&counted(mistakes.mistakes.len(), "error"));
-    text
 }

@@ -5,7 +5,7 @@ mod watch;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, plan, plan_with};
-use elbowroom::planner::external::Planner;
+use elbowroom::external::Planner;
 
 use crate::args::{EMBEDDED, PlanArgs};
 use crate::exit::{Answer, Exit, Failure};
@@ -20,11 +20,10 @@ pub(crate) fn run(arguments: &PlanArgs) -> Answer {
     } else {
         Some(named(arguments)?)
     };
-    let (mut task, domain, problem) = input::task_with_sources(&arguments.problem)?;
+    let (task, domain, problem) = input::task_with_sources(&arguments.problem, &arguments.epsilon)?;
     let mut watch = Watch::start(arguments, planner.is_some());
     let mut request = PlanRequest {
-        task: &mut task,
-        epsilon: arguments.epsilon.clone(),
+        task: &task,
         first_plan_only: arguments.first || watch.limit().is_none(),
         most_memory: arguments.memory.map(|megabytes| megabytes << 20),
     };
@@ -77,6 +76,9 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome) -> Answer {
         output::print(&format!("{reason}\n"))?;
     } else if let (Some(plan), None) = (&plan, &arguments.output) {
         output::print(plan)?;
+    }
+    if let Some(summary) = text::summary(answer).filter(|_| !arguments.json) {
+        output::tell(&summary);
     }
     Ok(match &answer.finding {
         PlanFinding::Plan { .. } => Exit::Yes,

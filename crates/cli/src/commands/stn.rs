@@ -13,13 +13,9 @@ use crate::{input, output};
 
 /// Writes the STN plan, and what else was asked for.
 pub(crate) fn run(arguments: &StnArgs) -> Answer {
-    let mut task = input::task(&arguments.problem)?;
-    let plan = input::any_plan(&mut task, &arguments.plan)?;
-    let request = StnRequest {
-        task: &task,
-        plan,
-        epsilon: arguments.epsilon.clone(),
-    };
+    let task = input::task(&arguments.problem, &arguments.epsilon)?;
+    let plan = input::any_plan(&task, &arguments.plan)?;
+    let request = StnRequest { task: &task, plan };
     let outcome = stn(&request).map_err(|error| Failure::new(error, ""))?;
     if let Some(violation) = &outcome.repaired {
         input::tell_repair(&arguments.plan, violation);

@@ -25,7 +25,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
     };
     let (problem, _) = read_problem(&source(domain)?, &source(problem)?)
         .map_err(|diagnostics| diagnostics.to_string())?;
-    let mut task = Task::new(problem);
+    let task = Task::new(problem);
     // Plans are written in the terms of the task; its names are all that is needed for that.
     let names = task.clone();
     let situation = Situation::initial(&task);
@@ -48,7 +48,7 @@ pub(crate) fn main(arguments: &[String]) -> Result<(), String> {
             ControlFlow::Continue(())
         }
     };
-    match plan(&mut task, &situation, &settings, &mut observe) {
+    match plan(&task, &situation, &settings, &mut observe) {
         Answer::Plan { .. } => {}
         Answer::Unsolvable { proof, .. } => println!("{proof}"),
         Answer::NoneFound { stopped, .. } => println!("no plan found: {stopped:?}"),

@@ -14,7 +14,7 @@ pub(crate) struct Row {
     pub(crate) instance: String,
     /// `deadlines`, `numbers`, `concurrency`, joined by spaces.
     pub(crate) kinds: String,
-    /// [`Outcome::name`](elbowroom::planner::external::Outcome::name).
+    /// [`Outcome::name`](elbowroom::external::Outcome::name).
     pub(crate) outcome: String,
     pub(crate) first_seconds: String,
     pub(crate) first_makespan: String,

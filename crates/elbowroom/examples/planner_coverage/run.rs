@@ -9,12 +9,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use elbowroom::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 use elbowroom::flow;
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{Source, read_problem};
-use elbowroom::planner::external::{Event, Outcome, Planner, Report, Request, Settings, plan};
 
+use crate::manifest;
 use crate::row::{self, Row};
 
 struct Options {
@@ -135,35 +136,15 @@ fn done(path: &Path) -> Result<BTreeSet<(String, String, String)>, String> {
 
 /// All planners on the temporal instances, instance by instance.
 fn jobs(options: &Options) -> Result<Vec<Job>, String> {
-    let manifest = options.data.join("manifest.csv");
-    let text = fs::read_to_string(&manifest)
-        .map_err(|error| format!("{}: {error}", manifest.display()))?;
     let mut jobs = Vec::new();
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for line in text.lines().skip(1) {
-        let columns: Vec<&str> = line.split(',').collect();
-        let [
-            collection,
-            domain,
-            instance,
-            domain_file,
-            problem_file,
-            _,
-            durative,
-            _,
-            _,
-            _,
-            domain_features,
-            problem_features,
-        ] = columns[..]
-        else {
-            continue;
-        };
-        let is_wanted = options.only.as_ref().is_none_or(|text| line.contains(text));
-        if durative == "0" || !is_wanted {
+    for instance in manifest::read(&options.data)? {
+        let text = options.only.as_ref();
+        let is_wanted = text.is_none_or(|text| instance.line.contains(text.as_str()));
+        if !instance.is_temporal || !is_wanted {
             continue;
         }
-        let domain = format!("{collection}/{domain}");
+        let domain = format!("{}/{}", instance.collection, instance.domain);
         let count = counts.entry(domain.clone()).or_default();
         *count += 1;
         if !(*count - 1).is_multiple_of(options.every) {
@@ -173,13 +154,13 @@ fn jobs(options: &Options) -> Result<Vec<Job>, String> {
             jobs.push(Job {
                 row: Row {
                     planner: planner.clone(),
-                    kinds: kinds(&domain, domain_features, problem_features),
+                    kinds: kinds(&domain, &instance.features),
                     domain: domain.clone(),
-                    instance: instance.to_owned(),
+                    instance: instance.instance.clone(),
                     ..Row::default()
                 },
-                domain: options.data.join(domain_file),
-                problem: options.data.join(problem_file),
+                domain: instance.domain_file.clone(),
+                problem: instance.problem_file.clone(),
             });
         }
     }
@@ -187,13 +168,10 @@ fn jobs(options: &Options) -> Result<Vec<Job>, String> {
 }
 
 /// What makes an instance hard in a way that interests us.
-fn kinds(domain: &str, domain_features: &str, problem_features: &str) -> String {
+fn kinds(domain: &str, features: &str) -> String {
     /// Domains in which no plan does one thing after the other.
     const CONCURRENT: &[&str] = &["match", "tms", "driverlogshift", "concurrency"];
-    let features: BTreeSet<&str> = domain_features
-        .split_whitespace()
-        .chain(problem_features.split_whitespace())
-        .collect();
+    let features: BTreeSet<&str> = features.split_whitespace().collect();
     let mut kinds = Vec::new();
     if features.contains("TIL") {
         kinds.push("deadlines");
@@ -220,7 +198,7 @@ fn run(job: &Job, options: &Options) -> Row {
         Err(error) => Source::new(path.display().to_string(), error.to_string()),
     };
     let (domain, problem) = (source(&job.domain), source(&job.problem));
-    let mut task = match read_problem(&domain, &problem) {
+    let task = match read_problem(&domain, &problem) {
         Ok((problem, _)) => Task::new(problem),
         Err(errors) => {
             let first = errors.errors().next().map(ToString::to_string);
@@ -238,19 +216,18 @@ fn run(job: &Job, options: &Options) -> Row {
         memory_limit: Some(options.megabytes << 20),
         ..Settings::default()
     };
-    let epsilon = settings.epsilon.clone();
     let situation = Situation::initial(&task);
     let mut makespans = Vec::new();
     let report = plan(
         &planner,
         &mut Request {
-            task: &mut task,
+            task: &task,
             situation: &situation,
             domain: &domain,
             problem: &problem,
         },
         &settings,
-        &mut |task, plan| flow::repaired(task, plan, &epsilon),
+        &mut flow::repaired,
         &mut |event| {
             if let Event::Plan { found, .. } = event {
                 makespans.push(found.makespan.clone());

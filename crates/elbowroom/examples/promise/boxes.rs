@@ -1,4 +1,5 @@
-//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take.
+//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take; and
+//! what is gained where the dispatcher sees to obligations.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -11,7 +12,7 @@ use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use super::options::Options;
 use super::sources::Source;
-use super::subject::{Subject, epsilon};
+use super::subject::Subject;
 use super::trial::{Boxed, Search, boxed};
 use super::{counted, not_counted};
 
@@ -21,6 +22,8 @@ struct Row {
     widths: [Rational; 2],
     checks: [usize; 2],
     times: [Duration; 2],
+    /// The width of the dynamic box and of that with obligations enforced, where there are any.
+    enforced: Option<[Rational; 2]>,
 }
 
 pub(crate) fn main(options: &Options) {
@@ -29,9 +32,10 @@ pub(crate) fn main(options: &Options) {
     });
     println!(
         "| family | plans | boxes differ | widths of these: weak | dynamic | share | \
-         checks: weak | dynamic | seconds: weak | dynamic |"
+         checks: weak | dynamic | seconds: weak | dynamic | to enforce | gain | widths of these | \
+         enforced |"
     );
-    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|");
     for (family, rows) in &families {
         println!("| {family} {}", line(&rows.iter().collect::<Vec<_>>()));
     }
@@ -66,19 +70,47 @@ fn line(rows: &[&Row]) -> String {
         let time: Duration = rows.iter().map(|row| row.times[guarantee]).sum();
         let _ = write!(line, " {:.3} |", time.as_secs_f64());
     }
+    let enforced: Vec<_> = rows
+        .iter()
+        .filter_map(|row| row.enforced.as_ref())
+        .collect();
+    let gain: Vec<_> = enforced
+        .iter()
+        .filter(|[without, with]| without < with)
+        .collect();
+    let sum = |which: usize| {
+        let widths = gain.iter().map(|widths| &widths[which]);
+        widths.fold(Rational::ZERO, |sum, width| &sum + width)
+    };
+    let [without, with] = [sum(0), sum(1)].map(|sum| sum.to_decimal(1));
+    let _ = write!(
+        line,
+        " {} | {} | {without} | {with} |",
+        enforced.len(),
+        gain.len()
+    );
     line
 }
 
 fn row(source: &Source, options: &Options) -> Result<Row, String> {
     let subject = Subject::of_source(source, &options.planning)?;
-    let open = flow::open(&subject.task, subject.freed.clone(), &[], &epsilon());
+    let open = flow::open(&subject.task, subject.freed.clone(), &[]);
     let open = Arc::new(open.map_err(|_| "durations cannot be left open")?);
     let (weak, weak_time) = timed(&subject, &open, Guarantee::Weak, options)?;
     let (dynamic, dynamic_time) = timed(&subject, &open, Guarantee::Dynamic, options)?;
     if !weak.is_finished || !dynamic.is_finished {
         return Err("a box that was still growing when the time was up".to_owned());
     }
+    let enforced = match elbowroom::envelope::enforced(&subject.task, &open) {
+        Ok((plan, count)) if count > 0 => {
+            let plan = Arc::new(plan);
+            let (with, _) = timed(&subject, &plan, Guarantee::Dynamic, options)?;
+            Some([&dynamic, &with].map(|own| width(&own.envelope, &open)))
+        }
+        _ => None,
+    };
     Ok(Row {
+        enforced,
         is_different: weak.envelope != dynamic.envelope,
         widths: [&weak, &dynamic].map(|own| width(&own.envelope, &open)),
         checks: [weak.checks, dynamic.checks],

@@ -11,7 +11,7 @@ use elbowroom::plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::options::Options;
 use super::sources::Source;
-use super::subject::{Subject, epsilon};
+use super::subject::Subject;
 use super::trial::{Ready, Search};
 use super::worlds::Worlds;
 use super::{counted, not_counted};
@@ -83,7 +83,7 @@ fn row(source: &Source, options: &Options) -> Result<Row, String> {
     };
     let ready = Ready::new(&subject, search)?;
     let plan = Arc::new(ready.open.plan.clone());
-    let oracle = Oracle::new(&subject.task, &plan, &epsilon(), Guarantee::Dynamic);
+    let oracle = Oracle::new(&subject.task, &plan, Guarantee::Dynamic);
     let mut oracle = oracle.map_err(|_| "beyond exact analysis")?;
     let mut is_sharp = true;
     let sharp = sharpen(&mut oracle, ready.envelope(), &mut || {

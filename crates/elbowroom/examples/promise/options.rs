@@ -26,7 +26,7 @@ impl Options {
             data: PathBuf::from("../shared/data"),
             planning: Planning {
                 cache: None,
-                states: 20_000,
+                states: 200_000,
                 time: Some(Duration::from_secs(5)),
             },
             only: Vec::new(),

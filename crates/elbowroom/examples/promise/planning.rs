@@ -3,7 +3,7 @@
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use elbowroom::model::{Situation, Task};
 use elbowroom::pddl::write_plan;
@@ -12,31 +12,63 @@ use elbowroom::planner::{Answer, Settings, plan as search};
 use super::sources::Source;
 use super::subject::Planning;
 
-/// In files that say that there is none.
+/// In files that say that there is none, whatever the limits.
 const NO_PLAN: &str = "; none: ";
 
-/// The plan that was made earlier, or a new one.
+/// In files that say that none was found within limits; these follow.
+const NOT_FOUND: &str = "; not found within ";
+
+/// Why there is no plan.
+enum Without {
+    /// None exists, or the planner does not take the problem.
+    Ever(&'static str),
+    /// None was found within the limits.
+    Yet,
+}
+
+/// The plan that was made earlier, or a new one. Where none was found earlier, it is looked for
+/// again if the limits are others now.
 ///
 /// # Errors
 /// Why there is none.
-pub(crate) fn plan(source: &Source, task: &mut Task, how: &Planning) -> Result<String, String> {
+pub(crate) fn plan(source: &Source, task: &Task, how: &Planning) -> Result<String, String> {
     let file = file(source, how);
+    let limits = limits(how);
     if let Some(text) = file.as_ref().and_then(|file| fs::read_to_string(file).ok()) {
-        return match text.strip_prefix(NO_PLAN) {
-            Some(why) => Err(why.trim_end().to_owned()),
-            None => Ok(text),
-        };
+        if let Some(why) = text.strip_prefix(NO_PLAN) {
+            return Err(why.trim_end().to_owned());
+        }
+        match text.strip_prefix(NOT_FOUND) {
+            None => return Ok(text),
+            Some(earlier) if how.time.is_none() || earlier.trim_end() == limits => {
+                return Err(format!("no plan found within {}", earlier.trim_end()));
+            }
+            Some(_) => {}
+        }
     }
-    let made = made(task, how);
+    let Some(time) = how.time else {
+        return Err("no plan has been made yet".to_owned());
+    };
+    let made = made(task, how, time);
     if let Some(file) = file {
         let text = match &made {
             Ok(text) => text.clone(),
-            Err(why) => format!("{NO_PLAN}{why}\n"),
+            Err(Without::Ever(why)) => format!("{NO_PLAN}{why}\n"),
+            Err(Without::Yet) => format!("{NOT_FOUND}{limits}\n"),
         };
         // What cannot be kept is made again the next time.
         let _ = fs::write(file, text);
     }
-    made
+    made.map_err(|without| match without {
+        Without::Ever(why) => why.to_owned(),
+        Without::Yet => format!("no plan found within {limits}"),
+    })
+}
+
+/// The limits of the search, in words.
+fn limits(how: &Planning) -> String {
+    let seconds = how.time.map_or(0, |time| time.as_secs());
+    format!("{} states and {seconds} s", how.states)
 }
 
 fn file(source: &Source, how: &Planning) -> Option<PathBuf> {
@@ -45,10 +77,7 @@ fn file(source: &Source, how: &Planning) -> Option<PathBuf> {
 }
 
 #[allow(clippy::disallowed_methods, reason = "planning has a time limit")]
-fn made(task: &mut Task, how: &Planning) -> Result<String, String> {
-    let Some(time) = how.time else {
-        return Err("no plan has been made yet".to_owned());
-    };
+fn made(task: &Task, how: &Planning, time: Duration) -> Result<String, Without> {
     let begin = Instant::now();
     let situation = Situation::initial(task);
     let settings = Settings {
@@ -65,8 +94,8 @@ fn made(task: &mut Task, how: &Planning) -> Result<String, String> {
     });
     match answer {
         Answer::Plan { found, .. } => Ok(write_plan(task, &found.plan)),
-        Answer::Unsolvable { .. } => Err("there is no plan".to_owned()),
-        Answer::NoneFound { .. } => Err("no plan found within the limits".to_owned()),
-        Answer::Unsupported(_) => Err("beyond the embedded planner".to_owned()),
+        Answer::Unsolvable { .. } => Err(Without::Ever("there is no plan")),
+        Answer::NoneFound { .. } => Err(Without::Yet),
+        Answer::Unsupported(_) => Err(Without::Ever("beyond the embedded planner")),
     }
 }

@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use elbowroom::flow::{self, Freed};
 use elbowroom::model::{Task, TimeTriggeredPlan};
-use elbowroom::num::Rational;
 use elbowroom::pddl::{self, read_problem};
 use elbowroom::plan::format;
 use elbowroom::plan::{NodeId, network_node};
@@ -15,11 +14,6 @@ use elbowroom::{PlanKind, stn};
 
 use super::planning;
 use super::sources::{Origin, Source};
-
-/// The least separation of interfering happenings (ε).
-pub(crate) fn epsilon() -> Rational {
-    Rational::new(1, 1000)
-}
 
 /// A problem with a valid plan.
 pub(crate) struct Subject {
@@ -62,26 +56,26 @@ impl Subject {
     /// # Errors
     /// Why it does not count.
     pub(crate) fn of_source(source: &Source, how: &Planning) -> Result<Self, String> {
-        let mut task = task(&source.domain, &source.problem)?;
+        let task = task(&source.domain, &source.problem)?;
         let bytes = match &source.origin {
             Origin::File(path) => read(path)?,
-            Origin::Planned => planning::plan(source, &mut task, how)?.into_bytes(),
+            Origin::Planned => planning::plan(source, &task, how)?.into_bytes(),
         };
         Self::of_bytes([&source.family, &source.name], task, &bytes)
     }
 
-    fn of_bytes([family, name]: [&str; 2], mut task: Task, bytes: &[u8]) -> Result<Self, String> {
+    fn of_bytes([family, name]: [&str; 2], task: Task, bytes: &[u8]) -> Result<Self, String> {
         let plan = match PlanKind::of_text(&String::from_utf8_lossy(bytes)) {
             PlanKind::TimeTriggered => {
-                let read = pddl::read_plan(&pddl::Source::from_bytes("plan", bytes), &mut task);
+                let read = pddl::read_plan(&pddl::Source::from_bytes("plan", bytes), &task);
                 read.map_err(|_| "refused by the reader of plans")?.0
             }
-            PlanKind::Stn => scheduled(bytes, &mut task)?,
+            PlanKind::Stn => scheduled(bytes, &task)?,
         };
         if plan.steps.is_empty() {
             return Err("an empty plan".to_owned());
         }
-        let freed = flow::free(&task, &plan, &epsilon()).map_err(|error| match error {
+        let freed = flow::free(&task, &plan).map_err(|error| match error {
             flow::FlowError::Invalid(_) => "the judge rejects the plan".to_owned(),
             _ => "the plan cannot be freed".to_owned(),
         })?;
@@ -94,7 +88,8 @@ impl Subject {
         })
     }
 
-    /// The same plan, whose steps that start together stand in the opposite order.
+    /// The same plan, read from a text in which the lines that start together stand in the opposite
+    /// order; `None` if no two of them do, or if its times cannot be written exactly.
     pub(crate) fn turned_round(&self) -> Option<Result<Self, String>> {
         let mut plan = self.plan.clone();
         plan.steps.reverse();
@@ -102,13 +97,18 @@ impl Subject {
         if plan == self.plan {
             return None;
         }
-        let freed = flow::free(&self.task, &plan, &epsilon());
-        Some(match freed {
+        let text = pddl::write_plan(&self.task, &plan);
+        let task = Task::clone(&self.task);
+        let (read, _) = pddl::read_plan(&pddl::Source::new("plan", &text), &task).ok()?;
+        if read.makespan() != self.plan.makespan() {
+            return None;
+        }
+        Some(match flow::free(&task, &read) {
             Ok(freed) => Ok(Self {
                 family: self.family.clone(),
                 name: self.name.clone(),
-                task: Arc::clone(&self.task),
-                plan,
+                task: Arc::new(task),
+                plan: read,
                 freed,
             }),
             Err(error) => Err(error.to_string()),
@@ -117,7 +117,7 @@ impl Subject {
 }
 
 /// The earliest schedule of an STN plan file at its nominal values.
-fn scheduled(bytes: &[u8], task: &mut Task) -> Result<TimeTriggeredPlan, String> {
+fn scheduled(bytes: &[u8], task: &Task) -> Result<TimeTriggeredPlan, String> {
     let plan = format::read(bytes, task).map_err(|_| "refused by the reader of STN plans")?;
     let plan = plan.plan.at(&plan.nominal());
     let network = stn::ConsistentNetwork::try_from(plan.network(&[]));

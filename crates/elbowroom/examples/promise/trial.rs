@@ -4,12 +4,9 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
-use elbowroom::execute::{Analyst, WholeRegion};
-use elbowroom::execution::executors::{ExecutorSpec, Means};
-use elbowroom::execution::run::{
-    self, Patience, PlanningTime, Ports, Report, RunSettings, Verdict,
-};
-use elbowroom::execution::{Need, NoPlanner, NoRecord, Prepared, Preparer, World};
+use elbowroom::execute::{Analyst, Execution};
+use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
+use elbowroom::execution::{Forms, Need, NoPlanner, Prepared, Preparer, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -17,7 +14,7 @@ use elbowroom::num::Rational;
 use elbowroom::plan::DecoupledEnvelope;
 use elbowroom::sim::{SimWorld, WorldModel};
 
-use super::subject::{Subject, epsilon};
+use super::subject::Subject;
 
 /// A plan made ready for every executor.
 pub(crate) struct Ready<'a> {
@@ -26,7 +23,7 @@ pub(crate) struct Ready<'a> {
     pub(crate) network: Prepared,
     /// With all durations left open, and the box.
     pub(crate) open: Prepared,
-    /// For `esterel`.
+    /// For `esterel`, `adaptable` and `lookahead`.
     orderings: Result<Prepared, String>,
 }
 
@@ -44,7 +41,7 @@ pub(crate) struct Outcome {
 pub(crate) struct Search<'a> {
     pub(crate) most_checks: usize,
     /// Whether to go on.
-    pub(crate) goes_on: &'a dyn Fn() -> bool,
+    pub(crate) goes_on: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// The box of a plan with all durations open, and what it took.
@@ -61,11 +58,11 @@ impl<'a> Ready<'a> {
     /// # Errors
     /// Why it cannot be.
     pub(crate) fn new(subject: &'a Subject, search: Search<'_>) -> Result<Self, String> {
-        let (task, epsilon) = (&subject.task, epsilon());
+        let task = &subject.task;
         let nominal = subject.freed.deordered.nominal.clone();
-        let open = flow::open(task, subject.freed.clone(), &[], &epsilon)
+        let open = flow::open(task, subject.freed.clone(), &[])
             .map_err(|_| "durations cannot be left open".to_owned())?;
-        let closed = flow::closed(task, subject.freed.clone(), &epsilon);
+        let closed = flow::closed(task, subject.freed.clone());
         let open = Arc::new(open);
         let boxed = boxed(task, &open, Guarantee::Dynamic, search)?;
         let mut analyst = Analyst::new(flow::Settings::default());
@@ -75,13 +72,17 @@ impl<'a> Ready<'a> {
                 plan: closed,
                 nominal: nominal.clone(),
                 envelope: None,
+                forms: Forms::default(),
+                order: None,
             },
             open: Prepared {
                 plan: Arc::unwrap_or_clone(open),
                 nominal,
                 envelope: Some(boxed.envelope),
+                forms: Forms::default(),
+                order: None,
             },
-            orderings: analyst.prepare(task, &subject.plan, Need::Orderings),
+            orderings: analyst.prepare(task, &subject.plan, Need::PartialOrder),
         })
     }
 
@@ -115,9 +116,6 @@ impl<'a> Ready<'a> {
     }
 
     pub(crate) fn report(&self, executor: &str, world: &mut dyn World) -> Report {
-        let spec: ExecutorSpec = executor.parse().expect("an executor that there is");
-        let region = Box::new(WholeRegion { epsilon: epsilon() });
-        let mut decider = spec.build(Means::from(region));
         // What may go on without end is waited for.
         let patience = Patience {
             at_least: Rational::from(1_000_000_000_000_i64),
@@ -129,20 +127,13 @@ impl<'a> Ready<'a> {
             time_limit: Rational::from(1_000_000_000_000_i64),
             ..RunSettings::default()
         };
-        let mut preparer = Remembered(self);
-        run::run(
-            Arc::clone(&self.subject.task),
-            Some(&self.subject.plan),
-            &settings,
-            Ports {
-                world,
-                planner: &mut NoPlanner,
-                preparer: &mut preparer,
-                executor: decider.as_mut(),
-                need: spec.registered.need,
-                recorder: &mut NoRecord,
-            },
-        )
+        Execution::of(&self.subject.task)
+            .beginning_with(self.subject.plan.clone())
+            .by(executor.parse().expect("an executor that there is"))
+            .with_settings(settings)
+            .prepared_by(Remembered(self))
+            .planned_by(NoPlanner)
+            .run_in(world)
     }
 
     fn outcome(&self, report: &Report) -> Outcome {
@@ -172,11 +163,7 @@ impl<'a> Ready<'a> {
         let plan = TimeTriggeredPlan {
             steps: steps.collect(),
         };
-        let settings = validate::Settings {
-            epsilon: Some(epsilon()),
-            ..validate::Settings::default()
-        };
-        validate(&self.subject.task, &plan, &settings)
+        validate(&self.subject.task, &plan, &validate::Settings::default())
     }
 }
 
@@ -191,7 +178,7 @@ impl Preparer for Remembered<'_> {
         need: Need,
     ) -> Result<Prepared, String> {
         match need {
-            Need::Orderings => self.0.orderings.clone(),
+            Need::Orderings | Need::PartialOrder => self.0.orderings.clone(),
             Need::Network => Ok(self.0.network.clone()),
             Need::OpenNetwork | Need::Envelope => Ok(self.0.open.clone()),
         }
@@ -209,7 +196,7 @@ pub(crate) fn boxed(
     search: Search<'_>,
 ) -> Result<Boxed, String> {
     let beyond = |_| "beyond exact analysis".to_owned();
-    let mut oracle = Oracle::new(task, plan, &epsilon(), guarantee).map_err(beyond)?;
+    let mut oracle = Oracle::new(task, plan, guarantee).map_err(beyond)?;
     let settings = elbowroom::envelope::Settings {
         most_checks: Some(search.most_checks),
         ..elbowroom::envelope::Settings::default()

@@ -69,6 +69,13 @@ pub enum CheckFinding {
         /// The time of the last happening of the plan's actions.
         #[serde(with = "exact")]
         makespan: Rational,
+        /// The value of the problem's metric, if it has one that can be evaluated.
+        #[serde(
+            with = "exact::option",
+            default,
+            skip_serializing_if = "Option::is_none"
+        )]
+        metric: Option<Rational>,
         /// The value of each numeric fluent at the end.
         values: Vec<FluentValue>,
         /// How close each comparison came to failing.
@@ -175,6 +182,7 @@ fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding
     let values = report.state.values.iter();
     CheckFinding::Valid {
         makespan: report.makespan.clone(),
+        metric: report.metric(task),
         values: values
             .map(|(fluent, value)| FluentValue {
                 fluent: task.fluent_name(*fluent),

@@ -1,6 +1,7 @@
 //! How far may each quantity of a plan deviate?
 
 mod answer;
+mod conditions;
 mod foresight;
 mod limits;
 mod search;
@@ -24,6 +25,7 @@ pub use answer::{
     Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
     Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
+pub use conditions::Conditions;
 pub use foresight::Foresight;
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.
@@ -37,8 +39,6 @@ pub struct EnvelopeRequest {
     pub name: String,
     /// What to leave open; all durations if empty. An STN plan may leave something open itself.
     pub vary: Vec<VarySpec>,
-    /// The least separation of interfering happenings (ε); positive.
-    pub epsilon: Rational,
     /// What to guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
@@ -95,14 +95,13 @@ pub struct EnvelopeOutcome {
 }
 
 impl EnvelopeRequest {
-    /// The envelope of a plan, all durations open, with ε = 0.001 and the default search.
+    /// The envelope of a plan, all durations open, with the default search.
     pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
         Self {
             task: Arc::clone(task),
             plan: plan.into(),
             name: String::new(),
             vary: Vec::new(),
-            epsilon: Rational::new(1, 1000),
             guarantee: Guarantee::default(),
             enforce: false,
             contains: None,
@@ -114,7 +113,6 @@ impl EnvelopeRequest {
     #[must_use]
     pub fn with_settings(mut self, settings: &flow::Settings) -> Self {
         self.vary.clone_from(&settings.vary);
-        self.epsilon = settings.epsilon.clone();
         self.guarantee = settings.guarantee;
         self.search.precision = settings.search.precision.clone();
         self.search.growth = settings.search.growth;
@@ -134,13 +132,14 @@ pub fn envelope(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
-    let plan = match opened(request, watcher) {
+    let (plan, enforced) = match opened(request, watcher) {
         Ok(plan) if request.enforce => {
-            let enforced = elbowroom_envelope::enforced(&request.task, &plan, &request.epsilon);
+            let enforced = elbowroom_envelope::enforced(&request.task, &plan);
             // Without a schedule there is nothing to keep to, which will be said with its reason.
-            Arc::new(enforced.map_or(plan, |(enforced, _)| enforced))
+            let (plan, count) = enforced.unwrap_or((plan, 0));
+            (Arc::new(plan), count)
         }
-        Ok(plan) => Arc::new(plan),
+        Ok(plan) => (Arc::new(plan), 0),
         Err(FlowError::Invalid(violation)) => {
             let violation = (&*violation).into();
             let failing = Failing::Invalid { violation };
@@ -156,9 +155,10 @@ pub fn envelope(
     let subject = Subject {
         request,
         plan: &plan,
-        explainer: Explainer::new(&request.task, &plan, &request.epsilon),
+        enforced,
+        explainer: Explainer::new(&request.task, &plan),
     };
-    let oracle = match Oracle::new(&request.task, &plan, &request.epsilon, request.guarantee) {
+    let oracle = match Oracle::new(&request.task, &plan, request.guarantee) {
         Ok(oracle) => oracle,
         Err(Refusal::NoNominalSchedule) => {
             return Ok(subject.fails(subject.explainer.no_schedule(&plan.nominal())));
@@ -181,15 +181,15 @@ fn opened(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
 ) -> Result<ParametrizedPlan, FlowError> {
-    let (task, epsilon) = (&request.task, &request.epsilon);
+    let task = &request.task;
     match &request.plan {
         AnyPlan::Stn(plan) => Ok(flow::open_more(task, plan.clone(), &request.vary)?),
         AnyPlan::TimeTriggered(plan) => {
-            let freed = flow::free(task, plan, epsilon)?;
+            let freed = flow::free(task, plan)?;
             if let Some(violation) = &freed.repaired {
                 watcher.notice(&Event::Repaired(violation));
             }
-            flow::open(task, freed, &request.vary, epsilon)
+            flow::open(task, freed, &request.vary)
         }
     }
 }
@@ -220,6 +220,8 @@ fn contains(
 struct Subject<'a> {
     request: &'a EnvelopeRequest,
     plan: &'a Arc<ParametrizedPlan>,
+    /// How many bounds were added for the dispatcher to keep to.
+    enforced: usize,
     explainer: Explainer<'a>,
 }
 

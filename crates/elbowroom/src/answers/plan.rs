@@ -1,6 +1,5 @@
 //! Is there a plan?
 
-#[cfg(feature = "external")]
 mod external;
 
 use std::ops::ControlFlow;
@@ -14,16 +13,13 @@ use serde::{Deserialize, Serialize};
 
 use super::{Event, Exact, Halt, PlanProgress, RequestError, Version, Watcher, exact};
 
-#[cfg(feature = "external")]
 pub use external::{PlannerFailure, plan_with};
 
 /// Asks for a plan.
 #[derive(Debug)]
 pub struct PlanRequest<'a> {
     /// The problem. Planning names facts in it that it did not name before.
-    pub task: &'a mut Task,
-    /// The least separation of interfering happenings (ε); positive.
-    pub epsilon: Rational,
+    pub task: &'a Task,
     /// Whether the first plan is enough. Otherwise better ones are looked for until the watcher
     /// wants no more, or there is none.
     pub first_plan_only: bool,
@@ -192,7 +188,6 @@ pub fn plan(
     let begun = watcher.elapsed();
     let situation = Situation::initial(request.task);
     let mut settings = Settings {
-        epsilon: request.epsilon.clone(),
         first_plan_only: request.first_plan_only,
         ..Settings::default()
     };
@@ -361,14 +356,12 @@ impl Course<'_> {
 }
 
 fn none_found(stop: PlanStop, counts: Counts) -> String {
-    let why = match stop {
-        PlanStop::Cancelled => "before it was stopped",
-        PlanStop::TimeLimit => "within the time limit",
-        PlanStop::MemoryLimit => "within the memory limit",
-        _ => "within what the search can reach",
+    let evaluated = counts.evaluated;
+    let ended = match stop {
+        PlanStop::Cancelled => format!("stopped after {evaluated} states"),
+        PlanStop::TimeLimit => format!("gave up at the time limit, after {evaluated} states"),
+        PlanStop::MemoryLimit => format!("gave up at the memory limit, after {evaluated} states"),
+        _ => format!("searched all that the search can reach, {evaluated} states"),
     };
-    format!(
-        "no plan was found {why}, and none is known not to exist ({} states)",
-        counts.evaluated
-    )
+    format!("no plan found: {ended}; this is no proof that there is none")
 }

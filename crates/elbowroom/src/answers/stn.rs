@@ -19,8 +19,6 @@ pub struct StnRequest<'a> {
     pub task: &'a Task,
     /// The plan. One that is a network already is taken as it is.
     pub plan: AnyPlan,
-    /// The least separation of interfering happenings (ε); positive.
-    pub epsilon: Rational,
 }
 
 /// The answer, and what it is about.
@@ -131,10 +129,10 @@ pub fn stn(request: &StnRequest<'_>) -> Result<StnOutcome, RequestError> {
     let task = request.task;
     let (plan, repaired) = match &request.plan {
         AnyPlan::Stn(plan) => (plan.clone(), None),
-        AnyPlan::TimeTriggered(plan) => match flow::free(task, plan, &request.epsilon) {
+        AnyPlan::TimeTriggered(plan) => match flow::free(task, plan) {
             Ok(freed) => {
                 let repaired = freed.repaired.clone();
-                (flow::closed(task, freed, &request.epsilon), repaired)
+                (flow::closed(task, freed), repaired)
             }
             Err(FlowError::Invalid(violation)) => {
                 let violation = (&*violation).into();

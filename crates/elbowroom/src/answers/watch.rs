@@ -7,6 +7,8 @@ use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
+use super::RunProgress;
+
 /// Hears how far a request has come, and says when it has to end.
 ///
 /// The library looks at no clock: who wants a time limit, or to know how long something took,
@@ -46,6 +48,10 @@ pub enum Event<'a> {
     Envelope(EnvelopeProgress<'a>),
     /// A planner is at work, or has found a plan.
     Plan(PlanProgress<'a>),
+    /// Something has happened in a run.
+    Run(RunProgress<'a>),
+    /// A trial of an experiment is over.
+    Trials(TrialsProgress),
 }
 
 /// How far the search for an envelope has come.
@@ -74,6 +80,15 @@ pub struct PlanProgress<'a> {
     pub states: Option<u64>,
     /// How much memory is used, in bytes; other planners only.
     pub memory: Option<u64>,
+}
+
+/// How far an experiment has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrialsProgress {
+    /// How many trials have been made.
+    pub done: u64,
+    /// Of how many.
+    pub of: u64,
 }
 
 /// Nobody watches: the work goes on until it is done.

@@ -5,14 +5,15 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_envelope::{Guarantee, Oracle, irr};
-use elbowroom_execution::{Need, Prepared, Preparer, Region};
+use elbowroom_execution::{Forms, Need, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
+use elbowroom_plan::partial_order::partial_order;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
-use super::facts_only::{facts_only, sorted};
+use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
 use crate::flow;
 
@@ -79,28 +80,27 @@ impl Analyst {
     }
 
     fn open(&self, task: &Task, freed: flow::Freed) -> Result<ParametrizedPlan, String> {
-        let epsilon = &self.settings.epsilon;
         let specs = self.specs(task, &freed)?;
         if specs.is_empty() && !self.settings.vary.is_empty() {
-            return Ok(flow::closed(task, freed, epsilon));
+            return Ok(flow::closed(task, freed));
         }
-        flow::open(task, freed, &specs, epsilon).map_err(|error| error.to_string())
+        flow::open(task, freed, &specs).map_err(|error| error.to_string())
     }
 
     /// What facts alone order: see [`Need::Orderings`].
-    fn orderings(&self, task: &Task, plan: &TimeTriggeredPlan) -> Result<Prepared, String> {
-        let settings = deorder::Settings {
-            epsilon: self.settings.epsilon.clone(),
-        };
-        let deordered = deorder::deorder(task, &facts_only(plan), &settings);
+    fn orderings(task: &Task, plan: &TimeTriggeredPlan, need: Need) -> Result<Prepared, String> {
+        let deordered = deorder::deorder(task, &facts_only(plan));
         let mut deordered = deordered.map_err(|error| error.to_string())?;
-        for (instance, step) in deordered.plan.instances.iter_mut().zip(sorted(plan)) {
-            instance.action = step.action;
+        let order = (need == Need::PartialOrder).then(|| partial_order(task, &as_timed(plan)));
+        for (instance, step) in deordered.instances.iter().zip(&plan.steps) {
+            deordered.plan.instances[instance.index()].action = step.action.clone();
         }
         Ok(Prepared {
             plan: ParametrizedPlan::closed(task, deordered.plan),
             nominal: deordered.nominal,
             envelope: None,
+            forms: Forms::default(),
+            order,
         })
     }
 
@@ -109,9 +109,8 @@ impl Analyst {
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
     ) -> Result<DecoupledEnvelope, String> {
-        let (epsilon, guarantee) = (&self.settings.epsilon, self.settings.guarantee);
         let mut oracle =
-            Oracle::new(task, plan, epsilon, guarantee).map_err(|error| error.to_string())?;
+            Oracle::new(task, plan, self.settings.guarantee).map_err(|error| error.to_string())?;
         let search = &self.settings.search;
         let run = irr(&mut oracle, search, &mut |_| self.flow());
         let run = run.map_err(|error| error.to_string())?;
@@ -127,38 +126,37 @@ impl Preparer for Analyst {
         plan: &TimeTriggeredPlan,
         need: Need,
     ) -> Result<Prepared, String> {
-        let epsilon = &self.settings.epsilon;
-        if need == Need::Orderings && flow::judge(task, plan, epsilon).is_valid() {
-            return self.orderings(task, plan);
+        let is_about_orders = matches!(need, Need::Orderings | Need::PartialOrder);
+        if is_about_orders && flow::judge(task, plan).is_valid() {
+            return Self::orderings(task, plan, need);
         }
-        let freed = flow::free(task, plan, epsilon).map_err(|error| error.to_string())?;
-        if need == Need::Orderings {
-            return self.orderings(task, plan);
+        let freed = flow::free(task, plan).map_err(|error| error.to_string())?;
+        if is_about_orders {
+            return Self::orderings(task, plan, need);
         }
         let nominal = freed.deordered.nominal.clone();
         let plan = Arc::new(match need {
-            Need::Orderings | Need::Network => flow::closed(task, freed, epsilon),
+            Need::Orderings | Need::PartialOrder | Need::Network => flow::closed(task, freed),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
         });
         let envelope = match need {
             Need::Envelope => Some(self.envelope(task, &plan)?),
             Need::OpenNetwork => self.envelope(task, &plan).ok(),
-            Need::Orderings | Need::Network => None,
+            Need::Orderings | Need::PartialOrder | Need::Network => None,
         };
         Ok(Prepared {
             plan: Arc::unwrap_or_clone(plan),
             nominal,
             envelope,
+            forms: Forms::default(),
+            order: None,
         })
     }
 }
 
 /// The exact envelope, asked point by point.
-#[derive(Clone, Debug)]
-pub struct WholeRegion {
-    /// The least separation of interfering happenings (ε).
-    pub epsilon: Rational,
-}
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WholeRegion;
 
 impl Region for WholeRegion {
     fn objection(
@@ -176,7 +174,7 @@ impl Region for WholeRegion {
             parameter.nominal = value.clone();
         }
         let plan = Arc::new(plan);
-        let mut oracle = match Oracle::new(task, &plan, &self.epsilon, Guarantee::Weak) {
+        let mut oracle = match Oracle::new(task, &plan, Guarantee::Weak) {
             Ok(oracle) => oracle,
             Err(refusal) => return Some(refusal.to_string()),
         };
@@ -184,7 +182,7 @@ impl Region for WholeRegion {
             Ok(objection) => objection?,
             Err(refusal) => return Some(refusal.to_string()),
         };
-        let explainer = crate::Explainer::new(task, &plan, &self.epsilon);
+        let explainer = crate::Explainer::new(task, &plan);
         let envelope = DecoupledEnvelope::point(values);
         Some(explainer.objection(&oracle, &envelope, &objection).reason)
     }

@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use elbowroom_execution::{PlanAnswer, Planner, PlannerAnswer};
+use elbowroom_external::{self as external, Event, Outcome, Request, Settings};
 use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
-use elbowroom_planner::external::{self, Event, Outcome, Request, Settings};
 
 use crate::flow;
 
@@ -32,8 +32,7 @@ pub struct External<'a> {
 }
 
 impl Planner for External<'_> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
-        let epsilon = self.settings.epsilon.clone();
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let report = external::plan(
             &self.planner,
             &mut Request {
@@ -43,7 +42,7 @@ impl Planner for External<'_> {
                 problem: &self.problem,
             },
             &self.settings,
-            &mut |task, plan| flow::repaired(task, plan, &epsilon),
+            &mut flow::repaired,
             &mut |event| {
                 let is_enough = self.takes_first && matches!(event, Event::Plan { .. });
                 if is_enough || !(self.goes_on)() {

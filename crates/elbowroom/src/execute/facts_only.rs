@@ -1,25 +1,17 @@
-//! Actions as a dispatcher sees them that knows no numbers.
+//! Actions as a dispatcher sees them that knows no numbers, or no durations but the planned ones.
 
-use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, SnapAction};
+use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
 use elbowroom_model::{Step, TimeTriggeredPlan};
 
-/// The plan without conditions and effects on numbers, steps in order of start: what `ROSPlan`
-/// orders happenings by.
+/// The plan without conditions and effects on numbers: what `ROSPlan` orders happenings by.
 pub(super) fn facts_only(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
-    let steps = sorted(plan).into_iter().map(|step| Step {
+    let steps = plan.steps.iter().map(|step| Step {
         action: without_numbers(&step.action),
-        ..step
+        ..step.clone()
     });
     TimeTriggeredPlan {
         steps: steps.collect(),
     }
-}
-
-/// The steps in the order in which deordering numbers them.
-pub(super) fn sorted(plan: &TimeTriggeredPlan) -> Vec<Step> {
-    let mut steps = plan.steps.clone();
-    steps.sort_by(|a, b| a.start.cmp(&b.start));
-    steps
 }
 
 fn without_numbers(action: &Action) -> Action {
@@ -53,5 +45,25 @@ fn taken_as(condition: &Condition, truth: bool) -> Condition {
             Condition::And(parts.iter().map(|it| taken_as(it, truth)).collect())
         }
         Condition::Or(parts) => Condition::Or(parts.iter().map(|it| taken_as(it, truth)).collect()),
+    }
+}
+
+/// The plan with each planned duration in place of `?duration`: numbers that depend on how long
+/// something takes are followed as if all went as planned.
+pub(super) fn as_timed(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+    TimeTriggeredPlan {
+        steps: plan.steps.iter().map(timed).collect(),
+    }
+}
+
+fn timed(step: &Step) -> Step {
+    let duration = step.duration.clone();
+    let mut planned = |leaf: &Expression| match leaf {
+        Expression::Duration => duration.clone().map(Expression::Constant),
+        _ => None,
+    };
+    Step {
+        action: step.action.map_leaves(&mut planned),
+        ..step.clone()
     }
 }

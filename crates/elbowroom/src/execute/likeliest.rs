@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::{Compared, Odds, PlanAnswer, Planner, PlannerAnswer, Remainder};
 use elbowroom_model::ground::{Action, Expression};
@@ -10,7 +10,7 @@ use elbowroom_model::problem::{Comparison, SchemaId};
 use elbowroom_model::validate::{self, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use elbowroom_plan::deorder::{self, deorder};
+use elbowroom_plan::deorder::deorder;
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan};
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, WorldModel};
@@ -51,7 +51,7 @@ pub struct Likeliest<'a> {
 }
 
 impl Planner for Likeliest<'_> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.planner.clock.map(|clock| clock());
         let answer = match self.best(task, situation) {
             Ok((plan, _)) => PlanAnswer::Plan(plan),
@@ -75,39 +75,45 @@ impl Odds for Likeliest<'_> {
             return None;
         }
         let mut state = rest.belief.clone();
-        let time = rest.now + &self.planning_time + &self.planner.settings.epsilon;
+        let time = rest.now + &self.planning_time + rest.belief.task().epsilon();
         let _ = state.advance(&time);
         let situation = Situation {
             state: state.state(),
             time,
             running: Vec::new(),
         };
-        let mut task = Task::clone(rest.belief.task());
-        let (_, other) = self.best(&mut task, &situation).ok()?;
+        // What is only thought of gets no numbers.
+        let task = rest.belief.task().with_own_table();
+        let (_, other) = self.best(&task, &situation).ok()?;
         Some(Compared { present, other })
     }
 }
 
 /// One [`Likeliest`] behind both ports.
 #[derive(Clone)]
-pub struct SharedLikeliest(Rc<RefCell<Likeliest<'static>>>);
+pub struct SharedLikeliest(Arc<Mutex<Likeliest<'static>>>);
 
 impl SharedLikeliest {
     /// Shares it.
     pub fn new(likeliest: Likeliest<'static>) -> Self {
-        Self(Rc::new(RefCell::new(likeliest)))
+        Self(Arc::new(Mutex::new(likeliest)))
+    }
+
+    /// What it remembers is right whatever became of who asked last.
+    fn get(&self) -> MutexGuard<'_, Likeliest<'static>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Planner for SharedLikeliest {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
-        self.0.borrow_mut().plan(task, situation)
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        self.get().plan(task, situation)
     }
 }
 
 impl Odds for SharedLikeliest {
     fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared> {
-        self.0.borrow_mut().compare(rest)
+        self.get().compare(rest)
     }
 }
 
@@ -125,7 +131,7 @@ impl<'a> Likeliest<'a> {
     /// The likeliest plan and its probability, or what the planner says instead of a plan.
     fn best(
         &mut self,
-        task: &mut Task,
+        task: &Task,
         situation: &Situation,
     ) -> Result<(TimeTriggeredPlan, Rational), PlanAnswer> {
         let mut plans = Vec::new();
@@ -152,7 +158,7 @@ impl<'a> Likeliest<'a> {
     /// A plan for a world in which every action takes long, as a plan of the task.
     fn slow_plan(
         &mut self,
-        task: &mut Task,
+        task: &Task,
         situation: &Situation,
         quantile: u64,
     ) -> Option<TimeTriggeredPlan> {
@@ -163,13 +169,13 @@ impl<'a> Likeliest<'a> {
                 values.borrow_mut().quantile(name, planned, quantile)
             });
         }
-        let mut slow = Task::new(problem);
+        let slow = Task::new(problem).with_epsilon(task.epsilon().clone());
         let there = Situation {
             time: situation.time.clone(),
             state: slow.initial().clone(),
             running: Vec::new(),
         };
-        let PlanAnswer::Plan(plan) = self.planner.plan(&mut slow, &there).answer else {
+        let PlanAnswer::Plan(plan) = self.planner.plan(&slow, &there).answer else {
             return None;
         };
         let mut steps = Vec::with_capacity(plan.steps.len());
@@ -184,10 +190,7 @@ impl<'a> Likeliest<'a> {
             });
         }
         let plan = TimeTriggeredPlan { steps };
-        let settings = validate::Settings {
-            epsilon: Some(self.planner.settings.epsilon.clone()),
-            ..validate::Settings::default()
-        };
+        let settings = validate::Settings::default();
         let verdict = validate_from(task, situation, &plan, &settings);
         verdict.is_valid().then_some(plan)
     }
@@ -225,11 +228,8 @@ impl<'a> Likeliest<'a> {
         situation: &Situation,
         plan: &TimeTriggeredPlan,
     ) -> Rational {
-        let settings = deorder::Settings {
-            epsilon: self.planner.settings.epsilon.clone(),
-        };
         let rest = situation.rest_of_task(task);
-        let freed = deorder(&rest, &situation.rest_of_plan(plan), &settings);
+        let freed = deorder(&rest, &situation.rest_of_plan(plan));
         let Ok(freed) = freed else {
             return Rational::ZERO;
         };
@@ -272,7 +272,7 @@ impl Rest {
         // Start and end may also have to be ε apart: the duration is the longest that is asked for.
         let mut durations: BTreeMap<InstanceId, (usize, Rational)> = BTreeMap::new();
         for (index, constraint) in plan.constraints.iter().enumerate() {
-            let Some(instance) = duration_of(&plan, constraint) else {
+            let Some(instance) = plan.duration_of(constraint) else {
                 continue;
             };
             let has_started = happened[constraint.from.index()].is_some();
@@ -336,15 +336,6 @@ impl Rest {
             plan.constraints[*index].upper = Bound::Finite(duration);
         }
         ConsistentNetwork::try_from(plan.network(&[])).is_ok()
-    }
-}
-
-/// The instance whose duration a constraint bounds.
-fn duration_of(plan: &StnPlan, constraint: &Constraint) -> Option<InstanceId> {
-    let node = |id: NodeId| plan.nodes[id.index()];
-    match (node(constraint.from), node(constraint.to)) {
-        (Node::Start(start), Node::End(end)) if start == end => Some(start),
-        _ => None,
     }
 }
 

@@ -72,7 +72,7 @@ impl<P: Planner> RememberingPlanner<P> {
 }
 
 impl<P: Planner> Planner for RememberingPlanner<P> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let table = table(task);
         if *self.table.get_or_insert(table) != table {
             // Numbers that were given later may mean other facts in another run.

@@ -10,8 +10,8 @@ use elbowroom_planner::embedded;
 /// A planner without a clock: a function from situations to answers.
 pub struct Clockless<F>(pub F);
 
-impl<F: FnMut(&mut Task, &Situation) -> PlanAnswer> Planner for Clockless<F> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+impl<F: FnMut(&Task, &Situation) -> PlanAnswer + Send> Planner for Clockless<F> {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         PlannerAnswer {
             answer: (self.0)(task, situation),
             seconds: None,
@@ -29,13 +29,13 @@ pub struct Embedded<'a> {
     /// How many states to look at for a better plan than the first.
     pub improve_states: u64,
     /// What time it is, in seconds since whenever: where planning time is measured.
-    pub clock: Option<&'a dyn Fn() -> Rational>,
+    pub clock: Option<&'a (dyn Fn() -> Rational + Sync)>,
     /// Asked now and then whether to go on; without it, always.
-    pub goes_on: Option<&'a dyn Fn() -> bool>,
+    pub goes_on: Option<&'a (dyn Fn() -> bool + Sync)>,
 }
 
 impl Planner for Embedded<'_> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let begun = self.clock.map(|clock| clock());
         let answer = self.answer(task, situation);
         let seconds = self.clock.map(|clock| clock() - begun.unwrap_or_default());
@@ -43,8 +43,21 @@ impl Planner for Embedded<'_> {
     }
 }
 
+impl Default for Embedded<'_> {
+    /// 20,000 states, of which 2,000 for a better plan than the first; no clock.
+    fn default() -> Self {
+        Self {
+            settings: embedded::Settings::default(),
+            most_states: 20_000,
+            improve_states: 2_000,
+            clock: None,
+            goes_on: None,
+        }
+    }
+}
+
 impl Embedded<'_> {
-    fn answer(&self, task: &mut Task, situation: &Situation) -> PlanAnswer {
+    fn answer(&self, task: &Task, situation: &Situation) -> PlanAnswer {
         let answer = embedded::plan(task, situation, &self.settings, &mut |progress| {
             let limit = match progress.best {
                 Some(_) => self.improve_states.min(self.most_states),

@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 
 /// Gives each instance of a schema a duration of its own: a function of its name and of what the
 /// domain says. Where the plan has a say in the duration, or the state, it stays as it is.
-pub(crate) fn set_durations(
+pub fn set_durations(
     task: &Task,
     schema: SchemaId,
     problem: &mut Problem,
@@ -38,7 +38,7 @@ pub(crate) fn set_durations(
 }
 
 /// A function of the schema's parameters, with a value for each of its instances.
-pub(crate) fn add_function_of(
+pub fn add_function_of(
     task: &Task,
     schema: SchemaId,
     what: &str,

@@ -1,7 +1,7 @@
 //! Why a plan has no schedule: what takes too long, and what it must fit into.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason};
+use elbowroom_plan::{Bound, Constraint, NodeId, Origin, Reason, StnPlan};
 
 use super::Explainer;
 
@@ -15,7 +15,7 @@ pub(super) struct Conflict {
 
 /// What an edge of the network comes from.
 #[derive(Clone, Copy)]
-enum Origin<'a> {
+enum Edge<'a> {
     /// Nothing happens before time 0.
     Beginning,
     /// The lower bound of a constraint.
@@ -24,36 +24,37 @@ enum Origin<'a> {
     AtMost(&'a Constraint),
 }
 
+impl<'a> Edge<'a> {
+    fn of(plan: &'a StnPlan, origin: Origin) -> Self {
+        match origin {
+            Origin::Beginning => Self::Beginning,
+            Origin::AtLeast(index) => Self::AtLeast(&plan.constraints[index]),
+            Origin::AtMost(index) => Self::AtMost(&plan.constraints[index]),
+        }
+    }
+}
+
 /// The contradiction in the plan's constraints at these values; `None` if there is none.
 pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<Conflict> {
     let plan = &explainer.plan.plan;
-    let cycle = plan.network(valuation).consistency().err()?;
-    // In the order in which `StnPlan::network` adds them.
-    let mut origins: Vec<Origin<'_>> = plan.nodes().skip(1).map(|_| Origin::Beginning).collect();
-    for constraint in &plan.constraints {
-        if constraint.lower != Bound::Infinite {
-            origins.push(Origin::AtLeast(constraint));
-        }
-        if constraint.upper != Bound::Infinite {
-            origins.push(Origin::AtMost(constraint));
-        }
-    }
-    let mut walked: Vec<Origin<'_>> = cycle
+    let (network, origins) = plan.network_with_origins(valuation);
+    let cycle = network.consistency().err()?;
+    let mut walked: Vec<Edge<'_>> = cycle
         .constraints
         .iter()
-        .map(|id| origins[id.index()])
+        .map(|id| Edge::of(plan, origins[id.index()]))
         .collect();
     // Walking a cycle goes back in time along what takes long; people read forwards, from the
     // first of what must fit to the last.
-    let first_room = walked.iter().position(|o| matches!(o, Origin::AtMost(_)));
+    let first_room = walked.iter().position(|o| matches!(o, Edge::AtMost(_)));
     walked.rotate_left(first_room.unwrap_or(0));
     let mut needs: Vec<String> = Vec::new();
     let mut rooms: Vec<Room> = Vec::new();
     for (position, origin) in walked.iter().enumerate() {
         match origin {
-            Origin::Beginning => {}
-            Origin::AtLeast(constraint) => needs.extend(need(explainer, constraint, valuation)),
-            Origin::AtMost(constraint) => {
+            Edge::Beginning => {}
+            Edge::AtLeast(constraint) => needs.extend(need(explainer, constraint, valuation)),
+            Edge::AtMost(constraint) => {
                 let next = walked[(position + 1) % walked.len()];
                 rooms.push(room(explainer, constraint, next, valuation));
             }
@@ -82,7 +83,7 @@ enum Room {
     Limit(String),
 }
 
-/// `A, B must fit into C`; `deadline of D at 60, after A, B`.
+/// `A, B must fit into C`; `deadline of D at 60, because A, B must be over before it`.
 fn sentence(needs: &[String], rooms: &[Room]) -> String {
     let needs = needs.join(", ");
     let mut actions = Vec::new();
@@ -98,20 +99,20 @@ fn sentence(needs: &[String], rooms: &[Room]) -> String {
         (true, true, _) => limits,
         (true, false, true) => format!("the duration of {actions}"),
         (true, false, false) => format!("{limits}, and the duration of {actions}"),
-        (false, true, _) => format!("{limits}, after {needs}"),
+        (false, true, _) => format!("{limits}, because {needs} must be over before it"),
         (false, false, true) => format!("{needs} must fit into {actions}"),
         (false, false, false) => format!("{limits}, and {needs} must fit into {actions}"),
     }
 }
 
 /// Whether the edge keeps start and end of one action apart, because they interfere.
-fn is_own_separation(explainer: &Explainer<'_>, origin: Origin<'_>) -> bool {
+fn is_own_separation(explainer: &Explainer<'_>, origin: Edge<'_>) -> bool {
     match origin {
-        Origin::AtLeast(constraint) => {
+        Edge::AtLeast(constraint) => {
             constraint.reason == Reason::Interference
-                && duration_of(explainer, constraint).is_some()
+                && explainer.plan.plan.duration_of(constraint).is_some()
         }
-        Origin::AtMost(_) | Origin::Beginning => false,
+        Edge::AtMost(_) | Edge::Beginning => false,
     }
 }
 
@@ -121,11 +122,11 @@ fn need(
     constraint: &Constraint,
     valuation: &[Rational],
 ) -> Option<String> {
-    if let Some(id) = duration_of(explainer, constraint) {
+    if let Some(id) = explainer.plan.plan.duration_of(constraint) {
         return Some(explainer.action_name(id).to_owned());
     }
     let least = value(&constraint.lower, valuation)?;
-    if least <= *explainer.epsilon {
+    if least <= *explainer.task.epsilon() {
         return None;
     }
     let plan = &explainer.plan.plan;
@@ -149,18 +150,18 @@ fn need(
 fn room(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
-    next: Origin<'_>,
+    next: Edge<'_>,
     valuation: &[Rational],
 ) -> Room {
     let plan = &explainer.plan.plan;
     if let Reason::Timed(index) = constraint.reason {
         let before = match next {
-            Origin::AtLeast(after) => after.from,
-            Origin::AtMost(_) | Origin::Beginning => constraint.to,
+            Edge::AtLeast(after) => after.from,
+            Edge::AtMost(_) | Edge::Beginning => constraint.to,
         };
         return Room::Limit(explainer.deadline(before, index));
     }
-    if let Some(id) = duration_of(explainer, constraint) {
+    if let Some(id) = explainer.plan.plan.duration_of(constraint) {
         return Room::Action(explainer.action_name(id).to_owned());
     }
     let most = value(&constraint.upper, valuation).unwrap_or_default();
@@ -172,15 +173,6 @@ fn room(
         let from = plan.node_words(explainer.task, constraint.from);
         format!("at most {} from {from} to {to}", most.to_decimal(6))
     })
-}
-
-/// The instance whose duration the constraint bounds.
-fn duration_of(explainer: &Explainer<'_>, constraint: &Constraint) -> Option<InstanceId> {
-    let kind = |node: NodeId| explainer.plan.plan.nodes[node.index()];
-    match (kind(constraint.from), kind(constraint.to)) {
-        (Node::Start(start), Node::End(end)) if start == end => Some(start),
-        _ => None,
-    }
 }
 
 fn value(bound: &Bound, valuation: &[Rational]) -> Option<Rational> {

@@ -22,7 +22,9 @@ impl Explainer<'_> {
     }
 
     /// The deadline behind a bound that a plan puts on a node's absolute time, if there is one:
-    /// the first timed initial at or after it that takes away what the node needs.
+    /// the first timed initial at or after it that takes away what the node needs, unless the bound
+    /// is much stricter than that asks for. Plans keep some distance from their deadlines, and round
+    /// it off: up to a hundredth of the deadline's time counts as that, in whatever unit.
     pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
         let (index, timed) = self
             .task
@@ -31,7 +33,9 @@ impl Explainer<'_> {
             .enumerate()
             .filter(|(_, timed)| timed.time >= *bound)
             .find(|(index, _)| self.lost(node, *index).is_some())?;
-        if &timed.time - bound > Rational::ONE {
+        let distance = &timed.time - bound;
+        let hundredth = &timed.time / Rational::from(100);
+        if distance > hundredth.max(self.task.epsilon().clone()) {
             return None;
         }
         Some(self.deadline(node, index))

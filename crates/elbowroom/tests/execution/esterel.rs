@@ -1,7 +1,7 @@
 //! Paper 2's baseline on a clock.
 
-use elbowroom::execution::Cause;
 use elbowroom::execution::run::{Report, Verdict};
+use elbowroom::execution::{About, Cause};
 use elbowroom::num::Rational;
 
 use crate::scene::Scene;
@@ -52,13 +52,8 @@ fn a_plan_is_given_up_when_a_condition_does_not_hold_where_it_is_needed() {
     let reason = &report.reasons[0];
     assert_eq!(reason.cause, Cause::Condition, "{reason}");
     assert_eq!(reason.action.as_deref(), Some("(drop rover parcel office)"));
-    assert!(
-        reason
-            .about
-            .as_deref()
-            .unwrap()
-            .contains("(unlocked office)")
-    );
+    let unlocked = vec!["(unlocked office)".to_owned()];
+    assert_eq!(reason.about, Some(About::Conditions(unlocked)));
     assert_eq!(count(&report, "unlock"), 2);
     assert!(scene.judged(&report).is_valid());
     // Not before it is needed: `guarded` sees at 20 that the rest does not work any more.

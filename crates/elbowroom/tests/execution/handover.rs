@@ -16,7 +16,7 @@ fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
             "[[duration]]\naction = \"*\"\nnormal = { mean = 1, deviation = 0.3, minimum = 0.2 }\n\
              relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.3\nwhen = \"start\"\n",
         );
-        for executor in EXECUTORS {
+        for executor in EXECUTORS.iter() {
             let (mut replans, mut reached) = (0, 0);
             for seed in 0..40 {
                 scene.settings.planning_time = PlanningTime::Seconds(Rational::new(seed % 7, 2));
@@ -32,5 +32,32 @@ fn what_ends_while_a_plan_is_made_has_ended_for_the_new_plan() {
             assert!(reached > 0, "{name}, {executor}");
             assert!(replans > 0 || *executor == "esterel", "{name}, {executor}");
         }
+    }
+}
+
+/// The door is being unlocked when the first drive does not start, so the new plan goes on with
+/// that. It was once taken for another of its steps that begin at once, and done again and again.
+#[test]
+fn what_runs_is_not_started_again_by_the_new_plan() {
+    let scene = Scene::case("delivery");
+    let world = scene.world(
+        "[[failure]]\naction = \"*\"\nprobability = 0.3\nwhen = \"start\"\n\
+         [[duration]]\naction = \"drive\"\nconstant = 1.1\nrelative = true\n",
+    );
+    for executor in EXECUTORS.iter() {
+        let mut replans = 0;
+        for seed in 0..60 {
+            let report = scene.run(executor, &world, seed);
+            replans += report.replans;
+            let executed = &report.executed;
+            for (index, one) in executed.iter().enumerate() {
+                let again = executed[index + 1..].iter().any(|other| {
+                    one.step.action.name == other.step.action.name
+                        && other.step.start < one.step.end()
+                });
+                assert!(!again, "{executor}, {seed}: {report:#?}");
+            }
+        }
+        assert!(replans > 0 || matches!(*executor, "esterel" | "adaptable" | "lookahead"));
     }
 }

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use elbowroom::execution::run::{self, Ports, Report};
+use elbowroom::execution::run::Report;
 use elbowroom::execution::{
-    Cause, Decided, Decision, Ending, Executor, Mission, Moment, Need, News, NoPlanner, NoRecord,
+    Cause, Decided, Decision, Ending, Executor, Forms, Mission, Moment, Need, News, NoPlanner,
     Order, Planned, Prepared, Preparer, Reason, StepId,
 };
 use elbowroom::model::{State, Task, TimeTriggeredPlan};
@@ -30,24 +30,17 @@ pub(crate) fn execute(scene: &Scene) -> Outcome {
     let model = WorldModel::as_planned();
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 0);
     let belief = Arc::new(Mutex::new(None));
-    let mut executor = Literal {
+    let executor = Literal {
         steps: Vec::new(),
         left: 0,
         belief: Arc::clone(&belief),
     };
-    let report = run::run(
-        Arc::clone(&scene.task),
-        Some(&scene.plan),
-        &scene.settings,
-        Ports {
-            world: &mut world,
-            planner: &mut NoPlanner,
-            preparer: &mut AsItIs,
-            executor: &mut executor,
-            need: Need::Orderings,
-            recorder: &mut NoRecord,
-        },
-    );
+    let report = scene
+        .execution("stn")
+        .decided_by(executor)
+        .prepared_by(AsItIs)
+        .planned_by(NoPlanner)
+        .run_in(&mut world);
     let belief = belief.lock().expect("nobody panics").take();
     Outcome {
         report,
@@ -71,12 +64,15 @@ impl Preparer for AsItIs {
         Ok(Prepared {
             nominal: vec![Rational::ZERO; plan.nodes.len()],
             plan: ParametrizedPlan {
+                told: std::collections::BTreeMap::default(),
                 plan,
                 parameters: Vec::new(),
                 initial: std::collections::BTreeMap::default(),
                 goal: task.goal().clone(),
             },
             envelope: None,
+            forms: Forms::default(),
+            order: None,
         })
     }
 }
@@ -96,6 +92,10 @@ fn decided(decision: Decision, cause: Cause) -> Decided {
 }
 
 impl Executor for Literal {
+    fn need(&self) -> Need {
+        Need::Orderings
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let steps = mission.time_triggered.steps.iter().cloned();
         self.steps = (0..).map(StepId).zip(steps).collect();

@@ -3,7 +3,6 @@
 mod adaptable;
 mod amounts;
 mod bad_worlds;
-mod campaigns;
 mod esterel;
 mod guarantee;
 mod handover;
@@ -19,4 +18,7 @@ mod reports;
 mod scene;
 #[path = "../shared/mod.rs"]
 mod shared;
+mod spec;
+mod stepwise;
+mod told;
 mod traces;

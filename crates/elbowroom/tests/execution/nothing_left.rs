@@ -1,12 +1,9 @@
 //! The end of a run: nothing is left running, nothing is thrown away, and a dead end has a reason.
 
-use std::cell::Cell;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use elbowroom::execute::{Analyst, WholeRegion};
-use elbowroom::execution::executors::ExecutorSpec;
-use elbowroom::execution::run::{Ports, Report, Run, Verdict};
+use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
     Cause, Command, Ending, Event, NoPlanner, NoRecord, Observation, Passage, Planner, Recorder,
     World, WorldError,
@@ -48,24 +45,15 @@ fn run(
     world: &mut dyn World,
     planner: &mut dyn Planner,
     recorder: &mut dyn Recorder,
-    is_to_end: &dyn Fn() -> bool,
+    is_to_end: &(dyn Fn() -> bool + Sync),
 ) -> Report {
-    let spec: ExecutorSpec = executor.parse().expect("a correct test");
-    let mut decider = spec.build(Box::new(WholeRegion {
-        epsilon: scene.settings.epsilon.clone(),
-    }));
-    let ports = Ports {
-        world,
-        planner,
-        preparer: &mut Analyst::new(scene.flow.clone()),
-        executor: decider.as_mut(),
-        need: spec.registered.need,
-        recorder,
-    };
-    Run::new(Arc::clone(&scene.task), &scene.settings, ports)
+    scene
+        .execution(executor)
+        .planned_by(planner)
+        .recorded_by(recorder)
         .explaining()
         .ending_when(is_to_end)
-        .go(Some(&scene.plan))
+        .run_in(world)
 }
 
 /// A run in a simulated world, with what is running in it when the run is over.
@@ -111,7 +99,7 @@ fn a_failed_pick_does_not_cancel_the_other_robots_drive() {
     // It fails before it has started, the first time.
     let model =
         scene.world("[[failure]]\naction = \"pick\"\nprobability = 0.5\nwhen = \"start\"\n");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let mut replans = 0;
         for seed in 0..20 {
             let report = scene.run(executor, &model, seed);
@@ -135,7 +123,7 @@ fn a_failed_pick_does_not_cancel_the_other_robots_drive() {
 fn when_the_planner_fails_what_runs_is_cancelled() {
     let scene = robots("(shelved)", "(and (carried) (picked))", BOTH);
     let model = scene.world("[[failure]]\naction = \"pick\"\nprobability = 1\nwhen = \"end\"\n");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let (report, running) = simulated(&scene, executor, &model, false);
         assert!(
             matches!(report.verdict, Verdict::NoPlan { .. }),
@@ -228,15 +216,12 @@ fn a_run_that_is_asked_to_end_does_so_in_order_and_can_be_played_back() {
         scene.world("[[failure]]\naction = \"pick\"\nprobability = 0.5\nwhen = \"start\"\n");
     for executor in ["fixed:30", "stn", "guarded", "live", "esterel"] {
         for limit in 0..12 {
-            let asked = Cell::new(0);
-            let is_to_end = || {
-                asked.set(asked.get() + 1);
-                asked.get() > limit
-            };
+            let asked = AtomicUsize::new(0);
+            let is_to_end = || asked.fetch_add(1, Ordering::SeqCst) + 1 > limit;
             let mut text = String::new();
             let mut sink = |line: &str| text.push_str(line);
             let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
-            writer.header(json!({}));
+            writer.header(&json!({})).expect("an object");
             let mut world = SimWorld::new(Arc::clone(&scene.task), &model, 1);
             let mut planner = scene.planner();
             let report = run(

@@ -10,7 +10,7 @@ fn when_everything_goes_as_planned_so_does_every_executor() {
     for name in ["delivery", "match", "battery", "tank"] {
         let scene = Scene::case(name);
         let model = scene.world("");
-        for executor in EXECUTORS {
+        for executor in EXECUTORS.iter() {
             let report = scene.run(executor, &model, 0);
             assert_eq!(
                 report.verdict,
@@ -34,7 +34,7 @@ fn when_everything_goes_as_planned_so_does_every_executor() {
 fn work_that_must_lie_within_a_burning_flare_fails_with_it() {
     let scene = Scene::case("match");
     let model = scene.world("[[duration]]\naction = \"burn\"\nconstant = 15\n");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let report = scene.run(executor, &model, 0);
         assert_eq!(
             report.verdict,

@@ -7,7 +7,6 @@ use elbowroom::execution::run::{Report, RunningRule, Verdict};
 use elbowroom::execution::{
     Cause, Command, Ending, Event, NoRecord, Observation, Passage, Ticket, World, WorldError,
 };
-use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::sim::{SimWorld, WorldModel};
@@ -17,7 +16,7 @@ use crate::scene::{EXECUTORS, Scene};
 /// A world between which and the run somebody sits who changes its reports.
 struct Tampered<'a> {
     inner: SimWorld<'a>,
-    tamper: &'a mut dyn FnMut(Observation) -> Vec<Observation>,
+    tamper: &'a mut (dyn FnMut(Observation) -> Vec<Observation> + Send),
 }
 
 impl World for Tampered<'_> {
@@ -34,10 +33,6 @@ impl World for Tampered<'_> {
         })
     }
 
-    fn know(&mut self, task: &Arc<Task>) {
-        self.inner.know(task);
-    }
-
     fn look(
         &mut self,
         facts: &[FactId],
@@ -52,7 +47,7 @@ fn run(
     scene: &Scene,
     executor: &str,
     model: &WorldModel,
-    tamper: &mut dyn FnMut(Observation) -> Vec<Observation>,
+    tamper: &mut (dyn FnMut(Observation) -> Vec<Observation> + Send),
 ) -> Report {
     let inner = SimWorld::new(Arc::clone(&scene.task), model, 1);
     let mut world = Tampered { inner, tamper };
@@ -85,7 +80,7 @@ fn endings(report: &Report, action: &str) -> Vec<Option<Ending>> {
 #[test]
 fn a_report_that_comes_twice_counts_once() {
     let scene = Scene::case("delivery");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let model = WorldModel::as_planned();
         let once = run(&scene, executor, &model, &mut |it| vec![it]);
         let twice = run(&scene, executor, &model, &mut |it| vec![it.clone(), it]);
@@ -183,7 +178,7 @@ fn an_end_that_never_comes_is_given_up_when_patience_ends() {
 #[test]
 fn a_start_that_is_never_reported_is_known_from_its_end() {
     let scene = Scene::case("delivery");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let report = run(&scene, executor, &WorldModel::as_planned(), &mut |it| {
             if matches!(it.event, Event::Started { .. }) {
                 return Vec::new();
@@ -202,7 +197,7 @@ fn a_start_that_is_never_reported_is_known_from_its_end() {
 #[test]
 fn a_report_on_something_never_started_changes_nothing() {
     let scene = Scene::case("delivery");
-    for executor in EXECUTORS {
+    for executor in EXECUTORS.iter() {
         let model = WorldModel::as_planned();
         let clean = run(&scene, executor, &model, &mut |it| vec![it]);
         let report = run(&scene, executor, &model, &mut |it| {

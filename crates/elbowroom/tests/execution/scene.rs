@@ -1,10 +1,10 @@
 //! A problem, a plan, and how to run it.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-use elbowroom::execute::{Analyst, Embedded, Likeliest, SharedLikeliest, WholeRegion};
-use elbowroom::execution::executors::{ExecutorSpec, Means};
-use elbowroom::execution::run::{self, PlanningTime, Ports, Report, RunSettings, Verdict};
+use elbowroom::execute::{Analyst, Embedded, Execution, Likeliest, SharedLikeliest};
+use elbowroom::execution::executors::{self, ExecutorSpec};
+use elbowroom::execution::run::{PlanningTime, Report, RunSettings, Verdict};
 use elbowroom::execution::{NoRecord, Planner, Prepared, Preparer, Recorder, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
@@ -15,16 +15,11 @@ use elbowroom::planner::embedded;
 use elbowroom::probability::{Likelihoods, likelihoods};
 use elbowroom::sim::{Reports, SimWorld, Unreliable, WorldModel};
 
-/// The executors that there are, one of each.
-pub(crate) const EXECUTORS: &[&str] = &[
-    "fixed:30",
-    "stn",
-    "guarded",
-    "live",
-    "esterel",
-    "adaptable",
-    "lookahead",
-];
+/// One of each executor in the registry, so that a new one is covered from its first day on.
+pub(crate) static EXECUTORS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+    let registered = executors::EXECUTORS.iter();
+    registered.map(|it| &*it.example().leak()).collect()
+});
 
 /// A problem with a plan.
 pub(crate) struct Scene {
@@ -59,7 +54,7 @@ impl Scene {
         let source = |text: &str| Source::new("test", text);
         let (problem, _) =
             pddl::read_problem(&source(domain), &source(problem)).expect("a correct test");
-        let mut task = Task::new(problem);
+        let task = Task::new(problem);
         let mut scene = Self {
             plan: TimeTriggeredPlan::default(),
             flow: flow::Settings::default(),
@@ -73,11 +68,11 @@ impl Scene {
             likelihoods: Arc::new(Likelihoods::certain()),
         };
         scene.plan = if let Some(text) = plan {
-            let read = pddl::read_plan(&source(text), &mut task);
+            let read = pddl::read_plan(&source(text), &task);
             read.expect("a correct test").0
         } else {
             let situation = Situation::initial(&task);
-            match scene.planner().plan(&mut task, &situation).answer {
+            match scene.planner().plan(&task, &situation).answer {
                 elbowroom::execution::PlanAnswer::Plan(plan) => plan,
                 other => panic!("no plan: {other:?}"),
             }
@@ -101,23 +96,16 @@ impl Scene {
             panic!("a correct test");
         };
         let likeliest = Likeliest::new(model.clone(), self.planner(), time);
-        let mut likeliest = SharedLikeliest::new(likeliest);
+        let likeliest = SharedLikeliest::new(likeliest);
         let mut world = SimWorld::new(Arc::clone(&self.task), model, seed);
-        let region = Box::new(WholeRegion {
-            epsilon: self.settings.epsilon.clone(),
-        });
-        let mut decider =
-            spec.build(Means::from(region).with_odds(Some(Box::new(likeliest.clone()))));
-        let ports = Ports {
-            world: &mut world,
-            planner: &mut likeliest,
-            preparer: &mut Analyst::new(self.flow.clone()),
-            executor: decider.as_mut(),
-            need: spec.registered.need,
-            recorder: &mut NoRecord,
-        };
-        let task = Arc::clone(&self.task);
-        let report = run::run(task, Some(&self.plan), &self.settings, ports);
+        let report = Execution::of(&self.task)
+            .beginning_with(self.plan.clone())
+            .by(spec)
+            .with_settings(self.settings.clone())
+            .with_envelopes(self.flow.clone())
+            .with_odds(Some(Box::new(likeliest.clone())))
+            .planned_by(likeliest)
+            .run_in(&mut world);
         if report.verdict == Verdict::GoalReached {
             assert_eq!(world.truth().is_goal(), Ok(true), "a wrong goal reached");
         }
@@ -151,27 +139,21 @@ impl Scene {
         preparer: &mut dyn Preparer,
         recorder: &mut dyn Recorder,
     ) -> Report {
-        let spec: ExecutorSpec = executor.parse().expect("a correct test");
-        let region = Box::new(WholeRegion {
-            epsilon: self.settings.epsilon.clone(),
-        });
-        let mut decider = spec.build(Means {
-            likelihoods: Arc::clone(&self.likelihoods),
-            ..Means::from(region)
-        });
-        run::run(
-            Arc::clone(&self.task),
-            Some(&self.plan),
-            &self.settings,
-            Ports {
-                world,
-                planner: &mut self.planner(),
-                preparer,
-                executor: decider.as_mut(),
-                need: spec.registered.need,
-                recorder,
-            },
-        )
+        self.execution(executor)
+            .prepared_by(preparer)
+            .recorded_by(recorder)
+            .run_in(world)
+    }
+
+    /// An execution of the plan.
+    pub(crate) fn execution(&self, executor: &str) -> Execution<'static> {
+        Execution::of(&self.task)
+            .beginning_with(self.plan.clone())
+            .by(executor.parse().expect("a correct test"))
+            .with_settings(self.settings.clone())
+            .with_envelopes(self.flow.clone())
+            .with_likelihoods(Arc::clone(&self.likelihoods))
+            .planned_by(self.planner())
     }
 
     /// Runs in a simulated world.

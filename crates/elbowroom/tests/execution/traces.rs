@@ -24,7 +24,7 @@ fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -
     let mut text = String::new();
     let mut sink = |line: &str| text.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
-    writer.header(json!({}));
+    writer.header(&json!({})).expect("an object");
     let mut world = SimWorld::new(Arc::clone(&scene.task), &model, seed);
     let mut analyst = Analyst::new(scene.flow.clone());
     scene.run_in(executor, &mut world, &mut analyst, &mut writer);
@@ -33,28 +33,13 @@ fn traced_on_a_grid(scene: &Scene, executor: &str, seed: u64, grid: &Rational) -
 
 /// Plays a trace back; how many entries agree.
 fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
-    use elbowroom::execute::WholeRegion;
-    use elbowroom::execution::executors::ExecutorSpec;
-    use elbowroom::execution::run::{self, Ports};
     let stored = Stored::read(text).expect("a correct test");
-    let spec: ExecutorSpec = executor.parse().expect("a correct test");
-    let mut decider = spec.build(Box::new(WholeRegion {
-        epsilon: scene.settings.epsilon.clone(),
-    }));
     let mut replay = Replay::new(&stored, Arc::clone(&scene.task));
-    run::run(
-        Arc::clone(&scene.task),
-        Some(&scene.plan),
-        &scene.settings,
-        Ports {
-            world: &mut ReplayWorld::new(&stored, &scene.task),
-            planner: &mut ReplayPlanner::new(&stored),
-            preparer: &mut Analyst::new(scene.flow.clone()),
-            executor: decider.as_mut(),
-            need: spec.registered.need,
-            recorder: &mut replay,
-        },
-    );
+    scene
+        .execution(executor)
+        .planned_by(ReplayPlanner::new(&stored))
+        .recorded_by(&mut replay)
+        .run_in(&mut ReplayWorld::new(&stored, &scene.task));
     let (agreed, difference) = replay.outcome();
     assert_eq!(difference, None);
     agreed
@@ -63,7 +48,7 @@ fn replayed(scene: &Scene, executor: &str, text: &str) -> usize {
 #[test]
 fn a_run_can_be_played_back_from_its_trace_alone() {
     for scene in [Scene::case("delivery"), Scene::case("match")] {
-        for executor in EXECUTORS {
+        for executor in EXECUTORS.iter() {
             for seed in 0..5 {
                 let text = traced(&scene, executor, seed);
                 assert_eq!(text, traced(&scene, executor, seed));

@@ -55,8 +55,8 @@ impl Kind {
             &source("problem", self.problem),
         );
         let (problem, _) = problem.unwrap_or_else(|error| panic!("{}", error.render(false)));
-        let mut task = Task::new(problem);
-        let plan = read_plan(&source("plan", plan), &mut task);
+        let task = Task::new(problem);
+        let plan = read_plan(&source("plan", plan), &task);
         let (plan, _) = plan.unwrap_or_else(|error| panic!("{}", error.render(false)));
         (Arc::new(task), plan)
     }

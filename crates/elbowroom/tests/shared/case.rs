@@ -22,11 +22,6 @@ pub(crate) struct Case {
     pub(crate) plan: Arc<ParametrizedPlan>,
 }
 
-/// The least separation in all of the authors' runs.
-pub(crate) fn epsilon() -> Rational {
-    Rational::new(1, 1000)
-}
-
 pub(crate) fn number(text: &str) -> Rational {
     text.parse()
         .unwrap_or_else(|_| panic!("`{text}` is no number"))
@@ -42,9 +37,8 @@ impl Case {
 
     /// Reads a plan.
     pub(crate) fn of_text(domain: &Path, problem: &Path, plan: &str) -> Self {
-        let mut task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
-        let plan =
-            format::read(plan.as_bytes(), &mut task).unwrap_or_else(|error| panic!("{error}"));
+        let task = super::task(domain, problem).unwrap_or_else(|error| panic!("{error}"));
+        let plan = format::read(plan.as_bytes(), &task).unwrap_or_else(|error| panic!("{error}"));
         Self {
             task: Arc::new(task),
             plan: Arc::new(plan),
@@ -52,7 +46,7 @@ impl Case {
     }
 
     pub(crate) fn oracle(&self) -> Oracle {
-        Oracle::new(&self.task, &self.plan, &epsilon(), Guarantee::Weak).expect("within reach")
+        Oracle::new(&self.task, &self.plan, Guarantee::Weak).expect("within reach")
     }
 
     /// Whether the plan works everywhere in the box (`dur_0=[7/4,9]`; what is left out is nominal).
@@ -89,8 +83,7 @@ impl Case {
     fn objection(&self, envelope: &DecoupledEnvelope) -> Option<(Objection, Explanation)> {
         let mut oracle = self.oracle();
         let objection = oracle.objection(envelope).expect("within reach")?;
-        let epsilon = epsilon();
-        let explainer = Explainer::new(&self.task, &self.plan, &epsilon);
+        let explainer = Explainer::new(&self.task, &self.plan);
         let explanation = explainer.objection(&oracle, envelope, &objection);
         Some((objection, explanation))
     }

@@ -1,17 +1,20 @@
 //! Benchmark files beside the repository. Tests that need them say so and pass where they are
 //! absent.
 #![allow(dead_code, reason = "each test uses some of it")]
-#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
 
 pub(crate) mod case;
 pub(crate) mod draw;
 pub(crate) mod instances;
 pub(crate) mod rounds;
 
+#[path = "../../../../testing/skipped.rs"]
+mod skipped;
+
 use std::path::{Path, PathBuf};
 
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
+use skipped::skipped;
 
 /// The folder of benchmark data, if it is there.
 pub(crate) fn data() -> Option<PathBuf> {
@@ -19,7 +22,7 @@ pub(crate) fn data() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: there is no {}", folder.display());
+    skipped(format_args!("there is no {}", folder.display()));
     None
 }
 

@@ -39,14 +39,13 @@ impl Obligations {
     pub(crate) fn compile(
         task: &Task,
         plan: &ParametrizedPlan,
-        epsilon: &Rational,
         nominal: &[Rational],
         substitution: &Substitution,
     ) -> Result<Self, Refusal> {
         let mut order: Vec<NodeId> = plan.plan.nodes().map(|(id, _)| id).collect();
         order.sort_by(|a, b| nominal[a.index()].cmp(&nominal[b.index()]).then(a.cmp(b)));
         let mut obligations = Self {
-            direct: separations(task, &plan.plan, &order, epsilon),
+            direct: separations(task, &plan.plan, &order),
             over_all: Vec::new(),
         };
         let substitution = Arc::new(substitution.clone());

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::{Footprint, Task};
-use elbowroom_num::Rational;
 
 use super::{BadCase, Difference, Obligation, Requirement};
 use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
@@ -13,12 +12,7 @@ use elbowroom_plan::{Bound, Node, NodeId, StnPlan};
 /// `order` lists all nodes in nominal order. If `a` is ε before `b` and `b` is ε before `c`, then
 /// `a` is before `c`: only pairs without such a detour are obligations of their own. Nor are pairs
 /// of timed initials at fixed times: the plan is not to blame for when they happen.
-pub(super) fn separations(
-    task: &Task,
-    plan: &StnPlan,
-    order: &[NodeId],
-    epsilon: &Rational,
-) -> Vec<Obligation> {
+pub(super) fn separations(task: &Task, plan: &StnPlan, order: &[NodeId]) -> Vec<Obligation> {
     interfering_in_order(task, plan, order)
         .into_iter()
         .filter(|&(first, second)| !is_fixed(plan, first) || !is_fixed(plan, second))
@@ -28,7 +22,7 @@ pub(super) fn separations(
                 differences: vec![Difference {
                     from: first,
                     to: second,
-                    bound: epsilon.clone(),
+                    bound: task.epsilon().clone(),
                     is_strict: true,
                 }],
                 inequalities: Vec::new(),

@@ -3,7 +3,7 @@
 //! Bounds are fractions, and strict ones an infinitesimal less. Nearly always they fit whole
 //! numbers, multiplied by their common denominator: that is several times faster, and as exact.
 
-use elbowroom_num::{Delta, Rational};
+use elbowroom_num::{CommonDenominator, Delta, Rational};
 use elbowroom_stn::Weight;
 
 use crate::reduction::{Edge, Reduction};
@@ -80,10 +80,10 @@ impl Whole {
         }
         // A bound is a constant plus an end, or a difference plus two offsets.
         let nodes = i128::try_from(reduction.class_count()).ok()? + 4;
-        let largest = all.largest.checked_mul(i128::from(all.denominator))?;
+        let largest = all.largest.checked_mul(i128::from(all.denominator.get()))?;
         let path = largest.checked_mul(3)?.checked_mul(nodes)?;
         (path < LARGEST_PATH).then_some(Self {
-            denominator: all.denominator,
+            denominator: all.denominator.get(),
         })
     }
 }
@@ -91,14 +91,14 @@ impl Whole {
 /// The common denominator of some numbers, and a bound on their magnitude.
 #[derive(Clone, Debug)]
 pub(crate) struct Numbers {
-    denominator: i64,
+    denominator: CommonDenominator,
     largest: i128,
 }
 
 impl Default for Numbers {
     fn default() -> Self {
         Self {
-            denominator: 1,
+            denominator: CommonDenominator::default(),
             largest: 1,
         }
     }
@@ -108,9 +108,7 @@ impl Numbers {
     /// Includes a number; `None` if the numbers get too large.
     pub(crate) fn include(&mut self, number: &Rational) -> Option<()> {
         let (numerator, own) = number.as_small()?;
-        if self.denominator % own != 0 {
-            self.denominator = (self.denominator / gcd(self.denominator, own)).checked_mul(own)?;
-        }
+        self.denominator.include(number)?;
         let magnitude = i128::from(numerator / own).abs() + 1;
         self.largest = self.largest.max(magnitude);
         Some(())
@@ -122,10 +120,6 @@ impl Numbers {
             .iter()
             .try_for_each(|edge| self.include(&edge.constant))
     }
-}
-
-fn gcd(a: i64, b: i64) -> i64 {
-    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 #[cfg(test)]

@@ -24,13 +24,9 @@ impl<'a> SoundBox<'a> {
     /// # Errors
     /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
     /// reasoning.
-    pub fn new(
-        task: &'a Task,
-        plan: &'a ParametrizedPlan,
-        epsilon: &Rational,
-    ) -> Result<Option<Self>, Refusal> {
+    pub fn new(task: &'a Task, plan: &'a ParametrizedPlan) -> Result<Option<Self>, Refusal> {
         let nominal = plan.nominal();
-        let mut soundness = Soundness::around(task, plan, epsilon, &nominal)?;
+        let mut soundness = Soundness::around(task, plan, &nominal)?;
         let envelope = DecoupledEnvelope::point(&nominal);
         let broken = soundness.broken(task, plan, &envelope, None)?;
         Ok(broken.is_none().then_some(Self {

@@ -10,7 +10,7 @@ use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::soundness::{Broken, broken_in};
 use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
-use elbowroom_plan::deorder::{Deordered, Settings, deorder, pin_until_sound, pinned_to};
+use elbowroom_plan::deorder::{Deordered, deorder, pin_until_sound, pinned_to};
 use elbowroom_plan::{
     DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
 };
@@ -76,7 +76,7 @@ fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
 fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
     let closed = ParametrizedPlan::closed(task, plan.clone());
     let everything = DecoupledEnvelope::point(&[]);
-    broken_in(task, &closed, &Settings::default().epsilon, &everything)
+    broken_in(task, &closed, &everything)
 }
 
 fn assert_sound(seed: u64, task: &Task, plan: &StnPlan, rng: &mut ChaCha8Rng) {
@@ -98,9 +98,9 @@ fn all_schedules_are_valid_where_no_value_depends_on_time() {
     for seed in 0..400 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scenario = scenario(&mut rng, true);
-        let mut task = scenario.task();
-        let plan = scenario.plan(&mut task);
-        let deordered = deorder(&task, &plan, &Settings::default());
+        let task = scenario.task();
+        let plan = scenario.plan(&task);
+        let deordered = deorder(&task, &plan);
         let Deordered { plan, .. } = deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
         assert_sound(seed, &task, &plan, &mut rng);
     }
@@ -112,10 +112,10 @@ fn with_pins_all_schedules_are_valid_where_values_depend_on_time() {
     for seed in 0..250 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scenario = scenario(&mut rng, false);
-        let mut task = scenario.task();
-        let plan = scenario.plan(&mut task);
-        let deordered = deorder(&task, &plan, &Settings::default());
-        let Deordered { plan, nominal } =
+        let task = scenario.task();
+        let plan = scenario.plan(&task);
+        let deordered = deorder(&task, &plan);
+        let Deordered { plan, nominal, .. } =
             deordered.unwrap_or_else(|error| panic!("{seed}: {error}"));
         let mut is_told = true;
         let sound = pin_until_sound(plan.clone(), &nominal, &mut |plan| {

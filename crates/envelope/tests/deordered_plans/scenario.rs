@@ -27,7 +27,7 @@ impl Scenario {
         Task::new(self.problem.clone())
     }
 
-    pub(super) fn plan(&self, task: &mut Task) -> TimeTriggeredPlan {
+    pub(super) fn plan(&self, task: &Task) -> TimeTriggeredPlan {
         let steps = self
             .times
             .iter()
@@ -45,8 +45,8 @@ impl Scenario {
     }
 
     fn is_valid(&self) -> bool {
-        let mut task = self.task();
-        let plan = self.plan(&mut task);
+        let task = self.task();
+        let plan = self.plan(&task);
         validate(&task, &plan, &Settings::default()).is_valid()
     }
 }

@@ -30,6 +30,7 @@ pub(crate) struct Given<'a> {
 }
 
 impl Given<'_> {
+    /// The task with ε = 1/4.
     pub(crate) fn task_and_plan(&self) -> (Arc<Task>, Arc<ParametrizedPlan>) {
         let domain = format!(
             "(define (domain d) (:predicates (p) (q) (r)) (:functions (x) (y) (z)) {})",
@@ -49,8 +50,8 @@ impl Given<'_> {
             &Source::new("problem", problem),
         )
         .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
-        let mut task = Task::new(problem);
-        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &mut task).expect("a plan");
+        let task = Task::new(problem).with_epsilon(Rational::new(1, 4));
+        let plan = elbowroom_plan::format::read(self.plan.as_bytes(), &task).expect("a plan");
         let specs: Vec<_> = self
             .vary
             .iter()
@@ -61,7 +62,7 @@ impl Given<'_> {
         (Arc::new(task), Arc::new(plan))
     }
 
-    /// What one oracle with ε = 1/4 says of these boxes, one after the other: `inside`, or why not.
+    /// What one oracle says of these boxes, one after the other: `inside`, or why not.
     pub(crate) fn answers(&self, boxes: &[&str]) -> Vec<String> {
         let (task, plan) = self.task_and_plan();
         let mut oracle = oracle(&task, &plan).expect("within reach");
@@ -97,9 +98,9 @@ impl Given<'_> {
     }
 }
 
-/// The oracle with ε = 1/4.
+/// The oracle of the weak guarantee.
 pub(crate) fn oracle(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Result<Oracle, Refusal> {
-    Oracle::new(task, plan, &Rational::new(1, 4), Guarantee::Weak)
+    Oracle::new(task, plan, Guarantee::Weak)
 }
 
 /// `[1, 3/2] [-inf, 0]`: an interval for each parameter.

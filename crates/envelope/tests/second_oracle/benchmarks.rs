@@ -18,6 +18,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 
 use crate::instances::{Instance, figure_3, figure_4};
 use crate::setting;
+use crate::skipped::skipped;
 use crate::smt::contained;
 use crate::z3::Z3;
 
@@ -28,11 +29,11 @@ const MOST_NODES: u64 = 12;
 fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if !data.is_dir() {
-        println!("skipped: there is no {}", data.display());
+        skipped(format_args!("there is no {}", data.display()));
         return;
     }
     let Some(mut solver) = Z3::start() else {
-        println!("skipped: there is no z3 here");
+        skipped("there is no z3 here");
         return;
     };
     let most_nodes = setting("ELBOWROOM_NODES", MOST_NODES);
@@ -51,8 +52,7 @@ fn our_boxes_are_inside_by_the_authors_encoding_and_cannot_grow() {
         if is_generator && nodes > most_nodes {
             continue;
         }
-        let mut oracle =
-            Oracle::new(&task, &plan, &epsilon, Guarantee::Weak).expect("within reach");
+        let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
         let run = irr(&mut oracle, &Settings::default(), &mut |_| {
             ControlFlow::Continue(())
         });
@@ -126,7 +126,7 @@ fn read(instance: &Instance) -> Option<(Arc<Task>, Arc<ParametrizedPlan>)> {
     let source = |path: &Path| Source::from_bytes(path.display().to_string(), &bytes(path));
     let (problem, _) = read_problem(&source(&instance.domain), &source(&instance.problem))
         .expect("a readable problem");
-    let mut task = Task::new(problem);
-    let plan = format::read(&text, &mut task).expect("a readable plan");
+    let task = Task::new(problem);
+    let plan = format::read(&text, &task).expect("a readable plan");
     Some((Arc::new(task), Arc::new(plan)))
 }

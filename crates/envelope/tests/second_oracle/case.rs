@@ -53,7 +53,7 @@ impl Case {
     pub(crate) fn build(&self) -> (Task, ParametrizedPlan) {
         let mut problem = self.problem.clone();
         problem.unknowns = self.parameters.iter().map(|p| p.name.clone()).collect();
-        let mut task = Task::new(problem);
+        let task = Task::new(problem).with_epsilon(self.epsilon.clone());
         let instances = (0..task.problem().schemas.len()).map(|index| {
             let action = task
                 .instantiate(SchemaId::from(index), &[])
@@ -93,6 +93,7 @@ impl Case {
         let plan = ParametrizedPlan {
             plan,
             parameters: self.parameters.clone(),
+            told: std::collections::BTreeMap::new(),
             initial: initial.collect(),
             goal: task.goal().map_leaves(&mut parameter_of),
         };
@@ -115,14 +116,14 @@ impl Case {
                 timed.time = valuation[id.index()].clone();
             }
         }
-        Task::new(problem)
+        Task::new(problem).with_epsilon(self.epsilon.clone())
     }
 
     /// What the judge says of a schedule of the plan for these values.
     pub(crate) fn judge(&self, valuation: &[Rational], schedule: &[Rational]) -> Verdict {
         let (_, plan) = self.build();
         let scheduled = plan.plan.at(valuation).scheduled(schedule);
-        let mut task = self.task_at(valuation);
+        let task = self.task_at(valuation);
         let steps = scheduled.steps.into_iter().map(|mut step| {
             // The same action, in the table of the problem with these values.
             let mut action = task
@@ -136,7 +137,7 @@ impl Case {
             steps: steps.collect(),
         };
         let settings = Settings {
-            epsilon: Some(self.epsilon.clone()),
+            needs_separation: true,
             tolerance: Rational::ZERO,
             slack: Rational::ZERO,
         };

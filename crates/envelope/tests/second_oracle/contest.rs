@@ -103,7 +103,7 @@ impl Script {
             dice: Dice::new(1),
             tally: Tally::default(),
         };
-        let mut oracle = match Oracle::new(&task, &plan, &self.case.epsilon, Guarantee::Weak) {
+        let mut oracle = match Oracle::new(&task, &plan, Guarantee::Weak) {
             Ok(oracle) => oracle,
             Err(refusal) => {
                 contest.tally.count("plans refused");

@@ -23,6 +23,8 @@ mod plain;
 mod polynomial;
 mod schedules;
 mod shrink;
+#[path = "../../../../testing/skipped.rs"]
+mod skipped;
 mod smt;
 mod system;
 mod z3;
@@ -30,6 +32,7 @@ mod z3;
 use contest::{Mismatch, Script, Tally, steps};
 use dice::Dice;
 use generate::generate;
+use skipped::skipped;
 use z3::Z3;
 
 fn setting(name: &str, default: u64) -> u64 {
@@ -98,6 +101,6 @@ fn the_fast_oracle_agrees_with_the_plain_one_and_the_judge() {
 fn the_fast_oracle_agrees_with_the_authors_encoding() {
     match Z3::start() {
         Some(solver) => expect_agreement(20, Some(solver)),
-        None => println!("skipped: there is no z3 here"),
+        None => skipped("there is no z3 here"),
     }
 }

@@ -332,7 +332,8 @@ impl<'a> Encoder<'a> {
         };
         Ok(match condition {
             Condition::Fact(fact) if self.task.is_derived(*fact) => {
-                let rules = self.task.rules().iter().filter(|rule| rule.head == *fact);
+                let rules = self.task.rules();
+                let rules = rules.iter().filter(|rule| rule.head == *fact);
                 let bodies = rules.map(|rule| self.condition(&rule.body, at, None));
                 or(&bodies.collect::<Result<Vec<_>, _>>()?)
             }

@@ -6,7 +6,7 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{InstanceId, NodeId, StnPlan, network_node};
 use elbowroom_stn::WindowEnd;
 
-use super::{Bounds, Dispatch, duration_of};
+use super::{Bounds, Dispatch};
 use crate::horizon::Behind;
 
 /// How many constraints of a long chain are named.
@@ -18,7 +18,7 @@ pub(super) fn words(task: &Task, plan: &StnPlan, index: usize) -> String {
     if let elbowroom_plan::Reason::Timed(timed) = constraint.reason {
         return timed_words(task, timed);
     }
-    if let Some(id) = duration_of(plan, constraint) {
+    if let Some(id) = plan.duration_of(constraint) {
         return format!("the duration of {}", plan.instance(id).action.name);
     }
     let node = |id: NodeId| plan.node_words(task, id);
@@ -80,8 +80,7 @@ impl Dispatch {
         let node = network_node(self.ends[id.index()][1]);
         let behind = self.horizon.grounds(node, end);
         let index = behind.last().and_then(|behind| self.sources.of(*behind));
-        index
-            .is_some_and(|index| duration_of(&self.plan, &self.plan.constraints[index]) == Some(id))
+        index.is_some_and(|index| self.plan.duration_of(&self.plan.constraints[index]) == Some(id))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::event::Ending;
 use crate::executor::{Moment, News};
 use crate::horizon::{Horizon, Missed};
 use crate::projection;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 impl Dispatch {
     /// Takes note of what is new. The first thing that the plan does not survive, if there is one.
@@ -49,7 +49,7 @@ impl Dispatch {
     /// any more; if not, why not. `what` was not as expected.
     pub(crate) fn surprise(&self, moment: &Moment<'_>, what: &str) -> Option<Reason> {
         let failure = projection::failure(self, moment)?;
-        let mut reason = Reason::new(Cause::Surprise).about(what);
+        let mut reason = Reason::new(Cause::Surprise).about(About::Seen(what.to_owned()));
         reason.action = failure.action;
         reason.behind = vec![failure.condition];
         reason.since = Some(moment.now.clone());
@@ -69,7 +69,7 @@ impl Dispatch {
         }
         let missed = fixed.err()?;
         let name = self.action(id).name.clone();
-        let mut reason = Reason::new(Cause::Unreachable).about(format!("the start of {name}"));
+        let mut reason = Reason::new(Cause::Unreachable).about(About::Start(name.clone()));
         reason.action = Some(name);
         reason.observed = Some(time.clone());
         reason.behind = self.behind(start, missed.end);
@@ -85,14 +85,14 @@ impl Dispatch {
             Ending::Succeeded => {}
             Ending::Failed { why } => {
                 self.finish(id);
-                let reason = Reason::new(Cause::Failed).of(&name).about(why.as_str());
+                let reason = Reason::new(Cause::Failed)
+                    .of(&name)
+                    .about(About::Said(why.clone()));
                 return Some(reason.since(time.clone()));
             }
             Ending::Cancelled => {
                 self.finish(id);
-                let reason = Reason::new(Cause::Failed)
-                    .of(&name)
-                    .about("it was cancelled");
+                let reason = Reason::new(Cause::Failed).of(&name).about(About::Cancelled);
                 return Some(reason.since(time.clone()));
             }
         }
@@ -128,13 +128,13 @@ impl Dispatch {
     ) -> Reason {
         let name = self.action(id).name.clone();
         let mut reason = if is_own {
-            let about = self.duration_in_words(id);
+            let about = self.duration_of(id);
             let mut reason = Reason::new(Cause::OutsideInterval).about(about);
             reason.observed = duration;
             reason.allowed = Some(explain::interval(&self.durations[id.index()]));
             reason
         } else {
-            let mut reason = Reason::new(Cause::Unreachable).about(format!("the end of {name}"));
+            let mut reason = Reason::new(Cause::Unreachable).about(About::End(name.clone()));
             reason.observed = Some(time.clone());
             reason
         };

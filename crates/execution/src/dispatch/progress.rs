@@ -6,8 +6,6 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
 use elbowroom_stn::Network;
 
-use super::duration_of;
-
 /// What has happened of a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
@@ -50,7 +48,7 @@ impl Progress {
             }
         };
         for constraint in constraints {
-            if duration_of(plan, constraint).is_some() {
+            if plan.duration_of(constraint).is_some() {
                 order(constraint.from, constraint.to, &Rational::ONE);
                 continue;
             }

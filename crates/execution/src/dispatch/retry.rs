@@ -4,6 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use super::Dispatch;
+use crate::reason::About;
 
 /// A start that has failed.
 #[derive(Clone, Debug)]
@@ -43,12 +44,9 @@ impl Dispatch {
             .map(|retry| retry.not_before.clone())
     }
 
-    /// How often a start has failed in a row, in words.
-    pub(super) fn failures_in_words(&self, start: NodeId) -> Option<String> {
-        let times = match self.retries.get(&start)?.failures {
-            1 => "once".to_owned(),
-            many => format!("{many} times in a row"),
-        };
-        Some(format!("its start has failed {times}"))
+    /// How often a start has failed in a row; `of` describes it where it is still to come.
+    pub(super) fn failures(&self, start: NodeId, of: Option<String>) -> Option<About> {
+        let failures = self.retries.get(&start)?.failures;
+        Some(About::Retry { of, failures })
     }
 }

@@ -9,7 +9,7 @@ use super::{Dispatch, explain, is_instantaneous};
 use crate::executor::{Decided, Decision, Moment, Order, StepId};
 use crate::horizon::Horizon;
 use crate::progression::Progression;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 impl Dispatch {
     /// What to do now, when everything new has been taken note of.
@@ -73,12 +73,10 @@ impl Dispatch {
         reason.about = Some(match &wake {
             Some((_, node)) => {
                 let words = self.plan.node_words(&self.task, *node);
-                match self.failures_in_words(*node) {
-                    Some(failures) => format!("{words} is tried again: {failures}"),
-                    None => words,
-                }
+                let failures = self.failures(*node, Some(words.clone()));
+                failures.unwrap_or(About::TimePoint(words))
             }
-            None => "something is observed".to_owned(),
+            None => About::AnyObservation,
         });
         Decided {
             decision: Decision::Wait {
@@ -119,7 +117,7 @@ impl Dispatch {
         }
         let mut reason = Reason::new(Cause::Due);
         reason.action = orders.first().map(|order| order.action.name.clone());
-        reason.about = first.and_then(|id| self.failures_in_words(self.nodes_of(id)[0]));
+        reason.about = first.and_then(|id| self.failures(self.nodes_of(id)[0], None));
         Decided {
             decision: Decision::Start(orders),
             reason,
@@ -194,13 +192,14 @@ impl Dispatch {
             let mut reason = if is_own {
                 let mut reason = Reason::new(Cause::Outlived);
                 if self.resumed.contains(&id) {
-                    reason = reason.about(self.duration_in_words(id));
+                    reason = reason.about(self.duration_of(id));
                 }
                 reason.observed = self.happened(start).map(|start| &now - start);
                 reason.allowed = Some(explain::interval(&self.durations[id.index()]));
                 reason
             } else {
-                Reason::new(Cause::Unreachable).about(self.plan.node_words(&self.task, node))
+                let words = self.plan.node_words(&self.task, node);
+                Reason::new(Cause::Unreachable).about(About::TimePoint(words))
             };
             reason.action = Some(self.action(id).name.clone());
             reason.behind = self.behind(node, WindowEnd::Latest);
@@ -211,7 +210,7 @@ impl Dispatch {
         for node in self.progress.ready.iter().copied() {
             let latest = self.horizon.window(network_node(node)).1;
             if let Some(latest) = latest.filter(|latest| *latest < now) {
-                let about = self.plan.node_words(&self.task, node);
+                let about = About::TimePoint(self.plan.node_words(&self.task, node));
                 let mut reason = Reason::new(Cause::Unreachable).about(about);
                 reason.behind = self.behind(node, WindowEnd::Latest);
                 reason.since = Some(self.world(&latest));
@@ -234,14 +233,14 @@ fn at_the_end(moment: &Moment<'_>) -> Decided {
     }
     let task = belief.task();
     let unmet = belief.unmet(task.goal(), None);
-    replan(Reason::new(Cause::PlanDone).about(in_words(belief, &unmet)))
+    replan(Reason::new(Cause::PlanDone).about(About::Conditions(in_words(belief, &unmet))))
 }
 
 /// An over-all condition of something running that does not hold.
 fn broken(moment: &Moment<'_>) -> Option<Reason> {
     let (_, underway) = moment.belief.broken()?;
     let unmet = underway.broken_parts();
-    let about = format!("{} throughout", in_words(moment.belief, &unmet));
+    let about = About::Throughout(in_words(moment.belief, &unmet));
     let reason = Reason::new(Cause::Condition).of(&underway.action.name);
     Some(reason.about(about).since(moment.now.clone()))
 }
@@ -257,14 +256,14 @@ pub(crate) fn unmet(action: &Action, duration: &Rational, belief: &Progression) 
     }
     let unmet = belief.unmet(condition, Some(duration));
     let reason = Reason::new(Cause::Condition).of(&action.name);
-    Some(reason.about(in_words(belief, &unmet)))
+    Some(reason.about(About::Conditions(in_words(belief, &unmet))))
 }
 
-pub(crate) fn in_words(belief: &Progression, conditions: &[&Condition]) -> String {
+pub(crate) fn in_words(belief: &Progression, conditions: &[&Condition]) -> Vec<String> {
     let words = conditions
         .iter()
         .map(|condition| belief.task().describe_condition(condition));
-    words.collect::<Vec<_>>().join(" and ")
+    words.collect()
 }
 
 pub(crate) fn replan(reason: Reason) -> Decided {

@@ -2,13 +2,11 @@
 
 mod rest;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_model::ground::Expression;
-use elbowroom_model::{Step, TimeTriggeredPlan};
-use elbowroom_plan::deorder;
-use elbowroom_plan::partial_order::partial_order;
-use elbowroom_plan::{Node, NodeId};
+use elbowroom_model::Step;
+use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::{
     LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, SearchSettings, Semantics,
 };
@@ -18,18 +16,18 @@ use super::{Foresight, Registered};
 use crate::dispatch::replan;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 use rest::Rest;
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "adaptable",
     argument: None,
     is_optional: false,
-    summary: "Does next what the order of the plan's happenings that is most likely to succeed \
-              has next, as things stand: it skips, repeats and re-orders actions where that is \
+    summary: "Executes the order of the plan's actions that is most likely to succeed from \
+              the present state: it skips, repeats and reorders actions where that is \
               likelier and there is time for it, and replans when no order can work.",
     paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
-    need: Need::Orderings,
+    need: Need::PartialOrder,
     make: |_, means| {
         Box::new(Adaptable {
             likelihoods: means.likelihoods,
@@ -51,6 +49,10 @@ pub(super) struct Adaptable {
 }
 
 impl Executor for Adaptable {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let (chooser, steps) = match self.tabulated(mission) {
             Some(tabulated) => tabulated,
@@ -95,7 +97,7 @@ impl Adaptable {
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;
         let steps = table.steps().to_vec();
-        let search = Box::new(table.search(&mission.epsilon));
+        let search = Box::new(table.search());
         let chooser = Chooser::Table {
             table,
             search,
@@ -107,34 +109,30 @@ impl Adaptable {
     /// The orders of a plan, with its steps.
     fn orders(&self, mission: &Mission) -> Result<(Chooser, Vec<Step>), Box<Reason>> {
         let looks_ahead = self.foresight.is_some();
-        let settings = deorder::Settings {
-            epsilon: mission.epsilon.clone(),
+        let Some(plan) = mission.order.clone() else {
+            let reason = Reason::new(Cause::NoOrder).about(About::NoPartialOrder);
+            return Err(Box::new(reason));
         };
-        // Numbers that depend on how long something takes are followed as if all went as planned.
-        let as_timed = TimeTriggeredPlan {
-            steps: mission.time_triggered.steps.iter().map(timed).collect(),
-        };
-        let plan = partial_order(&mission.task, &as_timed, &settings);
+        // What is running comes first in both.
+        let by_instance = plan
+            .instance_of_step
+            .iter()
+            .zip(&mission.time_triggered.steps);
+        let by_instance: BTreeMap<InstanceId, &Step> =
+            by_instance.map(|(&id, step)| (id, step)).collect();
+        let steps: Vec<Step> = by_instance.into_values().cloned().collect();
         let task = Arc::clone(&mission.task);
         let semantics = if looks_ahead {
             Semantics::World
         } else {
             Semantics::Paper
         };
-        let model = Model::new(task, plan, &self.likelihoods, semantics)
-            .map_err(|missing| Box::new(Reason::new(Cause::NoOrder).about(missing.to_string())))?;
-        // Instances are numbered by their start; what is running comes first in both.
-        let mut steps = mission.time_triggered.steps.clone();
-        steps.sort_by(|a, b| a.start.cmp(&b.start));
+        let model = Model::new(task, plan, &self.likelihoods, semantics).map_err(|missing| {
+            let about = About::Said(missing.to_string());
+            Box::new(Reason::new(Cause::NoOrder).about(about))
+        })?;
         let as_planned = as_planned(&model, &steps);
-        let search = OrderSearch::new(
-            model,
-            SearchSettings {
-                epsilon: mission.epsilon.clone(),
-                ..SearchSettings::default()
-            },
-        )
-        .beginning_with(as_planned);
+        let search = OrderSearch::new(model, SearchSettings::default()).beginning_with(as_planned);
         let is_short = search.model().plan().nodes.len() <= SHORT;
         let reconsider = if looks_ahead && is_short {
             Reconsider::Always
@@ -143,19 +141,6 @@ impl Adaptable {
         };
         let dispatch = LayerDispatch::new(search, reconsider);
         Ok((Chooser::Orders(Box::new(dispatch)), steps))
-    }
-}
-
-/// The step with its planned duration in place of `?duration`.
-fn timed(step: &Step) -> Step {
-    let duration = step.duration.clone();
-    let mut planned = |leaf: &Expression| match leaf {
-        Expression::Duration => duration.clone().map(Expression::Constant),
-        _ => None,
-    };
-    Step {
-        action: step.action.map_leaves(&mut planned),
-        ..step.clone()
     }
 }
 

@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_probability::optimum::Table;
 use elbowroom_probability::search::Progress;
 use elbowroom_probability::{
     Choice, Circumstances, LayerDispatch, NextHappening, OrderSearch, TooCoupled,
 };
 
-use super::lookahead::Table;
+use crate::reason::About;
 
 /// Who chooses the next happening.
 pub(super) enum Chooser {
@@ -51,19 +52,15 @@ impl Chooser {
         }
     }
 
-    /// Why this is next, in words.
-    pub(super) fn words(&self, next: &NextHappening) -> String {
+    /// Why this is next.
+    pub(super) fn about(&self, next: &NextHappening) -> About {
         match self {
-            Self::Table { value, .. } => {
-                format!("best of all that can be done (P = {value:.4} from here)")
-            }
+            Self::Table { value, .. } => About::BestOfAll(*value),
             Self::Orders(dispatch) if next.is_new_order => {
                 let probability = dispatch.order().map_or(0.0, |order| order.probability);
-                format!(
-                    "first of the order most likely to succeed (P = {probability:.4} from here)"
-                )
+                About::FirstOfBestOrder(probability)
             }
-            Self::Orders(_) => "next after the lattermost layer that fits".to_owned(),
+            Self::Orders(_) => About::NextInOrder,
         }
     }
 }

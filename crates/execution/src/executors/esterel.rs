@@ -4,21 +4,21 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, InstanceId};
 
 use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, duration_of, replan};
+use crate::dispatch::{Bounds, Dispatch, Sight, replan};
 use crate::event::Ending;
 use crate::executor::{Decided, Executor, Mission, Moment, News, Planned, StepId};
 use crate::preparation::Need;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "esterel",
     argument: None,
     is_optional: false,
-    summary: "Does the plan's happenings as soon as its orderings allow, whatever the likelihoods: \
-              it tries a failed start again, without limit and each time after twice the wait, and \
-              replans when something needs a condition that does not hold, when an action breaks \
-              off, or when the plan is done and the goal is not reached. It looks at no deadline \
-              and no duration.",
+    summary: "Executes actions as soon as the plan's orderings allow, regardless of \
+              likelihoods. It retries a failed start without limit, doubling the wait each \
+              time, and replans when a condition does not hold, when an action is aborted, \
+              or when the plan is over without reaching the goal. It ignores deadlines and \
+              durations.",
     paper: "the Esterel Dispatcher of ROSPlan, the baseline in Ribeiro et al. (2021), section 3",
     need: Need::Network,
     make: |_, _| Box::new(Esterel { dispatch: None }),
@@ -31,10 +31,14 @@ struct Esterel {
 }
 
 impl Executor for Esterel {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
-            if duration_of(plan, constraint).is_some() {
+            if plan.duration_of(constraint).is_some() {
                 // An end comes when it comes.
                 return (None, None);
             }
@@ -86,8 +90,8 @@ fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
                     dispatch.try_again(id, time);
                     return None;
                 }
-                Ending::Failed { why } => why.as_str(),
-                Ending::Cancelled => "it was cancelled",
+                Ending::Failed { why } => About::Said(why.clone()),
+                Ending::Cancelled => About::Cancelled,
             };
             let reason = Reason::new(Cause::Failed).of(name).about(why);
             Some(reason.since(time.clone()))

@@ -4,11 +4,11 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 
 use super::Registered;
-use crate::dispatch::{Bounds, Dispatch, Sight, duration_of, given, replan};
+use crate::dispatch::{Bounds, Dispatch, Sight, given, replan};
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::quantities::amounts;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "fixed",
@@ -87,13 +87,17 @@ fn place_timed(plan: &mut StnPlan, nominal: &[Rational]) {
 }
 
 impl Executor for Fixed {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let mut mission = mission.clone();
         place_timed(&mut mission.plan.plan, &mission.nominal);
         let mission = &mission;
         let plan = &mission.plan.plan;
         let bounds = |constraint: &Constraint| -> Bounds {
-            let Some(instance) = duration_of(plan, constraint) else {
+            let Some(instance) = plan.duration_of(constraint) else {
                 return given(constraint);
             };
             let time = |node: elbowroom_plan::NodeId| &mission.nominal[node.index()];
@@ -124,7 +128,7 @@ impl Executor for Fixed {
             let room = deviation.expected.abs() * &share;
             let distance = (&deviation.observed - &deviation.expected).abs();
             if distance > room {
-                let about = format!("change of {}", deviation.fluent);
+                let about = About::Change(deviation.fluent);
                 let mut reason = Reason::new(Cause::OutsideInterval).about(about);
                 reason.action = Some(deviation.action);
                 reason.observed = Some(deviation.observed);

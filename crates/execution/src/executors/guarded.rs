@@ -8,7 +8,7 @@ use crate::dispatch::{Dispatch, replan};
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::quantities::{Reading, amounts, duration_parameters};
-use crate::reason::{Cause, Promise, Reason};
+use crate::reason::{About, Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "guarded",
@@ -40,10 +40,15 @@ struct Guard {
 }
 
 impl Executor for Guarded {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let Some(envelope) = mission.envelope.clone() else {
-            let about = "the plan has no envelope";
-            return Err(Box::new(Reason::new(Cause::GuaranteeLost).about(about)));
+            return Err(Box::new(
+                Reason::new(Cause::GuaranteeLost).about(About::NoEnvelope),
+            ));
         };
         let reading = |constraint: &Constraint| mission.plan.reading(constraint, &envelope);
         let (dispatch, promise) = match Dispatch::controlled(mission, &reading) {
@@ -132,9 +137,13 @@ impl Guard {
     fn outside(&self, reading: &Reading, now: &Rational) -> Option<Reason> {
         let (about, observed, allowed) = if let Some((parameter, value)) = reading.value() {
             let name = self.mission.plan.parameter(parameter).name.clone();
-            (name, value, self.envelope.interval(parameter).clone())
+            (
+                About::Parameter(name),
+                value,
+                self.envelope.interval(parameter).clone(),
+            )
         } else {
-            let about = format!("change of {}", reading.fluent);
+            let about = About::Change(reading.fluent.clone());
             (about, reading.observed.clone(), self.guaranteed(reading))
         };
         if allowed.contains(&observed) {

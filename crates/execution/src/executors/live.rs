@@ -17,7 +17,7 @@ use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Planne
 use crate::odds::{Odds, Remainder};
 use crate::preparation::{Need, Region};
 use crate::quantities::{amounts, duration_parameters, places};
-use crate::reason::{Cause, Promise, Reason};
+use crate::reason::{About, Cause, Promise, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "live",
@@ -57,6 +57,8 @@ struct Rest {
     mission: Mission,
     /// What was observed, and for the rest what is planned.
     values: Valuation,
+    /// The parameters that are durations, by instance.
+    durations: BTreeMap<InstanceId, ParameterId>,
     /// The amounts that were observed: by which instance, at its end or its start.
     amounts: Vec<(InstanceId, bool, Measured)>,
     /// Whether the plan needs numbers at all, and whether durations move any.
@@ -67,6 +69,10 @@ struct Rest {
 }
 
 impl Executor for Live {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         let plan = &mission.plan;
         let (dispatch, promise) = promise::begin(mission)?;
@@ -80,6 +86,9 @@ impl Executor for Live {
             durations_move_numbers: reads_numbers && plan.durations_move_numbers(),
             limits: BTreeMap::new(),
             values: plan.nominal(),
+            durations: duration_parameters(plan)
+                .map(|(parameter, instance)| (instance, parameter))
+                .collect(),
         };
         rest.find_limits(&mission.now, self.region.as_mut());
         self.state = Some(rest);
@@ -143,8 +152,7 @@ impl Rest {
                 return Some(reason);
             }
         } else if moves_times {
-            let about = "even if nothing deviates any more, too little time is left";
-            let reason = Reason::new(Cause::GuaranteeLost).about(about);
+            let reason = Reason::new(Cause::GuaranteeLost).about(About::TooLittleTime);
             if let Err(reason) = self.weaken(moment.now, reason.since(moment.now.clone())) {
                 return Some(reason);
             }
@@ -155,7 +163,9 @@ impl Rest {
             let (plan, values) = self.remainder(moment.now);
             if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
                 let action = &self.dispatch.action(InstanceId(step.0)).name;
-                let reason = Reason::new(Cause::GuaranteeLost).of(action).about(why);
+                let reason = Reason::new(Cause::GuaranteeLost)
+                    .of(action)
+                    .about(About::Said(why));
                 return Some(Box::new(reason.since(moment.now.clone())));
             }
         }
@@ -195,12 +205,10 @@ impl Rest {
         if !gain.is_positive() || gain < *advantage {
             return None;
         }
-        let percent = |share: &Rational| (share * Rational::from(100)).to_decimal(1);
-        let about = format!(
-            "another plan succeeds with a probability of {} %, the rest of this one of {} %",
-            percent(&compared.other),
-            percent(&compared.present)
-        );
+        let about = About::Odds {
+            present: compared.present,
+            other: compared.other,
+        };
         let reason = Reason::new(Cause::Likelier).about(about);
         Some(reason.since(moment.now.clone()))
     }
@@ -208,7 +216,10 @@ impl Rest {
     /// Puts observed values in place of planned ones. Whether other times follow from them than
     /// from what has happened.
     fn observe(&mut self, moment: &Moment<'_>) -> bool {
-        for (parameter, instance) in duration_parameters(&self.mission.plan) {
+        for instance in moment.news.iter().filter_map(instance_of) {
+            let Some(parameter) = self.durations.get(&instance) else {
+                continue;
+            };
             let [start, end] = self.dispatch.nodes_of(instance);
             let happened = |node| self.dispatch.happened(node);
             if let (Some(start), Some(end)) = (happened(start), happened(end)) {
@@ -278,6 +289,14 @@ impl Rest {
 fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
     let range = &plan.parameter(parameter).range;
     (range.lower.value().cloned(), range.upper.value().cloned())
+}
+
+/// The instance whose start or end is told of.
+fn instance_of(news: &News) -> Option<InstanceId> {
+    match news {
+        News::Started { step, .. } | News::Ended { step, .. } => Some(InstanceId(step.0)),
+        _ => None,
+    }
 }
 
 /// The step whose news can move the rest of a plan out of its envelope.

@@ -2,31 +2,25 @@
 
 use std::sync::{Arc, OnceLock};
 
-use elbowroom_model::ground::{Action, Body, Change, Condition, DurativeBody, Expression};
-use elbowroom_model::problem::Comparison;
-use elbowroom_model::{Step, Task};
-use elbowroom_num::Rational;
-use elbowroom_plan::{Instance, PartialOrderPlan};
-use elbowroom_probability::optimum::{Optimum, Perturbed, Settings};
-use elbowroom_probability::{
-    Choice, Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, Semantics, Slot,
-};
+use elbowroom_model::Task;
+use elbowroom_probability::Likelihoods;
+use elbowroom_probability::optimum::Table;
 
 use super::Registered;
 use super::adaptable::Adaptable;
 use crate::preparation::Need;
-use crate::untimed::all_actions;
 
 pub(super) const REGISTERED: Registered = Registered {
     name: "lookahead",
     argument: None,
     is_optional: false,
-    summary: "Does before each start what succeeds most likely, retries and detours counted, \
-              whether or not it is in the plan, where the world is small, without numbers and timed \
-              initials, and nothing has to be done before something else ends. Elsewhere it does what `adaptable` does, but goes by the order that \
-              is most likely to succeed before each start, if the plan is short.",
+    summary: "Chooses each start so that success is most likely, counting retries and \
+              detours, whether or not the action is in the plan. This needs a small world \
+              without numbers and timed initials, in which nothing has to be done before \
+              something else ends. In other worlds it acts like `adaptable`, but chooses the \
+              most likely order again before each start if the plan is short.",
     paper: "goes beyond Ribeiro et al. (2021)",
-    need: Need::Orderings,
+    need: Need::PartialOrder,
     make: |_, means| {
         Box::new(Adaptable::with_foresight(
             means.likelihoods,
@@ -35,300 +29,17 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// At most so many actions are thought to be under way at once.
-const MOST_RUNNING: usize = 3;
-
-/// Worlds with more states, those of facts times those of actions under way, are not tabulated: a
-/// table of so many takes some seconds.
-const MOST_STATES: usize = 1 << 18;
-
-/// Nor are worlds with more facts than this, however little can be done in them.
-const MOST_FACTS: usize = 16;
-
 /// What `lookahead` has found out about a problem and its likelihoods; clones share it. Nobody has
 /// to fill it, and it changes no decision: it saves making the same table in every run.
 #[derive(Clone, Debug, Default)]
 pub struct Foresight(Arc<OnceLock<Option<Arc<Table>>>>);
 
-/// The best that can be done in each state of a small world.
-#[derive(Debug)]
-pub(super) struct Table {
-    process: Perturbed,
-    optimum: Optimum,
-    /// The actions in the order of the model's instances, as long as the domain says.
-    steps: Vec<Step>,
-}
-
 impl Foresight {
     /// The table, made when it is first asked for; `None` if the world cannot be tabulated.
     pub(super) fn table(&self, task: &Task, likelihoods: &Likelihoods) -> Option<Arc<Table>> {
-        let made = self.0.get_or_init(|| Table::new(task, likelihoods));
+        let made = self
+            .0
+            .get_or_init(|| Table::new(task, likelihoods).map(Arc::new));
         made.clone()
-    }
-}
-
-impl Table {
-    fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Arc<Self>> {
-        let mut task = task.clone();
-        let actions = all_actions(&mut task).ok()?;
-        if ends_break_others(&actions) || has_negations(&task, &actions) {
-            return None;
-        }
-        let plan = PartialOrderPlan::unordered(&task, actions);
-        let steps = plan.instances().map(|(_, instance)| step(&task, instance));
-        let steps = steps.collect::<Option<Vec<Step>>>()?;
-        let model = Model::new(task, plan, &without_luck(likelihoods), Semantics::World).ok()?;
-        let facts = model.facts().count();
-        if facts > MOST_FACTS || sets(steps.len()) << facts > MOST_STATES {
-            return None;
-        }
-        let settings = Settings {
-            most_running: MOST_RUNNING,
-            // What runs without what it needs throughout, breaks off.
-            enforces_over_all: true,
-            ..Settings::default()
-        };
-        let process = Perturbed::new(model, settings).ok()?;
-        Some(Arc::new(Self {
-            optimum: process.optimum(),
-            process,
-            steps,
-        }))
-    }
-
-    /// The actions in the order of the model's instances.
-    pub(super) fn steps(&self) -> &[Step] {
-        &self.steps
-    }
-
-    /// A search that knows the model, for the times at which happenings may be.
-    pub(super) fn search(&self, epsilon: &Rational) -> OrderSearch {
-        OrderSearch::new(
-            Arc::clone(self.process.model()),
-            SearchSettings {
-                epsilon: epsilon.clone(),
-                ..SearchSettings::default()
-            },
-        )
-    }
-
-    /// How likely it is that the goal is reached from here, if only what is best is done.
-    pub(super) fn value(&self, circumstances: &Circumstances) -> f64 {
-        self.optimum.value(&self.process, circumstances)
-    }
-
-    /// What is best. A start is due as soon as nothing that interferes with it has just happened.
-    pub(super) fn choose(&self, search: &OrderSearch, circumstances: &Circumstances) -> Choice {
-        self.optimum.choice(&self.process, circumstances, |node| {
-            let slots = search.windows(circumstances, &[node]);
-            let slot = slots.and_then(|slots| slots.into_iter().next());
-            slot.unwrap_or_else(|| Slot {
-                node,
-                earliest: circumstances.now.clone(),
-                latest: None,
-            })
-        })
-    }
-}
-
-/// Nothing comes about by itself. A table takes whatever is done for a chance of that, and where
-/// nothing but the world's clock goes on, it would do something in vain for ever.
-fn without_luck(likelihoods: &Likelihoods) -> Likelihoods {
-    let mut likelihoods = likelihoods.clone();
-    let entries = likelihoods.predicates.values_mut();
-    for entry in entries.chain(likelihoods.facts.values_mut()) {
-        entry.becomes_true = entry.becomes_true.map(|_| 0.0);
-    }
-    let becomes_true = &mut likelihoods.defaults.becomes_true;
-    *becomes_true = becomes_true.map(|_| 0.0);
-    likelihoods
-}
-
-/// Whether something needs a fact to be false: facts that are lost would be luck then.
-fn has_negations(task: &Task, actions: &[Action]) -> bool {
-    let needs = actions.iter().flat_map(|action| match &action.body {
-        Body::Instantaneous(snap) => vec![&snap.condition],
-        Body::Durative(body) => vec![&body.start.condition, &body.over_all, &body.end.condition],
-    });
-    needs.chain([task.goal()]).any(is_negative)
-}
-
-fn is_negative(condition: &Condition) -> bool {
-    match condition {
-        Condition::Fact(_) | Condition::Compare(..) => false,
-        Condition::Not(_) => true,
-        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(is_negative),
-    }
-}
-
-/// The action, as long as it takes at least.
-fn step(task: &Task, instance: &Instance) -> Option<Step> {
-    let action = instance.action.clone();
-    let duration = match action.durative() {
-        Some(body) => Some(shortest(task, body)?),
-        None => None,
-    };
-    Some(Step {
-        start: Rational::ZERO,
-        duration,
-        action,
-    })
-}
-
-/// The shortest duration that the domain allows. In these worlds no action changes a number, so it
-/// is the same in all states.
-fn shortest(task: &Task, body: &DurativeBody) -> Option<Rational> {
-    let values = &task.initial().values;
-    let mut shortest: Option<Rational> = None;
-    let mut longest: Option<Rational> = None;
-    for constraint in &body.duration {
-        let bound = constraint.bound.evaluate(&mut |leaf| match leaf {
-            Expression::Fluent(fluent) => values.get(fluent).cloned(),
-            _ => None,
-        })?;
-        match constraint.comparison {
-            Comparison::AtMost => {
-                longest = Some(longest.map_or(bound.clone(), |known| known.min(bound)));
-            }
-            Comparison::AtLeast | Comparison::Equal => {
-                shortest = Some(shortest.map_or(bound.clone(), |known| known.max(bound)));
-            }
-            // With bounds that are not reached there may be no shortest.
-            Comparison::Greater | Comparison::Less => return None,
-        }
-    }
-    shortest.or(longest).filter(Rational::is_positive)
-}
-
-/// Whether an action's end takes away what another needs while it goes on. When ends come is not
-/// chosen, though in the table it is; there, who needs that light burns would always be done
-/// before the light goes out.
-fn ends_break_others(actions: &[Action]) -> bool {
-    let durative = || {
-        let bodies = actions.iter().enumerate();
-        bodies.filter_map(|(index, action)| Some((index, action.durative()?)))
-    };
-    durative().any(|(own, ending)| {
-        let mut others = durative().filter(|(other, _)| *other != own);
-        others.any(|(_, other)| {
-            let mut changes = ending.end.effects.iter().map(|effect| &effect.change);
-            changes.any(|change| {
-                breaks(change, &other.over_all) || breaks(change, &other.end.condition)
-            })
-        })
-    })
-}
-
-/// Whether a change can make a condition without negations false.
-fn breaks(change: &Change, condition: &Condition) -> bool {
-    match condition {
-        Condition::Fact(fact) => *change == Change::Delete(*fact),
-        Condition::Compare(..) | Condition::Not(_) => false,
-        Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().any(|part| breaks(change, part))
-        }
-    }
-}
-
-/// In how many ways at most [`MOST_RUNNING`] of so many actions can be under way.
-fn sets(actions: usize) -> usize {
-    let mut ways: usize = 1;
-    let mut sum: usize = 1;
-    for count in 1..=MOST_RUNNING.min(actions) {
-        ways = ways.saturating_mul(actions + 1 - count) / count;
-        sum = sum.saturating_add(ways);
-    }
-    sum
-}
-
-#[cfg(test)]
-mod tests {
-    use elbowroom_model::Task;
-    use elbowroom_num::Rational;
-    use elbowroom_pddl::{Source, read_problem};
-    use elbowroom_probability::Likelihoods;
-
-    use super::{Foresight, MOST_RUNNING, sets};
-
-    /// The durations of what can be done by the table, if there is one.
-    fn durations(actions: &str, init: &str) -> Option<Vec<Rational>> {
-        let domain = format!(
-            "(define (domain d) (:requirements :durative-actions :numeric-fluents)
-               (:types place) (:predicates (light) (done ?p - place)) (:functions (far ?p - place))
-               {actions})"
-        );
-        let problem = format!(
-            "(define (problem p) (:domain d) (:objects here there - place)
-               (:init (= (far here) 3) (= (far there) 5/2) {init})
-               (:goal (and (done here) (done there))))"
-        );
-        let problem = problem.replace("5/2", "2.5");
-        let source = |text: &str| Source::new("test", text);
-        let (problem, _) = read_problem(&source(&domain), &source(&problem)).unwrap();
-        let certain = Likelihoods::certain();
-        let table = Foresight::default().table(&Task::new(problem), &certain)?;
-        let durations = table.steps().iter().map(|step| step.duration.clone());
-        durations.collect()
-    }
-
-    /// An action at a place: its duration, its condition, and its effect.
-    fn action(name: &str, duration: &str, condition: &str, effect: &str) -> String {
-        format!(
-            "(:durative-action {name} :parameters (?p - place) :duration {duration}
-               :condition {condition} :effect {effect})"
-        )
-    }
-
-    #[test]
-    fn actions_take_as_long_as_they_must() {
-        let look = |duration: &str| action("look", duration, "()", "(at end (done ?p))");
-        let numbers = |text: &str| {
-            let numbers = text.split(' ').map(str::parse::<Rational>);
-            Some(numbers.collect::<Result<Vec<_>, _>>().unwrap())
-        };
-        let of = |duration: &str| durations(&look(duration), "");
-        assert_eq!(of("(= ?duration (far ?p))"), numbers("3 5/2"));
-        assert_eq!(
-            of("(and (>= ?duration 2) (<= ?duration (far ?p)))"),
-            numbers("2 2")
-        );
-        assert_eq!(of("(<= ?duration (far ?p))"), numbers("3 5/2"));
-        assert_eq!(of("()"), None);
-    }
-
-    #[test]
-    fn worlds_in_which_the_clock_matters_have_no_table() {
-        let look = action(
-            "look",
-            "(= ?duration 2)",
-            "(over all (light))",
-            "(at end (done ?p))",
-        );
-        let burn = |effect: &str| {
-            let effect = format!("(and (at start (light)) {effect})");
-            action("burn", "(= ?duration 9)", "()", &effect)
-        };
-        assert!(durations(&look, "(light)").is_some());
-        assert!(durations(&look, "(light) (at 5 (not (light)))").is_none());
-        assert!(durations(&format!("{look}{}", burn("")), "").is_some());
-        // What is to be seen must be seen before the light goes out.
-        // Nor may anything have to be dark: then it would be luck to lose the light.
-        let hide = look
-            .replace("look", "hide")
-            .replace("(light)", "(not (light))");
-        assert!(durations(&hide, "").is_none());
-        let goes_out = burn("(at end (not (light)))");
-        assert!(durations(&format!("{look}{goes_out}"), "").is_none());
-        let numbers = burn("(at end (increase (far ?p) 1))");
-        assert!(durations(&format!("{look}{numbers}"), "").is_none());
-    }
-
-    #[test]
-    fn sets_are_counted() {
-        for actions in 0..10_u32 {
-            let few = |set: &u32| set.count_ones() as usize <= MOST_RUNNING;
-            let count = (0..1_u32 << actions).filter(few).count();
-            assert_eq!(sets(actions as usize), count);
-        }
     }
 }

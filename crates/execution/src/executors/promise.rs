@@ -6,7 +6,7 @@ use elbowroom_plan::{Bound, Constraint, InstanceId, ParameterId, ParameterKind, 
 
 use crate::dispatch::Dispatch;
 use crate::executor::{Mission, StepId};
-use crate::reason::{Cause, Promise, Reason};
+use crate::reason::{About, Cause, Promise, Reason};
 
 /// How much of the room around what is planned is tried, in halves of the share before.
 const HALVINGS: u32 = 4;
@@ -101,8 +101,7 @@ pub(super) fn weaken(
         cause: Cause::GuaranteeLost,
         ..reason
     };
-    let about = "even if nothing deviates any more, too little time is left";
-    lost.about = Some(about.to_owned());
+    lost.about = Some(About::TooLittleTime);
     lost.behind = behind;
     Err(Box::new(lost.since(now.clone())))
 }
@@ -154,6 +153,12 @@ struct Room<'a> {
 impl Room<'_> {
     fn reading(&self, constraint: &Constraint) -> Reading {
         let plan = &self.mission.plan;
+        // What does not reckon with any more deviations may tell actions other durations too.
+        if let Some(planned) = plan.told_by(constraint)
+            && !self.share.is_zero()
+        {
+            return Reading::exactly(planned);
+        }
         let Some(parameter) = duration(plan, constraint) else {
             let value = |bound: &Bound| match bound {
                 Bound::Infinite => None,
@@ -179,7 +184,8 @@ impl Room<'_> {
             Overrun::ForEver => Reading::Contingent { lower, upper: None },
             Overrun::Quarter => {
                 let planned = &plan.parameter(parameter).nominal;
-                let quarter = (planned / Rational::from(4)).max(self.mission.epsilon.clone());
+                let quarter =
+                    (planned / Rational::from(4)).max(self.mission.task.epsilon().clone());
                 Reading::Contingent {
                     lower,
                     upper: Some(elapsed + quarter),

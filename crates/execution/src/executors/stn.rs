@@ -4,7 +4,7 @@ use elbowroom_plan::uncertain::Reading;
 use elbowroom_plan::{Constraint, NodeId};
 
 use super::Registered;
-use crate::dispatch::{Dispatch, duration_of, given, replan};
+use crate::dispatch::{Dispatch, given, replan};
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::quantities::amounts;
@@ -28,6 +28,10 @@ struct Stn {
 }
 
 impl Executor for Stn {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
     fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
         // Where the domain leaves a duration open the world may have its way, if the plan bears
         // that; if not, the executor goes by the durations that are planned, or by what it can
@@ -78,7 +82,7 @@ fn reading(mission: &Mission, constraint: &Constraint, open: Open) -> Reading {
     let plan = &mission.plan.plan;
     let (lower, upper) = given(constraint);
     let is_open = lower != upper || lower.is_none();
-    let is_duration = duration_of(plan, constraint).is_some();
+    let is_duration = plan.duration_of(constraint).is_some();
     match (open, &lower) {
         (Open::World, Some(least)) if is_duration && is_open && !least.is_negative() => {
             Reading::Contingent {

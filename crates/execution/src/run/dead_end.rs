@@ -14,7 +14,7 @@ use elbowroom_num::{Interval, Rational};
 use super::{Account, Run};
 use crate::event::{Ending, Ticket};
 use crate::progression::Progression;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 /// Something observed that was believed.
 #[derive(Clone, Debug)]
@@ -102,7 +102,7 @@ impl Past<'_> {
 
     /// Since which event a part of the goal has been out of reach.
     fn explain(&mut self, goal: &Condition) -> Reason {
-        let about = self.task.describe_condition(goal);
+        let about = About::Conditions(vec![self.task.describe_condition(goal)]);
         let reason = Reason::new(Cause::NeverAgain).about(about);
         // Back in ever longer strides to where it was in reach, then halving.
         let mut lost = self.history.len();
@@ -268,12 +268,12 @@ fn unreachable(state: &Progression) -> Option<Vec<Condition>> {
         state: state.state(),
         running: running.collect(),
     };
-    let mut task = Task::beginning_at(state.task(), &situation);
+    let task = Task::beginning_at(state.task(), &situation);
     let settings = reachability::Settings {
         step_limit: MOST_STEPS,
         ..reachability::Settings::default()
     };
-    match reachability::ground(&mut task, &settings) {
+    match reachability::ground(&task, &settings) {
         reachability::Answer::Complete(grounding) => Some(grounding.unreachable_goals),
         reachability::Answer::LimitReached => None,
     }

@@ -2,17 +2,27 @@
 
 use elbowroom_num::Rational;
 
-use super::{Run, Stop, Verdict};
+use super::agenda::Todo;
+use super::{Next, Report, Run, Stop, Verdict};
 use crate::event::Ticket;
+use crate::reason::Reason;
 use crate::record::Entry;
 
 /// How many seconds of the world's time cancelled actions have to stop when a run ends.
 pub const FAREWELL: i64 = 5;
 
+/// How a run ends, while what is running is told to stop.
+pub(super) struct Closing {
+    verdict: Verdict,
+    dead_end: Vec<Reason>,
+    /// When it ends, whatever has stopped by then.
+    last: Rational,
+}
+
 impl Run<'_> {
     /// Whether somebody wants the run to end.
     pub(super) fn heed(&mut self) -> Result<(), Stop> {
-        if !self.is_to_end.is_some_and(|is_to_end| is_to_end()) {
+        if !(self.is_to_end)() {
             return Ok(());
         }
         self.ports
@@ -21,32 +31,80 @@ impl Run<'_> {
         Err(Stop::Over(Verdict::Interrupted))
     }
 
-    /// Cancels what has not ended, and waits a moment for it to stop. A world that fails meanwhile
-    /// changes nothing any more.
-    pub(super) fn leave_nothing_running(&mut self) {
-        let open: Vec<Ticket> = self.account.open_tickets().collect();
-        if open.is_empty() {
+    /// Ends the run: cancels what has not ended, and gives it a moment to stop. A world that has
+    /// failed is told nothing more; one that fails meanwhile changes nothing any more.
+    pub(super) fn stop(&mut self, stop: Stop) {
+        self.agenda.clear();
+        if self.closing.is_some() {
+            self.conclude();
             return;
         }
-        for ticket in open {
-            if !self.account.is_cancelled(ticket) && self.cancel(ticket).is_err() {
-                return;
-            }
+        let verdict = match stop {
+            Stop::Over(verdict) => verdict,
+            Stop::World(error) => Verdict::WorldFailed { why: error.message },
+        };
+        let dead_end = match verdict {
+            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
+            _ => Vec::new(),
+        };
+        let has_failed = matches!(verdict, Verdict::WorldFailed { .. });
+        self.closing = Some(Closing {
+            verdict,
+            dead_end,
+            last: &self.now + Rational::from(FAREWELL),
+        });
+        let open: Vec<Ticket> = self.account.open_tickets().collect();
+        if has_failed || open.is_empty() {
+            self.conclude();
+            return;
         }
-        let last = &self.now + Rational::from(FAREWELL);
-        // What stops at once is told at once.
-        let mut until = self.now.clone();
         self.progress.begin_plan();
-        while self.account.open_tickets().next().is_some() {
-            let Ok(passage) = self.ports.world.wait(&until) else {
-                return;
-            };
-            self.take_up_passage(&until, passage);
-            let moves_on = self.progress.note(&self.now, self.steps);
-            if self.now >= last || moves_on.is_err() {
-                return;
-            }
-            until.clone_from(&last);
+        // What stops at once is told at once.
+        self.agenda.push(Todo::Close(self.now.clone()));
+        let running = open.into_iter().rev();
+        let running = running.filter(|ticket| !self.account.is_cancelled(*ticket));
+        self.agenda.extend(running.map(Todo::Cancel));
+    }
+
+    /// Waits for what was told to stop, if there is something left.
+    pub(super) fn close(&mut self, until: Rational) {
+        if self.account.open_tickets().next().is_some() {
+            self.asked = Some(Next::Wait { until });
+        } else {
+            self.conclude();
         }
+    }
+
+    /// The world has answered to [`Self::close`].
+    pub(super) fn go_on_closing(&mut self) {
+        let moves_on = self.progress.note(&self.now, self.steps);
+        match &self.closing {
+            Some(closing) if self.now < closing.last && moves_on.is_ok() => {
+                let last = closing.last.clone();
+                self.agenda.push(Todo::Close(last));
+            }
+            _ => self.conclude(),
+        }
+    }
+
+    /// The run is over.
+    fn conclude(&mut self) {
+        let Some(Closing {
+            verdict, dead_end, ..
+        }) = self.closing.take()
+        else {
+            return;
+        };
+        let report = Report {
+            verdict,
+            time: self.now.clone(),
+            replans: self.replans,
+            reasons: std::mem::take(&mut self.reasons),
+            dead_end,
+            starts: self.account.started(),
+            executed: self.account.executed(&self.now),
+        };
+        self.ports.recorder.record(&Entry::Over(&report));
+        self.report = Some(report);
     }
 }

@@ -1,11 +1,11 @@
 //! From one plan to the next.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
-use elbowroom_model::{RunningAction, Situation, Task};
+use elbowroom_model::{RunningAction, Situation};
 use elbowroom_num::{Interval, Rational};
 
+use super::agenda::{Made, Todo};
 use super::{PlanningTime, Run, RunningRule, Stop, Verdict};
 use crate::event::Ticket;
 use crate::planning::PlanAnswer;
@@ -14,71 +14,67 @@ use crate::record::Entry;
 
 impl Run<'_> {
     /// Brings what is running to where a new plan can begin: see [`RunningRule`].
-    pub(super) fn settle(&mut self) -> Result<(), Stop> {
+    pub(super) fn settle(&mut self) {
         match self.settings.running {
-            RunningRule::Keep => return self.cancel_what_cannot_go_on(),
-            RunningRule::Await => {}
+            RunningRule::Keep => {
+                let lost = self.what_cannot_go_on();
+                self.agenda.push(Todo::Settle(Some(lost.clone())));
+                self.agenda.extend(lost.into_iter().rev().map(Todo::Cancel));
+            }
+            RunningRule::Await => self.agenda.push(Todo::Settle(None)),
             RunningRule::Cancel => {
+                self.agenda.push(Todo::Settle(None));
                 let running: Vec<Ticket> = self.account.open_tickets().collect();
-                for ticket in running {
-                    self.cancel(ticket)?;
-                }
+                let running = running.into_iter().rev();
+                self.agenda.extend(running.map(Todo::Cancel));
             }
         }
-        // Each wait ends by then: what stays silent is given up.
-        while let Some(until) = self.next_silence() {
-            self.pass(&until.max(self.now.clone()))?;
-            self.give_up_the_silent()?;
+    }
+
+    /// Waits for what is awaited, if it has not ended. Each wait ends by the end of somebody's
+    /// patience: what stays silent is given up.
+    pub(super) fn go_on_settling(&mut self, awaited: Option<Vec<Ticket>>) {
+        if let Some(lost) = &awaited {
+            // Until it has stopped, it counts as running.
+            let mut lost = lost.iter();
+            if !lost.any(|ticket| self.belief.running().contains_key(ticket)) {
+                return;
+            }
         }
-        Ok(())
+        let Some(until) = self.next_silence() else {
+            return;
+        };
+        self.agenda.push(Todo::Settle(awaited));
+        self.agenda.push(Todo::GiveUpTheSilent);
+        let until = until.max(self.now.clone());
+        self.agenda.push(Todo::Pass(until));
     }
 
     /// A plan can only go on with what has started, and with what it may go on doing.
-    fn cancel_what_cannot_go_on(&mut self) -> Result<(), Stop> {
+    fn what_cannot_go_on(&self) -> Vec<Ticket> {
         let breaking = self.belief.breaking().into_iter();
         let breaking: BTreeSet<Ticket> = breaking.map(|(ticket, _)| ticket).collect();
         let is_lost = |ticket: &Ticket| match self.belief.running().get(ticket) {
             Some(underway) => breaking.contains(ticket) || !underway.broken_parts().is_empty(),
             None => true,
         };
-        let lost: Vec<Ticket> = self.account.open_tickets().filter(is_lost).collect();
-        for ticket in &lost {
-            self.cancel(*ticket)?;
-        }
-        // Until it has stopped, it counts as running.
-        let has_begun = |run: &Self| {
-            let mut lost = lost.iter();
-            lost.any(|ticket| run.belief.running().contains_key(ticket))
-        };
-        while has_begun(self)
-            && let Some(until) = self.next_silence()
-        {
-            self.pass(&until.max(self.now.clone()))?;
-            self.give_up_the_silent()?;
-        }
-        Ok(())
+        self.account.open_tickets().filter(is_lost).collect()
     }
 
-    /// Asks the planner, lets the time that this takes pass, and takes up the plan.
+    /// Asks the planner; the plan is taken up when the time that this takes has passed.
     pub(super) fn plan_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
         self.news.clear();
         if self.is_goal_certain() {
-            return self.goal_reached();
+            self.goal_reached();
+            return Ok(());
         }
-        let (situation, tickets) = self.situation();
+        let (situation, running) = self.situation();
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason,
             situation: &situation,
         });
-        let mut task = Task::clone(&self.task);
-        let planned = self.ports.planner.plan(&mut task, &situation);
-        if (task.fact_count(), task.fluent_count())
-            != (self.task.fact_count(), self.task.fluent_count())
-        {
-            self.know(Arc::new(task));
-            self.ports.world.know(&self.task);
-        }
+        let planned = self.ports.planner.plan(&self.task, &situation);
         let took = match &self.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => planned.seconds.unwrap_or_default(),
@@ -101,29 +97,40 @@ impl Run<'_> {
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
         });
         self.heed()?;
-        match planned.answer {
+        let plan = match planned.answer {
             PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
             PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
-            PlanAnswer::Plan(plan) => {
-                // What ends from now on is no step of the plan that was given up, and not yet one
-                // of the new plan: what it changes is news, and the new plan is told of its end.
-                self.account.begin_plan(&BTreeMap::new());
-                while self.now < ready {
-                    self.pass(&ready)?;
-                }
-                // What happened while the plan was made, it does not know.
-                let surprises = std::mem::take(&mut self.news);
-                self.take_up(&plan, &situation, &tickets)?;
-                self.news.splice(0..0, surprises);
-            }
-        }
+            PlanAnswer::Plan(plan) => plan,
+        };
+        // What ends from now on is no step of the plan that was given up, and not yet one of the
+        // new plan: what it changes is news, and the new plan is told of its end.
+        self.account.begin_plan(&BTreeMap::new());
+        self.agenda.push(Todo::Adopt(Box::new(Made {
+            plan,
+            situation,
+            running,
+            ready,
+        })));
         Ok(())
+    }
+
+    /// Takes up a plan, as soon as the time is over that it took to make it.
+    pub(super) fn adopt(&mut self, made: Box<Made>) -> Result<(), Stop> {
+        if self.now < made.ready {
+            let ready = made.ready.clone();
+            self.agenda.push(Todo::Adopt(made));
+            self.agenda.push(Todo::Pass(ready));
+            return Ok(());
+        }
+        let surprises = std::mem::take(&mut self.news);
+        self.agenda.push(Todo::Tell(surprises));
+        self.take_up(&made.plan, &made.situation, &made.running)
     }
 
     /// Where things will stand when the new plan can begin: after the time that planning is
     /// expected to take, and ε after whatever happens last before that.
     fn situation(&self) -> (Situation, Vec<Ticket>) {
-        let epsilon = &self.settings.epsilon;
+        let epsilon = self.task.epsilon();
         let mut time = &self.now + &self.allowance;
         if self.now.is_positive() || self.account.started() > 0 {
             time += epsilon;

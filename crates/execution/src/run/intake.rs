@@ -3,8 +3,9 @@
 use elbowroom_model::ground::{Action, Body, Change, Expression};
 use elbowroom_num::Rational;
 
+use super::Run;
+use super::agenda::Todo;
 use super::dead_end::What;
-use super::{Run, Stop};
 use crate::event::{Ending, Event, Measured, Observation, Ticket};
 use crate::executor::{Amount, News, Planned};
 use crate::quantities;
@@ -270,33 +271,35 @@ impl Run<'_> {
     }
 
     /// Gives up the actions of which nothing has been heard for too long.
-    pub(super) fn give_up_the_silent(&mut self) -> Result<(), Stop> {
+    pub(super) fn give_up_the_silent(&mut self) {
         let limits = self.limits();
         let silent: Vec<_> = limits.filter(|(_, limit)| *limit <= self.now).collect();
-        for (ticket, since) in silent {
-            self.cancel(ticket)?;
-            let entry = self.account.get(ticket);
-            let Some((action, step)) = entry.map(|entry| (entry.action.clone(), entry.step)) else {
-                continue;
-            };
-            self.belief.stop(ticket);
-            let now = self.now.clone();
-            self.note(&now, What::Stopped(ticket));
-            // Whether its end took place is not known.
-            if let Body::Durative(body) = &action.body {
-                self.belief.doubt(&body.end);
-            }
-            let why = "nothing was heard of it".to_owned();
-            let now = self.now.clone();
-            self.account
-                .note_end(ticket, &now, &Ending::Failed { why }, &[]);
-            if step.is_some() {
-                self.news.push(News::Silence {
-                    action: action.name.clone(),
-                    since,
-                });
-            }
+        let silent = silent.into_iter().rev();
+        let given_up = silent.map(|(ticket, since)| Todo::GiveUp(ticket, since));
+        self.agenda.extend(given_up);
+    }
+
+    /// An action that was silent for too long has been cancelled.
+    pub(super) fn note_silence(&mut self, ticket: Ticket, since: Rational) {
+        let entry = self.account.get(ticket);
+        let Some((action, step)) = entry.map(|entry| (entry.action.clone(), entry.step)) else {
+            return;
+        };
+        self.belief.stop(ticket);
+        let now = self.now.clone();
+        self.note(&now, What::Stopped(ticket));
+        // Whether its end took place is not known.
+        if let Body::Durative(body) = &action.body {
+            self.belief.doubt(&body.end);
         }
-        Ok(())
+        let why = "nothing was heard of it".to_owned();
+        self.account
+            .note_end(ticket, &now, &Ending::Failed { why }, &[]);
+        if step.is_some() {
+            self.news.push(News::Silence {
+                action: action.name.clone(),
+                since,
+            });
+        }
     }
 }

@@ -1,5 +1,8 @@
 //! How to run, and how a run ended.
 
+use std::fmt;
+use std::str::FromStr;
+
 use elbowroom_num::Rational;
 
 use super::account::ExecutedStep;
@@ -8,8 +11,6 @@ use crate::reason::Reason;
 /// How to run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSettings {
-    /// The least separation of interfering happenings (ε).
-    pub epsilon: Rational,
     /// What becomes of running actions when a new plan is made.
     pub running: RunningRule,
     /// How long making a plan takes in the world.
@@ -23,11 +24,10 @@ pub struct RunSettings {
 }
 
 impl Default for RunSettings {
-    /// ε = 0.001; running actions go on; planning takes as long as it takes; at most 10
+    /// Running actions go on; planning takes as long as it takes; at most 10
     /// new plans, as in paper 1's experiments; a million seconds.
     fn default() -> Self {
         Self {
-            epsilon: Rational::new(1, 1000),
             running: RunningRule::Keep,
             planning_time: PlanningTime::Measured,
             most_replans: 10,
@@ -60,6 +60,25 @@ impl RunningRule {
     ];
 }
 
+impl fmt::Display for RunningRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let found = Self::NAMES.iter().find(|(rule, _)| rule == self);
+        f.write_str(found.map_or("unknown", |(_, name)| name))
+    }
+}
+
+impl FromStr for RunningRule {
+    type Err = UnknownSetting;
+
+    fn from_str(text: &str) -> Result<Self, UnknownSetting> {
+        let found = Self::NAMES.iter().find(|(_, name)| *name == text);
+        found.map(|(rule, _)| *rule).ok_or_else(|| UnknownSetting {
+            text: text.to_owned(),
+            expected: "`cancel`, `await` or `keep`",
+        })
+    }
+}
+
 /// How long making a plan takes in the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlanningTime {
@@ -67,6 +86,48 @@ pub enum PlanningTime {
     Measured,
     /// Always so many seconds.
     Seconds(Rational),
+}
+
+impl PlanningTime {
+    /// How [`Self::Measured`] is written.
+    const MEASURED: &str = "measured";
+}
+
+impl fmt::Display for PlanningTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Measured => f.write_str(Self::MEASURED),
+            Self::Seconds(seconds) => seconds.fmt(f),
+        }
+    }
+}
+
+impl FromStr for PlanningTime {
+    type Err = UnknownSetting;
+
+    /// `measured`, or a number of seconds that is not negative.
+    fn from_str(text: &str) -> Result<Self, UnknownSetting> {
+        if text == Self::MEASURED {
+            return Ok(Self::Measured);
+        }
+        match text.parse::<Rational>() {
+            Ok(seconds) if !seconds.is_negative() => Ok(Self::Seconds(seconds)),
+            _ => Err(UnknownSetting {
+                text: text.to_owned(),
+                expected: "`measured` or a number of seconds",
+            }),
+        }
+    }
+}
+
+/// A text that is no value of a setting.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not {expected}")]
+pub struct UnknownSetting {
+    /// What was written.
+    pub text: String,
+    /// What can be written.
+    pub expected: &'static str,
 }
 
 /// An action is given up when it is silent for longer than `factor` times its planned duration,

@@ -10,7 +10,7 @@ use crate::ground::{Condition, FactId};
 
 /// Settles the facts of a stratum; those below it are settled already.
 pub(super) fn settle<F: Clone>(
-    derivation: &Derivation<'_>,
+    derivation: &Derivation,
     stratum: &[FactId],
     basic: &dyn Moment<F>,
     derived: &mut Derived<F>,
@@ -21,7 +21,7 @@ pub(super) fn settle<F: Clone>(
     }
     {
         let below = derivation.on_top_of(basic, derived);
-        for rule in stratum.iter().flat_map(|&fact| derivation.rules.of(fact)) {
+        for rule in stratum.iter().flat_map(|&fact| derivation.rules_of(fact)) {
             let gate = circuit.gate(1, Output::Head(rule));
             circuit.connect(&rule.body, true, gate, &below);
         }

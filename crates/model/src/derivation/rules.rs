@@ -1,7 +1,7 @@
 //! Ground rules, found by their heads.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
+use std::ops::{Deref, Range};
 
 use crate::ground::{Condition, FactId};
 
@@ -14,9 +14,9 @@ pub struct GroundRule {
     pub body: Condition,
 }
 
-/// Rules; those of one head stand together.
+/// Rules, in a list; those of one head stand together.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Rules {
+pub struct Rules {
     list: Vec<GroundRule>,
     by_head: BTreeMap<FactId, Range<usize>>,
 }
@@ -34,13 +34,8 @@ impl Rules {
         debug_assert!(before.is_none(), "the rules of a head come at once");
     }
 
-    /// All rules.
-    pub(crate) fn as_slice(&self) -> &[GroundRule] {
-        &self.list
-    }
-
-    /// The rules with this head.
-    pub(crate) fn of(&self, head: FactId) -> &[GroundRule] {
+    /// The rules with this head; none for a basic fact.
+    pub fn of(&self, head: FactId) -> &[GroundRule] {
         match self.by_head.get(&head) {
             Some(range) => &self.list[range.clone()],
             None => &[],
@@ -55,5 +50,13 @@ impl Rules {
     /// Each fact that has rules, once.
     pub(crate) fn heads(&self) -> impl ExactSizeIterator<Item = FactId> + '_ {
         self.by_head.keys().copied()
+    }
+}
+
+impl Deref for Rules {
+    type Target = [GroundRule];
+
+    fn deref(&self) -> &[GroundRule] {
+        &self.list
     }
 }

@@ -3,10 +3,11 @@
 mod naive;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::{Derivation, Moment, Rules, Strata};
+use super::{Derivation, Moment, Rules};
 use crate::ground::{Condition, Expression, FactId};
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::problem::{self, Atom, Comparison, Predicate, PredicateId, Problem, Schema};
@@ -74,15 +75,17 @@ proptest! {
 
     #[test]
     fn strata_exist_exactly_if_relaxation_finds_levels(rules in rule_sets()) {
-        prop_assert_eq!(Strata::of(&rules).is_some(), naive::levels(rules.as_slice()).is_some());
+        let is_stratified = naive::levels(&rules).is_some();
+        prop_assert_eq!(Derivation::of(&Arc::new(rules)).is_some(), is_stratified);
     }
 
     #[test]
     fn counting_derives_what_the_naive_fixpoint_derives(rules in rule_sets()) {
-        let Some(strata) = Strata::of(&rules) else { return Ok(()) };
-        let derived = Derivation::new(&rules, &strata).derive(&Basic);
-        let levels = naive::levels(rules.as_slice()).expect("as there are strata");
-        let expected = naive::derive(rules.as_slice(), &levels, &Basic);
+        let rules = Arc::new(rules);
+        let Some(derivation) = Derivation::of(&rules) else { return Ok(()) };
+        let derived = derivation.derive(&Basic);
+        let levels = naive::levels(&rules).expect("as there are strata");
+        let expected = naive::derive(&rules, &levels, &Basic);
         let found: BTreeMap<_, _> = rules
             .heads()
             .map(|head| (head, derived.truth(head).ok()))
@@ -96,8 +99,8 @@ fn of_two_faults_the_first_rule_names_its_own() {
     let mut rules = Rules::default();
     let fact = |number| Condition::Fact(FactId(number));
     rules.add(FactId(4), vec![fact(1), fact(3), fact(2)]);
-    let strata = Strata::of(&rules).expect("no negation");
-    let derived = Derivation::new(&rules, &strata).derive(&Basic);
+    let derivation = Derivation::of(&Arc::new(rules)).expect("no negation");
+    let derived = derivation.derive(&Basic);
     assert_eq!(derived.truth(FactId(4)), Err(3));
 }
 
@@ -117,7 +120,7 @@ fn verdict(bodies: Vec<problem::Condition>, goal: problem::Condition) -> Verdict
             body,
         }
     });
-    let mut task = Task::new(Problem {
+    let task = Task::new(Problem {
         predicates: predicates.collect(),
         rules: rules.collect(),
         initial_facts: vec![(PredicateId(0), Vec::new())],

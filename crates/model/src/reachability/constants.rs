@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use crate::ground::{FactId, FluentId};
 use crate::simplify::Constants;
-use crate::task::Task;
+use crate::table::Table;
 
 use super::relaxation::Relaxation;
 use super::value::Value;
@@ -29,7 +29,7 @@ enum Known<T> {
 /// A fact that is only ever made true when it is so already is not among them: whoever writes it
 /// may not do so at the moment at which it is read.
 pub(super) struct Unwritten<'u> {
-    pub(super) task: &'u Task,
+    pub(super) table: &'u Table,
     pub(super) relaxation: &'u Relaxation<'u>,
     pub(super) memory: &'u mut Memory,
 }
@@ -37,9 +37,9 @@ pub(super) struct Unwritten<'u> {
 impl Constants for Unwritten<'_> {
     fn truth(&mut self, fact: FactId) -> Option<bool> {
         remembered(&mut self.memory.facts, fact.index(), || {
-            let (predicate, arguments) = self.task.facts.get_index(fact.index())?;
+            let (predicate, arguments) = self.table.atom(fact);
             // A derived fact changes with those that its rules mention.
-            if self.task.problem.predicates[predicate.index()].is_derived {
+            if self.relaxation.problem.predicates[predicate.index()].is_derived {
                 return None;
             }
             self.relaxation.reached.constant(*predicate, arguments)
@@ -48,7 +48,7 @@ impl Constants for Unwritten<'_> {
 
     fn value(&mut self, fluent: FluentId) -> Option<Rational> {
         remembered(&mut self.memory.fluents, fluent.index(), || {
-            let (function, arguments) = self.task.fluents.get_index(fluent.index())?;
+            let (function, arguments) = self.table.application(fluent);
             match self.relaxation.constant(*function, arguments) {
                 Value::Number(value) => Some(value),
                 Value::Varies | Value::Undefined => None,

@@ -8,7 +8,7 @@
 use elbowroom_num::Rational;
 
 use crate::domains::Domains;
-use crate::instantiate::Foreknowledge;
+use crate::grounder::Foreknowledge;
 use crate::problem::{
     Atom, Comparison, Condition, DurationConstraint, Expression, Fluent, FunctionId, ObjectId,
     Problem, Variable,

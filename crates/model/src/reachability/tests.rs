@@ -10,8 +10,8 @@ use crate::problem::Problem;
 use crate::task::Task;
 
 fn grounding_of(problem: Problem) -> (Task, Grounding) {
-    let mut task = Task::new(problem);
-    match ground(&mut task, &Settings::default()) {
+    let task = Task::new(problem);
+    match ground(&task, &Settings::default()) {
         Answer::Complete(grounding) => (task, grounding),
         Answer::LimitReached => panic!("the problems of these tests are small"),
     }

@@ -17,9 +17,10 @@ pub(super) fn check<'a>(judge: &Judge<'a>, groups: &[Group<'a>]) -> Result<(), S
             compare(judge, first, second)?;
         }
     }
-    let Some(separation) = &judge.settings.epsilon else {
+    if !judge.settings.needs_separation {
         return Ok(());
-    };
+    }
+    let separation = judge.task.epsilon();
     let latest = &group.happenings.last().expect("a group is not empty").time;
     for before in earlier.iter().rev() {
         // Earlier groups are further away still, but their own happenings may be later.
@@ -54,7 +55,7 @@ fn compare<'a>(
         first: judge.occurrence(first.what, &first.time),
         second: judge.occurrence(second.what, &second.time),
         over: over(judge.task, &first.footprint, &second.footprint),
-        separation: judge.settings.epsilon.clone(),
+        separation: (judge.settings.needs_separation).then(|| judge.task.epsilon().clone()),
     };
     Err(judge.violation(&second.time, blamed, mistake))
 }

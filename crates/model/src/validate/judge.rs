@@ -25,7 +25,7 @@ pub(super) struct Judge<'a> {
     pub(super) task: &'a Task,
     pub(super) plan: &'a TimeTriggeredPlan,
     pub(super) settings: &'a Settings,
-    pub(super) derivation: Derivation<'a>,
+    pub(super) derivation: Derivation,
     pub(super) now: Now,
     /// The derived facts that hold in `now`, once something has asked for them.
     pub(super) derived: OnceCell<Derived<Fault>>,

@@ -19,7 +19,7 @@ pub(super) struct Piece<'a> {
     pub(super) now: &'a Now,
     pub(super) motion: &'a Motion,
     pub(super) length: &'a Rational,
-    pub(super) derivation: &'a Derivation<'a>,
+    pub(super) derivation: &'a Derivation,
     pub(super) slack: &'a Rational,
 }
 

@@ -9,7 +9,8 @@ use super::reading::{Fault, compare_signs, evaluate};
 use crate::derivation::Moment;
 use crate::ground::{Expression, FactId, FluentId};
 use crate::problem::Comparison;
-use crate::task::{State, Task};
+use crate::state::State;
+use crate::task::Task;
 
 /// Basic facts and values, by position in the task's tables.
 #[derive(Clone, Debug)]

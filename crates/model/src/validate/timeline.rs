@@ -7,7 +7,8 @@ use crate::ground::Body;
 use crate::interference::Footprint;
 use crate::plan::TimeTriggeredPlan;
 use crate::situation::Situation;
-use crate::task::{Task, TimedHappening};
+use crate::state::TimedHappening;
+use crate::task::Task;
 
 /// What a happening is.
 #[derive(Clone, Copy, Debug)]

@@ -20,7 +20,7 @@ pub(super) fn is_line(line: &str) -> bool {
     matches!(words.next(), Some("c" | "p"))
 }
 
-pub(super) fn read(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
     let mut builder = Builder::new(Format::Dimacs);
     let count = node_count(text, report)?;
     let mut names: Vec<String> = (1..=count).map(|number| number.to_string()).collect();
@@ -89,7 +89,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// What the problem line says.
-fn node_count(text: &str, report: &mut Report<'_>) -> Option<usize> {
+fn node_count(text: &str, report: &mut Report) -> Option<usize> {
     for (at, line) in lines(text) {
         if let ["p", _, count, ..] = words(line)[..] {
             let count = count.parse().ok().filter(|&count| count <= MOST_NODES);
@@ -116,7 +116,7 @@ fn arc(
     names: &[String],
     [from, to, most]: [&str; 3],
     at: usize,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) {
     let mut node = |number: &str| {
         let place = number.parse::<usize>().ok().and_then(|n| n.checked_sub(1));

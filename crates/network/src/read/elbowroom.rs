@@ -13,7 +13,7 @@ use crate::number::Bound;
 /// What the member `format` says.
 pub(crate) const FORMAT: &str = "elbowroom-network";
 
-pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {
     let version = required(document, "version", report)?;
     if number(version, report)? != Rational::ONE {
         report.mistake(
@@ -69,7 +69,7 @@ fn is_null(json: &Json<'_>) -> bool {
     matches!(json.value, Value::Null)
 }
 
-fn node(builder: &Builder, json: &Json<'_>, report: &mut Report<'_>) -> Option<NodeId> {
+fn node(builder: &Builder, json: &Json<'_>, report: &mut Report) -> Option<NodeId> {
     let Some(name) = json.text() else {
         report.mistake(json.at, "this is no name of a time point", "write a text");
         return None;
@@ -81,7 +81,7 @@ fn ends(
     builder: &Builder,
     json: &Json<'_>,
     names: [&str; 2],
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<(NodeId, NodeId)> {
     let [from, to] = names.map(|name| {
         let end = required(json, name, report)?;
@@ -90,13 +90,13 @@ fn ends(
     from.zip(to)
 }
 
-fn bounds(json: &Json<'_>, report: &mut Report<'_>) -> Option<(Bound, Bound)> {
+fn bounds(json: &Json<'_>, report: &mut Report) -> Option<(Bound, Bound)> {
     let lower = bound_or(json, "lower", Bound::NegativeInfinity, report);
     let upper = bound_or(json, "upper", Bound::Infinity, report);
     lower.zip(upper)
 }
 
-fn read_link(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+fn read_link(builder: &mut Builder, json: &Json<'_>, report: &mut Report) {
     let ends = ends(builder, json, ["activation", "end"], report);
     let bounds = bounds(json, report);
     let duration = match json.member("duration").filter(|json| !is_null(json)) {
@@ -121,7 +121,7 @@ fn read_link(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
 }
 
 /// `{ "normal": { "mean": …, "deviation": … } }` and its like.
-fn read_duration(json: &Json<'_>, report: &mut Report<'_>) -> Option<Duration> {
+fn read_duration(json: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let Some([(kind, numbers)]) = json.members() else {
         report.mistake(
             json.at,
@@ -178,7 +178,7 @@ fn read_duration(json: &Json<'_>, report: &mut Report<'_>) -> Option<Duration> {
     Some(duration)
 }
 
-fn read_wait(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+fn read_wait(builder: &mut Builder, json: &Json<'_>, report: &mut Report) {
     let Some((waiting, end)) = ends(builder, json, ["point", "until"], report) else {
         return;
     };
@@ -205,7 +205,7 @@ fn read_wait(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
     });
 }
 
-fn read_correlation(builder: &mut Builder, json: &Json<'_>, report: &mut Report<'_>) {
+fn read_correlation(builder: &mut Builder, json: &Json<'_>, report: &mut Report) {
     let mut links = Vec::new();
     for end in list(json, "ends", report) {
         let link = node(builder, end, report).and_then(|node| builder.link_ending_at(node));

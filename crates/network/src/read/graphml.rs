@@ -23,7 +23,7 @@ const REFERENCE: &str = "Z";
 /// The label that says "in every case".
 const EMPTY_LABEL: &str = "⊡";
 
-pub(super) fn read(text: &str, ending: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(text: &str, ending: &str, report: &mut Report) -> Option<NetworkFile> {
     let elements = xml::parse(text, report)?;
     let graph = graph(&elements, report)?;
     if let Some((at, kind)) = unsupported(graph, ending) {
@@ -53,7 +53,7 @@ pub(super) fn read(text: &str, ending: &str, report: &mut Report<'_>) -> Option<
 }
 
 /// The one graph of the document.
-fn graph<'e>(elements: &'e [Element], report: &mut Report<'_>) -> Option<&'e Element> {
+fn graph<'e>(elements: &'e [Element], report: &mut Report) -> Option<&'e Element> {
     let roots = elements.iter().filter(|element| element.name == "graphml");
     let graphs: Vec<&Element> = roots.flat_map(|root| root.named("graph")).collect();
     match graphs[..] {
@@ -150,7 +150,7 @@ enum Case {
 
 impl Edge {
     /// `None` after a mistake was noted.
-    fn of(element: &Element, builder: &Builder, report: &mut Report<'_>) -> Option<Self> {
+    fn of(element: &Element, builder: &Builder, report: &mut Report) -> Option<Self> {
         let mut end = |name| {
             let Some(id) = element.attribute(name) else {
                 report.mistake(
@@ -204,7 +204,7 @@ impl Edge {
 fn labelled(
     data: &Element,
     builder: &Builder,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<(Case, NodeId, Rational)> {
     let text = data.text.trim();
     let parts = text.rsplit_once(':').and_then(|(label, value)| {
@@ -230,7 +230,7 @@ fn labelled(
 }
 
 /// Joins the contingent edges to links.
-fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report<'_>) {
+fn contingent_links(builder: &mut Builder, edges: &[Edge], report: &mut Report) {
     let contingent = || edges.iter().filter(|edge| edge.is_contingent);
     let mut by_ends: BTreeMap<(NodeId, NodeId), &Edge> = BTreeMap::new();
     for edge in contingent() {
@@ -282,7 +282,7 @@ fn leads_to_end(edge: &Edge, back: &Edge) -> bool {
 }
 
 /// A link by its edge there and its edge back.
-fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report<'_>) {
+fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report) {
     let lower = there.in_case(Case::Lower).cloned();
     let lower = lower.or_else(|| back.finite().map(|value| -value));
     let upper = match back.in_case(Case::Upper) {
@@ -310,7 +310,7 @@ fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report<'_
 }
 
 /// What an edge of another type says: a requirement, a wait, or both.
-fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report<'_>) {
+fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
     if let Some(value) = &edge.value {
         let bounds = (Bound::NegativeInfinity, value.clone());
         builder.requirement((edge.from, edge.to), bounds, edge.at, report);

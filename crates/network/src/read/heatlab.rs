@@ -17,7 +17,7 @@ use crate::number::Bound;
 /// The node from which times count.
 const REFERENCE: &str = "0";
 
-pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {
     let mut builder = Builder::new(Format::Heatlab);
     if let Some(name) = document.member("name").and_then(Json::text) {
         name.clone_into(&mut builder.name);
@@ -47,7 +47,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<Netwo
 }
 
 /// When a node may happen, counted from the reference point.
-fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report: &mut Report<'_>) {
+fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report: &mut Report) {
     let least = Bound::Finite(elbowroom_num::Rational::ZERO);
     let lower = bound_or(node, "min_domain", least, report);
     let upper = bound_or(node, "max_domain", Bound::Infinity, report);
@@ -57,7 +57,7 @@ fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report
 }
 
 /// What a constraint says; the places of all that is wrong with it are noted.
-fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Report<'_>) {
+fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Report) {
     let mut end = |name| {
         let json = required(constraint, name, report)?;
         let name = point_name(json, report)?;
@@ -115,7 +115,7 @@ fn named_distribution(
     given: &Json<'_>,
     lower: &Bound,
     upper: &Bound,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<Duration> {
     let name = match given.text() {
         Some(_) => given,

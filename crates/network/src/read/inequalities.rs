@@ -23,7 +23,7 @@ pub(super) fn are_in(document: &Json<'_>) -> bool {
     })
 }
 
-pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {
     let mut builder = Builder::new(Format::Inequalities);
     let members = document.members().unwrap_or_default();
     for (name, value) in members {

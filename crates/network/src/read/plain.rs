@@ -74,7 +74,7 @@ struct Reader {
     links: usize,
 }
 
-pub(super) fn read(text: &str, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(text: &str, report: &mut Report) -> Option<NetworkFile> {
     let mut reader = Reader {
         builder: Builder::new(Format::Plain),
         announced: Vec::new(),
@@ -124,7 +124,7 @@ fn words(line: &str, begin: usize) -> Vec<(usize, &str)> {
 }
 
 impl Reader {
-    fn line(&mut self, section: Option<Section>, words: &[(usize, &str)], report: &mut Report<'_>) {
+    fn line(&mut self, section: Option<Section>, words: &[(usize, &str)], report: &mut Report) {
         let (at, first) = words[0];
         match section {
             None => {}
@@ -154,7 +154,7 @@ impl Reader {
         }
     }
 
-    fn edge(&mut self, words: &[(usize, &str)], report: &mut Report<'_>) {
+    fn edge(&mut self, words: &[(usize, &str)], report: &mut Report) {
         self.edges += 1;
         let [(from_at, from), (most_at, most), (to_at, to)] = words[..] else {
             report.mistake(
@@ -174,7 +174,7 @@ impl Reader {
         }
     }
 
-    fn link(&mut self, words: &[(usize, &str)], report: &mut Report<'_>) {
+    fn link(&mut self, words: &[(usize, &str)], report: &mut Report) {
         self.links += 1;
         let [
             (begin_at, begin),
@@ -211,7 +211,7 @@ impl Reader {
 
     /// That a number is not right may mean that the file is cut off, but not that it cannot be
     /// used.
-    fn check_counts(&self, report: &mut Report<'_>) {
+    fn check_counts(&self, report: &mut Report) {
         for &(what, announced, at) in &self.announced {
             let (found, name) = match what {
                 What::Points => (self.builder.nodes().count(), "time points"),
@@ -233,7 +233,7 @@ impl Reader {
     }
 }
 
-fn number(text: &str, at: usize, report: &mut Report<'_>) -> Option<Bound> {
+fn number(text: &str, at: usize, report: &mut Report) -> Option<Bound> {
     let read = Bound::parse(text);
     if read.is_none() {
         report.mistake(

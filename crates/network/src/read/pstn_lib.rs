@@ -20,7 +20,7 @@ use crate::number::Bound;
 /// What the library writes for infinity.
 const INFINITY: i64 = 1_000_000_000;
 
-pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<NetworkFile> {
+pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {
     let mut builder = Builder::new(Format::PstnLib);
     if let Some(name) = document.member("name").and_then(Json::text) {
         name.clone_into(&mut builder.name);
@@ -41,7 +41,7 @@ pub(super) fn read(document: &Json<'_>, report: &mut Report<'_>) -> Option<Netwo
 fn points(
     builder: &mut Builder,
     document: &Json<'_>,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> BTreeMap<String, NodeId> {
     let mut ids = BTreeMap::new();
     for point in list(document, "timepoints", report) {
@@ -79,7 +79,7 @@ fn points(
 fn ends(
     ids: &BTreeMap<String, NodeId>,
     constraint: &Json<'_>,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<(NodeId, NodeId)> {
     let mut end = |name| {
         let json = required(constraint, name, report)?;
@@ -102,7 +102,7 @@ fn read_constraint(
     builder: &mut Builder,
     ids: &BTreeMap<String, NodeId>,
     constraint: &Json<'_>,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) {
     let Some((source, sink)) = ends(ids, constraint, report) else {
         return;
@@ -149,7 +149,7 @@ fn read_constraint(
 fn duration_bound(
     constraint: &Json<'_>,
     is_required: bool,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) -> Option<(Bound, Bound)> {
     let given = match constraint.member("duration_bound") {
         Some(given) => given,
@@ -169,7 +169,7 @@ fn duration_bound(
 }
 
 /// `{ "mean": …, "sd": … }`.
-fn normal(given: &Json<'_>, report: &mut Report<'_>) -> Option<Duration> {
+fn normal(given: &Json<'_>, report: &mut Report) -> Option<Duration> {
     let mut part = |name| {
         let json = required(given, name, report)?;
         number(json, report)
@@ -191,7 +191,7 @@ fn read_correlation(
     builder: &mut Builder,
     ids: &BTreeMap<String, NodeId>,
     group: &Json<'_>,
-    report: &mut Report<'_>,
+    report: &mut Report,
 ) {
     let mut links = Vec::new();
     for constraint in list(group, "constraints", report) {

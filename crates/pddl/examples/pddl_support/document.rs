@@ -122,7 +122,7 @@ fn benchmarks(survey: &Survey, text: &mut String) {
     for domain in &survey.domains {
         let mut shown = BTreeMap::new();
         for (path, errors) in &domain.refused {
-            if let Some(error) = errors.iter().find(|error| !error.is_unsupported()) {
+            if let Some(error) = errors.iter().find(|error| Feature::of(error).is_none()) {
                 shown
                     .entry(error.to_string())
                     .or_insert_with(Vec::new)

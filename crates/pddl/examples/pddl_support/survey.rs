@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use elbowroom_model::Task;
 use elbowroom_model::reachability::{self, Answer, ground};
-use elbowroom_pddl::{Diagnostic, Diagnostics, Source, read_plan, read_problem};
+use elbowroom_pddl::{Diagnostic, Diagnostics, Feature, Source, read_plan, read_problem};
 
 /// What became of all texts.
 #[derive(Debug, Default)]
@@ -39,10 +39,10 @@ pub(crate) struct Domain {
 
 /// Why a problem was refused: the names of the features it uses, or that it contains mistakes.
 pub(crate) fn reason(errors: &[Diagnostic]) -> String {
-    if errors.iter().any(|error| !error.is_unsupported()) {
+    if errors.iter().any(|error| Feature::of(error).is_none()) {
         return "mistakes".to_owned();
     }
-    let features: BTreeSet<_> = errors.iter().filter_map(|error| error.feature).collect();
+    let features: BTreeSet<_> = errors.iter().filter_map(Feature::of).collect();
     let names: Vec<_> = features.iter().map(|feature| feature.name()).collect();
     names.join(", ")
 }
@@ -74,7 +74,7 @@ pub(crate) fn survey(folder: &Path) -> Survey {
             Ok((problem, warnings)) => {
                 domain.read += 1;
                 let settings = reachability::Settings::default();
-                if let Answer::Complete(grounding) = ground(&mut Task::new(problem), &settings) {
+                if let Answer::Complete(grounding) = ground(&Task::new(problem), &settings) {
                     domain.grounded += 1;
                     domain.actions += grounding.actions.len();
                 }
@@ -94,7 +94,7 @@ pub(crate) fn survey(folder: &Path) -> Survey {
         let read = read_problem(&source(folder, &row[3]), &source(folder, &row[4]));
         let Ok((problem, _)) = read else { continue };
         survey.plans.0 += 1;
-        let steps = plan_steps(&source(folder, &row[5]), Task::new(problem));
+        let steps = plan_steps(&source(folder, &row[5]), &Task::new(problem));
         let expected = row[7].parse().expect("a number of actions");
         if steps.is_ok_and(|steps| steps == expected) {
             survey.plans.1 += 1;
@@ -103,8 +103,8 @@ pub(crate) fn survey(folder: &Path) -> Survey {
     survey
 }
 
-fn plan_steps(plan: &Source, mut task: Task) -> Result<usize, Diagnostics> {
-    read_plan(plan, &mut task).map(|(plan, _)| plan.steps.len())
+fn plan_steps(plan: &Source, task: &Task) -> Result<usize, Diagnostics> {
+    read_plan(plan, task).map(|(plan, _)| plan.steps.len())
 }
 
 /// The rows of a table without its head. None of its fields contains a comma.

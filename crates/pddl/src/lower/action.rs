@@ -11,8 +11,8 @@ use crate::lower::scope::Scope;
 use crate::lower::sections::Section;
 use crate::lower::timed::Timed;
 use crate::source::Span;
-use crate::suggest::nearest;
 use crate::syntax::Node;
+use elbowroom_text::nearest;
 
 /// What can stand in an action.
 const INSTANTANEOUS: &[&str] = &[
@@ -46,7 +46,7 @@ impl Reader {
         else {
             self.report
                 .error(section.span, "an action without a name")
-                .help(format!("expected `({} name …)`", section.keyword));
+                .advise(format!("expected `({} name …)`", section.keyword));
             return;
         };
         let allowed = if is_durative { DURATIVE } else { INSTANTANEOUS };
@@ -63,7 +63,7 @@ impl Reader {
         if self.names.schemas.insert(name.to_string(), id).is_some() {
             self.report
                 .error(span, format!("an action `{name}` is declared already"))
-                .help("give each action its own name");
+                .advise("give each action its own name");
         }
         self.schema_spans.push(span);
         self.problem.schemas.push(Schema {
@@ -90,7 +90,7 @@ impl Reader {
                         node.span,
                         format!("unexpected `{}` in action `{action}`", node.quote()),
                     )
-                    .help(format!("expected one of {}", allowed.join(", ")));
+                    .advise(format!("expected one of {}", allowed.join(", ")));
                 continue;
             };
             let is_keyword = |node: &Node| node.word().is_some_and(|word| word.starts_with(':'));
@@ -107,7 +107,7 @@ impl Reader {
                         node.span,
                         format!("unknown keyword `{word}` in action `{action}`"),
                     )
-                    .help(format!("expected one of {}", allowed.join(", ")))
+                    .advise(format!("expected one of {}", allowed.join(", ")))
                     .suggest(near);
                 continue;
             };
@@ -121,7 +121,7 @@ impl Reader {
                         node.span,
                         format!("a second `{keyword}` in action `{action}`"),
                     )
-                    .help("join them by `and`");
+                    .advise("join them by `and`");
             }
         }
         fields
@@ -142,7 +142,7 @@ impl Reader {
                     *span,
                     "`:control` parameters are not supported",
                 )
-                .help("a number that stays open can be a `:synth-parameters` entry");
+                .advise("a number that stays open can be a `:synth-parameters` entry");
             for name in value.and_then(Node::list).unwrap_or_default() {
                 scope.controls.extend(name.lower().map(String::from));
             }
@@ -170,7 +170,7 @@ impl Reader {
             None => {
                 self.report
                     .warning(section.span, "a durative action without `:duration`")
-                    .help("it may take any time; write `:duration ()` if that is meant");
+                    .advise("it may take any time; write `:duration ()` if that is meant");
             }
         }
         let condition = match fields.get(":condition") {

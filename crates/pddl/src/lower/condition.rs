@@ -18,7 +18,7 @@ impl Reader {
         let Some((head, parts)) = node.form() else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help("expected a condition such as `(predicate argument …)` or `(and …)`");
+                .advise("expected a condition such as `(predicate argument …)` or `(and …)`");
             return Condition::TRUE;
         };
         if let Some(comparison) = comparison(&head) {
@@ -73,7 +73,7 @@ impl Reader {
                         node.span,
                         format!("`{}` does not belong here", node.quote()),
                     )
-                    .help("time specifiers belong into durative actions, and do not nest");
+                    .advise("time specifiers belong into durative actions, and do not nest");
                 Condition::TRUE
             }
             _ => self
@@ -117,7 +117,7 @@ impl Reader {
                     node.span,
                     format!("`{}` takes two operands", comparison.symbol()),
                 )
-                .help(format!("expected `({} a b)`", comparison.symbol()));
+                .advise(format!("expected `({} a b)`", comparison.symbol()));
             return Condition::TRUE;
         };
         if comparison == Comparison::Equal {
@@ -168,7 +168,7 @@ impl Reader {
         if scope.without_preferences > 0 {
             self.report
                 .error(node.span, "a preference cannot stand here")
-                .help("preferences stand under `and` and `forall` only");
+                .advise("preferences stand under `and` and `forall` only");
         } else {
             self.report.ignored(
                 Feature::Preferences,
@@ -189,7 +189,7 @@ impl Reader {
         };
         self.report
             .error(node.span, format!("`{head}` has the wrong number of parts"))
-            .help(format!("expected `{expected}`"));
+            .advise(format!("expected `{expected}`"));
     }
 }
 

@@ -27,7 +27,7 @@ impl Reader {
                     place.quote()
                 ),
             )
-            .help("express them by timed initial literals, or by an action that lasts");
+            .advise("express them by timed initial literals, or by an action that lasts");
     }
 }
 

@@ -35,7 +35,9 @@ impl Reader {
                     value.span,
                     format!("`{}` is not a rate times `#t`", value.quote()),
                 )
-                .help("what does not depend on `#t` belongs into an effect `at start` or `at end`");
+                .advise(
+                    "what does not depend on `#t` belongs into an effect `at start` or `at end`",
+                );
             return None;
         }
         let rate = rate?;
@@ -104,7 +106,7 @@ impl Reader {
             _ => {
                 self.report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
-                    .help("`#t` may stand in sums, products and dividends only");
+                    .advise("`#t` may stand in sums, products and dividends only");
                 None
             }
         }

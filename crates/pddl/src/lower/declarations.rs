@@ -23,7 +23,7 @@ impl Reader {
             if name.starts_with('?') {
                 self.report
                     .error(entry.node.span, format!("`{name}` is a variable"))
-                    .help("names of objects have no question mark");
+                    .advise("names of objects have no question mark");
             }
             let types = self.resolve_types(&entry.types);
             let key = name.to_ascii_lowercase();
@@ -67,7 +67,7 @@ impl Reader {
             if let Some(&again) = again {
                 self.report
                     .warning(node.span, format!("`{name}` is declared already"))
-                    .help("its arguments may be of the types of either declaration");
+                    .advise("its arguments may be of the types of either declaration");
                 let own = &mut self.problem.predicates[again.index()].parameters;
                 for (own, more) in own.iter_mut().zip(parameters) {
                     own.types.extend(more.types);
@@ -100,7 +100,7 @@ impl Reader {
                             "`{name}` has values of type `{ty}`: object fluents are not supported"
                         ),
                     )
-                    .help("use a predicate with one more argument");
+                    .advise("use a predicate with one more argument");
                 self.names.object_functions.insert(name);
                 continue;
             }
@@ -128,7 +128,7 @@ impl Reader {
         }
         self.report
             .error(node.span, format!("unexpected `{}`", node.quote()))
-            .help("expected `(name ?parameter - type …)`");
+            .advise("expected `(name ?parameter - type …)`");
         None
     }
 
@@ -156,13 +156,13 @@ impl Reader {
                             entry.node.span,
                             format!("`{}` cannot be an unknown", entry.node.quote()),
                         )
-                        .help("expected `?name`");
+                        .advise("expected `?name`");
                 }
             }
             if let Some((ty, span)) = entry.types.iter().find(|(ty, _)| ty != "number") {
                 self.report
                     .error(*span, format!("an unknown of type `{ty}`"))
-                    .help("`:synth-parameters` are numbers");
+                    .advise("`:synth-parameters` are numbers");
             }
         }
         names

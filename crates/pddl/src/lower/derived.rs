@@ -24,13 +24,13 @@ impl Reader {
         let [head, body] = section.content else {
             self.report
                 .error(section.span, "a rule needs a head and a condition")
-                .help("expected `(:derived (predicate ?x …) condition)`");
+                .advise("expected `(:derived (predicate ?x …) condition)`");
             return None;
         };
         let Some((name, parameters)) = head.form() else {
             self.report
                 .error(head.span, format!("unexpected `{}`", head.quote()))
-                .help("expected `(predicate ?x …)`");
+                .advise("expected `(predicate ?x …)`");
             return None;
         };
         let mut parameters_read = self.variables(parameters);
@@ -92,7 +92,7 @@ impl Reader {
                     self.rule_spans[rule],
                     format!("`{name}` depends on its own negation"),
                 )
-                .help("a derived predicate may not be negated in what it is derived from");
+                .advise("a derived predicate may not be negated in what it is derived from");
         }
     }
 }

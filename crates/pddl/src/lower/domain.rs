@@ -3,8 +3,8 @@
 use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::sections::{Section, Sections};
-use crate::suggest::nearest;
 use crate::syntax::Node;
+use elbowroom_text::nearest;
 
 /// What can stand in a domain.
 const SECTIONS: &[&str] = &[

@@ -7,8 +7,8 @@ use crate::lower::Reader;
 use crate::lower::condition::comparison;
 use crate::lower::scope::Scope;
 use crate::lower::timed::{Time, time_specifier};
-use crate::suggest::nearest;
 use crate::syntax::{Kind, Node};
+use elbowroom_text::nearest;
 
 impl Reader {
     /// The constraints on a duration; none for `()`.
@@ -63,7 +63,7 @@ impl Reader {
                     node.span,
                     format!("`{}` on a duration is not supported", comparison.symbol()),
                 )
-                .help(format!("PDDL allows `{}=` here", comparison.symbol()));
+                .advise(format!("PDDL allows `{}=` here", comparison.symbol()));
             return;
         }
         constraints.push(DurationConstraint {
@@ -86,7 +86,7 @@ impl Reader {
                 node.span,
                 format!("`{}` does not bound the duration", node.quote()),
             )
-            .help("expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such")
+            .advise("expected `(= ?duration value)`, `(<= ?duration value)` or `(and …)` of such")
             .suggest(near);
     }
 }

@@ -66,7 +66,7 @@ impl Reader {
         let Some((head, parts)) = node.form() else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help("expected an effect such as `(predicate argument …)` or `(and …)`");
+                .advise("expected an effect such as `(predicate argument …)` or `(and …)`");
             return;
         };
         if let Some((time, inner)) = time_specifier(node) {
@@ -83,7 +83,7 @@ impl Reader {
                             node.span,
                             format!("`{}` does not belong here", node.quote()),
                         )
-                        .help("effects of durative actions happen `at start` or `at end`");
+                        .advise("effects of durative actions happen `at start` or `at end`");
                 }
             }
             return;
@@ -197,7 +197,7 @@ impl Reader {
             ("=" | "<" | "<=" | ">" | ">=" | "or" | "imply" | "exists", _) => {
                 self.report
                     .error(node.span, format!("`{head}` is not an effect"))
-                    .help("numbers are changed by `(assign (f) value)`, `(increase (f) value)`");
+                    .advise("numbers are changed by `(assign (f) value)`, `(increase (f) value)`");
                 return None;
             }
             _ => (node, Change::Add),
@@ -272,7 +272,7 @@ impl Reader {
                     node.span,
                     "too many effects under one condition or quantifier",
                 )
-                .help("this domain is too large to be read");
+                .advise("this domain is too large to be read");
             return None;
         }
         let mut guard = Guard::default();
@@ -298,7 +298,7 @@ impl Reader {
                         when.span,
                         "a condition that is read after its effect happens",
                     )
-                    .help("only effects `at end` may depend on conditions `at end`");
+                    .advise("only effects `at end` may depend on conditions `at end`");
                 let label = self.report.label(node.span, "this is the effect");
                 self.report.attach(label);
                 return None;
@@ -332,7 +332,7 @@ impl Reader {
         let name = operator.name();
         self.report
             .error(node.span, format!("`{name}` takes a fluent and a value"))
-            .help(format!("expected `({name} (function argument …) value)`"));
+            .advise(format!("expected `({name} (function argument …) value)`"));
     }
 
     pub(super) fn missing_moment(&mut self, node: &Node) {
@@ -342,7 +342,7 @@ impl Reader {
                 node.span,
                 format!("`{}` does not say when it happens", node.quote()),
             )
-            .help(
+            .advise(
                 "expected `(at start …)` or `(at end …)`, or for continuous change \
                  `(increase (f) (* #t rate))`",
             )

@@ -55,7 +55,7 @@ impl Reader {
             self.report
                 .error(span, format!("{what} has more than {MOST_PARTS} parts"))
                 .label("when its quantifiers are expanded")
-                .help("use fewer nested quantifiers, or narrower types");
+                .advise("use fewer nested quantifiers, or narrower types");
         }
     }
 }

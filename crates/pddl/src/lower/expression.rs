@@ -30,7 +30,7 @@ impl Reader {
         let Some((head, operands)) = node.form() else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help("expected a number, `(function argument …)` or `(+ …)`");
+                .advise("expected a number, `(function argument …)` or `(+ …)`");
             return WRONG;
         };
         match (head.as_ref(), operands) {
@@ -65,14 +65,14 @@ impl Reader {
             ("/", _) => {
                 self.report
                     .error(node.span, "`/` takes two operands")
-                    .help("expected `(/ a b)`");
+                    .advise("expected `(/ a b)`");
                 WRONG
             }
             ("total-time", []) => self.number_or_name("total-time", node, scope),
             _ if number(&node.list().unwrap_or_default()[0]).is_some() => {
                 self.report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
-                    .help("write a number without parentheses");
+                    .advise("write a number without parentheses");
                 WRONG
             }
             _ => self.fluent(node, scope).map_or(WRONG, Expression::Fluent),
@@ -95,13 +95,13 @@ impl Reader {
             "?duration" => {
                 self.report
                     .error(node.span, "`?duration` means nothing here")
-                    .help("it belongs into durative actions");
+                    .advise("it belongs into durative actions");
                 WRONG
             }
             "#t" => {
                 self.report
                     .error(node.span, "`#t` means nothing here")
-                    .help(
+                    .advise(
                         "it belongs into continuous effects of durative actions, \
                          which stand outside of `at start` and `at end`",
                     );
@@ -124,7 +124,7 @@ impl Reader {
             let asked = variable.name.clone();
             self.report
                 .error(node.span, format!("`{asked}` is an object, not a number"))
-                .help("use a function of it, or declare it under `:synth-parameters`");
+                .advise("use a function of it, or declare it under `:synth-parameters`");
             return WRONG;
         }
         if let Some(position) = position(&self.problem.unknowns, word) {
@@ -133,7 +133,7 @@ impl Reader {
         if !scope.controls.contains(word) {
             self.report
                 .error(node.span, format!("unknown number `{word}`"))
-                .help("numbers that stay open are declared under `:synth-parameters`");
+                .advise("numbers that stay open are declared under `:synth-parameters`");
         }
         WRONG
     }
@@ -144,7 +144,7 @@ impl Reader {
         value(&expression).unwrap_or_else(|| {
             self.report
                 .error(node.span, format!("`{}` is not a constant", node.quote()))
-                .help("expected a number");
+                .advise("expected a number");
             Rational::ZERO
         })
     }
@@ -157,7 +157,7 @@ impl Reader {
                 node.span,
                 format!("`{}` is not linear in `#t`", node.quote()),
             )
-            .help("write `(* #t rate)`; the rate may depend on fluents");
+            .advise("write `(* #t rate)`; the rate may depend on fluents");
     }
 }
 

@@ -34,7 +34,7 @@ impl Reader {
                             entry.node.span,
                             format!("`{}` is not a type", entry.node.quote()),
                         )
-                        .help("expected a name");
+                        .advise("expected a name");
                 }
             }
         }
@@ -131,14 +131,14 @@ impl Reader {
                         place(&ty.name),
                         format!("`{}` is a subtype of itself, or of such a type", ty.name),
                     )
-                    .help("remove the circle");
+                    .advise("remove the circle");
             } else if paths[index] > MOST_PATHS || height[index] > HIGHEST {
                 self.report
                     .error(
                         place(&ty.name),
                         format!("`{}` lies too deep in the type hierarchy", ty.name),
                     )
-                    .help(format!(
+                    .advise(format!(
                         "at most {HIGHEST} types above each other, and {MOST_PATHS} ways up"
                     ));
             } else {

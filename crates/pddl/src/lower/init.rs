@@ -53,7 +53,7 @@ impl Reader {
         }
         self.report
             .warning(init, "`(total-cost)` has no initial value: read as 0")
-            .help("say `(= (total-cost) 0)`");
+            .advise("say `(= (total-cost) 0)`");
         self.problem
             .initial_values
             .push((cost, Vec::new(), Rational::ZERO));
@@ -71,12 +71,34 @@ impl Reader {
             {
                 self.timed_initial(time, content, valued);
             }
+            Some((head, parts)) if head == "at" && self.is_broken_timed(parts) => {
+                let text = match parts {
+                    [time, not, atom] if not.is("not") && atom.list().is_some() => {
+                        format!("`(at {} (not {}))`", time.quote(), atom.quote())
+                    }
+                    _ => {
+                        "`(at 120 (p …))`, `(at 120 (not (p …)))` or `(at 120 (= (f …) 5))`".into()
+                    }
+                };
+                self.report
+                    .error(node.span, "this timed initial cannot be understood")
+                    .advise(format!("write {text}"));
+            }
             _ => match self.initial_change(node) {
                 // What is not said to be true is false anyway.
                 None | Some(TimedChange::Delete(..)) => {}
                 Some(change) => self.initially(change, node.span, valued),
             },
         }
+    }
+
+    /// Whether `(at …)` begins with a number, as only timed initials do, and not with an object.
+    fn is_broken_timed(&self, parts: &[Node]) -> bool {
+        let Some((first, [_, ..])) = parts.split_first() else {
+            return false;
+        };
+        let is_object = |word: &str| self.names.objects.contains_key(word);
+        number(first).is_some() && !first.lower().is_some_and(|word| is_object(&word))
     }
 
     /// `(at time (p …))`, `(at time (not (p …)))`, `(at time (= (f …) number))`
@@ -93,7 +115,7 @@ impl Reader {
         if time.is_negative() {
             self.report
                 .error(time_node.span, "a time before 0")
-                .help("the plan begins at time 0");
+                .advise("the plan begins at time 0");
         }
         let Some(change) = self.initial_change(content) else {
             return;
@@ -125,9 +147,9 @@ impl Reader {
             TimedChange::Assign(..) => "a second value for this fluent at the same time",
             _ => "this fact becomes both true and false at one time",
         };
-        self.report
-            .error(content.span, message)
-            .help("what happens at one time has no order: leave one out, or give it another time");
+        self.report.error(content.span, message).advise(
+            "what happens at one time has no order: leave one out, or give it another time",
+        );
     }
 
     /// What becomes so, at time 0 or later. `None`, with a report unless an object fluent is
@@ -157,7 +179,7 @@ impl Reader {
                 (change @ ("increase" | "decrease" | "scale-up" | "scale-down"), _) => {
                     self.report
                         .error(node.span, format!("a timed `{change}`"))
-                        .help("only values can be given for a time, as in `(at 10 (= (f) 3))`");
+                        .advise("only values can be given for a time, as in `(at 10 (= (f) 3))`");
                     return None;
                 }
                 ("=" | "assign" | "not" | "<" | "<=" | ">" | ">=", _) => {
@@ -189,7 +211,7 @@ impl Reader {
     fn not_initial(&mut self, node: &Node) {
         self.report
             .error(node.span, format!("unexpected `{}`", node.quote()))
-            .help(
+            .advise(
                 "expected `(predicate object …)`, `(= (function object …) number)`, \
                  or one of these in `(at time …)`",
             );
@@ -223,7 +245,7 @@ impl Reader {
             if initial[place].2 != value {
                 self.report
                     .warning(span, "a second initial value of this fluent")
-                    .help("the last one counts");
+                    .advise("the last one counts");
             }
             initial[place].2 = value;
         } else {

@@ -1,6 +1,8 @@
 //! The sections of a problem file; its goal and metric.
 
-use elbowroom_model::problem::{Condition, Metric};
+use elbowroom_model::problem::{
+    Body, Change, Condition, Fluent, Metric, ObjectId, Term, TimedChange, UpdateOperator,
+};
 
 use crate::feature::Feature;
 use crate::lower::Reader;
@@ -36,7 +38,7 @@ impl Reader {
             None => {
                 self.report
                     .warning(sections.name_span, "a problem without `:init`")
-                    .help("nothing is true at time 0");
+                    .advise("nothing is true at time 0");
             }
         }
         let goal = sections.only(":goal", &mut self.report);
@@ -45,7 +47,7 @@ impl Reader {
             None => {
                 self.report
                     .warning(sections.name_span, "a problem without `:goal`")
-                    .help("every plan reaches it; expected `(:goal condition)`");
+                    .advise("every plan reaches it; expected `(:goal condition)`");
             }
         }
         self.check_expansion(goal.map(|section| section.span));
@@ -95,16 +97,81 @@ impl Reader {
             [] => {
                 self.report
                     .error(section.span, "an empty goal")
-                    .help("`(:goal (and))` always holds");
+                    .advise("`(:goal (and))` always holds");
                 Condition::TRUE
             }
             [_, second, ..] => {
                 self.report
                     .error(second.span, "a second condition in the goal")
-                    .help("join them by `and`");
+                    .advise("join them by `and`");
                 Condition::TRUE
             }
         };
+        let mut undefined = Vec::new();
+        self.undefined(&self.problem.goal, &mut undefined);
+        for name in undefined {
+            self.report
+                .warning(
+                    section.span,
+                    format!("the goal reads `{name}`, which never gets a value"),
+                )
+                .advise(format!("say `(= {name} …)` under `:init`"));
+        }
+    }
+
+    /// The names of the fluents that a ground condition reads, and to which neither the initial
+    /// state nor an action or a timed initial gives a value.
+    fn undefined(&self, condition: &Condition, found: &mut Vec<String>) {
+        match condition {
+            Condition::Compare(_, left, right) => {
+                for side in [left, right] {
+                    side.visit_fluents(&mut |fluent| found.extend(self.undefined_fluent(fluent)));
+                }
+            }
+            Condition::Not(part) => self.undefined(part, found),
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.undefined(part, found);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn undefined_fluent(&self, fluent: &Fluent) -> Option<String> {
+        let problem = &self.problem;
+        let arguments: Vec<ObjectId> = fluent
+            .arguments
+            .iter()
+            .map(|term| match term {
+                Term::Object(object) => Some(*object),
+                Term::Variable(_) => None,
+            })
+            .collect::<Option<_>>()?;
+        let mut initial = problem.initial_values.iter();
+        let is_initial = initial
+            .any(|(function, objects, _)| *function == fluent.function && *objects == arguments);
+        let is_timed = problem.timed.iter().any(|timed| {
+            matches!(&timed.change, TimedChange::Assign(function, objects, _)
+                if *function == fluent.function && *objects == arguments)
+        });
+        let is_assigned = problem.schemas.iter().any(|schema| {
+            let (first, second) = match &schema.body {
+                Body::Instantaneous { effects, .. } => (effects.as_slice(), [].as_slice()),
+                Body::Durative {
+                    start_effects,
+                    end_effects,
+                    ..
+                } => (start_effects.as_slice(), end_effects.as_slice()),
+            };
+            first.iter().chain(second).any(|effect| {
+                matches!(&effect.change, Change::Update { operator: UpdateOperator::Assign, fluent: changed, .. }
+                    if changed.function == fluent.function)
+            })
+        });
+        let name = &problem.functions[fluent.function.index()].name;
+        let is_undefined = !(is_initial || is_timed || is_assigned);
+        is_undefined.then(|| problem.apply_name(name, &arguments))
     }
 
     fn metric(&mut self, section: &Section) {
@@ -140,7 +207,7 @@ impl Reader {
     fn wrong_metric(&mut self, section: &Section) {
         self.report
             .error(section.span, "this metric cannot be understood")
-            .help("expected `(:metric minimize expression)` or `(:metric maximize expression)`");
+            .advise("expected `(:metric minimize expression)` or `(:metric maximize expression)`");
     }
 }
 

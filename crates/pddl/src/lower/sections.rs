@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use crate::report::Report;
 use crate::source::{FileId, Span};
-use crate::suggest::nearest;
 use crate::syntax::Node;
+use elbowroom_text::nearest;
 
 /// A file taken apart into its sections.
 #[derive(Debug)]
@@ -37,9 +37,13 @@ impl<'t, 's> Sections<'t, 's> {
             .position(|node| node.form().is_some_and(|(head, _)| head == "define"));
         let Some(defined) = defined else {
             let span = nodes.first().map_or(start_of(file), |node| node.span);
-            report
-                .error(span, format!("this is not a PDDL {kind}"))
-                .help(format!("expected `(define ({kind} name) …)`"));
+            let is_plan = nodes.iter().any(is_time);
+            let diagnostic = report.error(span, format!("this is not a PDDL {kind}"));
+            if is_plan {
+                diagnostic.advise("it looks like a plan; the order is DOMAIN PROBLEM PLAN");
+            } else {
+                diagnostic.advise(format!("expected `(define ({kind} name) …)`"));
+            }
             return None;
         };
         let (_, content) = nodes[defined].form()?;
@@ -47,7 +51,7 @@ impl<'t, 's> Sections<'t, 's> {
             if content.is_empty() {
                 report
                     .error(nodes[defined].span, format!("this {kind} is empty"))
-                    .help(format!("expected `(define ({kind} name) …)`"));
+                    .advise(format!("expected `(define ({kind} name) …)`"));
             }
             return None;
         };
@@ -74,7 +78,7 @@ impl<'t, 's> Sections<'t, 's> {
         for second in same {
             report
                 .error(second.span, format!("a second `{keyword}` section"))
-                .help("put everything into one section");
+                .advise("put everything into one section");
             let label = report.label(first.span, "the first is here");
             report.attach(label);
         }
@@ -102,7 +106,7 @@ impl<'t, 's> Sections<'t, 's> {
             _ => {
                 report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
-                    .help("expected a section such as `(:init …)` or `(:action …)`");
+                    .advise("expected a section such as `(:init …)` or `(:action …)`");
             }
         }
     }
@@ -114,11 +118,17 @@ impl<'t, 's> Sections<'t, 's> {
                 node.head_span(),
                 format!("`{}` stands outside of `(define …)`", node.quote()),
             )
-            .help("check the parentheses before it: perhaps there is one `)` too many");
+            .advise("check the parentheses before it: perhaps there is one `)` too many");
         if node.form().is_some_and(|(head, _)| head.starts_with(':')) {
             self.add(node, report);
         }
     }
+}
+
+/// Whether this is the time before an action of a plan, `0.000:`.
+fn is_time(node: &Node) -> bool {
+    let word = node.word().and_then(|word| word.strip_suffix(':'));
+    word.is_some_and(|word| word.parse::<f64>().is_ok())
 }
 
 /// Reads `(domain name)` or `(problem name)`.
@@ -132,19 +142,19 @@ fn name<'s>(file: FileId, node: Option<&Node<'s>>, report: &mut Report) -> Optio
         Some((head, _)) if head == self::kind(other(file)) => {
             report
                 .error(node.span, format!("this is a {head}, not a {kind}"))
-                .help("are the two files given in the wrong order?");
+                .advise("are the two files given in the wrong order?");
             None
         }
         Some((head, _)) if nearest(&head, [kind]).is_some() || head == kind => {
             report
                 .error(node.span, format!("expected `({kind} name)`"))
-                .help(format!("write one name after `{kind}`"));
+                .advise(format!("write one name after `{kind}`"));
             None
         }
         _ => {
             report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help(format!("expected `({kind} name)`"));
+                .advise(format!("expected `({kind} name)`"));
             None
         }
     }

@@ -13,7 +13,7 @@ impl Reader {
         let Some((name, arguments)) = node.form() else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help("expected `(predicate argument …)`");
+                .advise("expected `(predicate argument …)`");
             return None;
         };
         let Some(overloads) = self.names.predicates.get(name.as_ref()) else {
@@ -40,7 +40,7 @@ impl Reader {
         let Some((name, arguments)) = form else {
             self.report
                 .error(node.span, format!("unexpected `{}`", node.quote()))
-                .help("expected `(function argument …)`");
+                .advise("expected `(function argument …)`");
             return None;
         };
         if self.names.object_functions.contains(name.as_ref()) {
@@ -71,7 +71,7 @@ impl Reader {
             if !is_object_fluent {
                 self.report
                     .error(node.span, format!("unexpected `{}`", node.quote()))
-                    .help("expected the name of an object, or a `?variable`");
+                    .advise("expected the name of an object, or a `?variable`");
             }
             return None;
         };
@@ -93,7 +93,7 @@ impl Reader {
             );
             if !is_number {
                 diagnostic
-                    .help("declare it under `:parameters`, or by `forall` or `exists`")
+                    .advise("declare it under `:parameters`, or by `forall` or `exists`")
                     .suggest(near);
             }
             return None;
@@ -106,7 +106,7 @@ impl Reader {
             .nearest(&word, self.names.objects.keys().map(String::as_str));
         self.report
             .error(node.span, format!("unknown object `{}`", node.quote()))
-            .help("declare it under `:objects` or `:constants`")
+            .advise("declare it under `:objects` or `:constants`")
             .suggest(near);
         None
     }
@@ -133,7 +133,7 @@ impl Reader {
                         arguments.len()
                     ),
                 )
-                .help(format!(
+                .advise(format!(
                     "expected `({})`",
                     [name, &expected].join(" ").trim_end()
                 ));
@@ -213,10 +213,10 @@ impl Reader {
             .report
             .error(node.head_span(), format!("unknown predicate `{name}`"));
         if is_function {
-            diagnostic.help("it is a function: compare it with a number, as in `(>= (f) 1)`");
+            diagnostic.advise("it is a function: compare it with a number, as in `(>= (f) 1)`");
         } else {
             diagnostic
-                .help("declare it under `:predicates`")
+                .advise("declare it under `:predicates`")
                 .suggest(near);
         }
     }
@@ -229,11 +229,13 @@ impl Reader {
         let diagnostic = self
             .report
             .error(node.head_span(), format!("unknown function `{name}`"));
-        if is_predicate {
-            diagnostic.help("it is a predicate, and has no number as its value");
+        if let Some(number) = with_point(name) {
+            diagnostic.advise(format!("write {number}"));
+        } else if is_predicate {
+            diagnostic.advise("it is a predicate, and has no number as its value");
         } else {
             diagnostic
-                .help("declare it under `:functions`")
+                .advise("declare it under `:functions`")
                 .suggest(near);
         }
     }
@@ -250,7 +252,7 @@ impl Reader {
                         predicate.name
                     ),
                 )
-                .help("change what its rules depend on");
+                .advise("change what its rules depend on");
         }
     }
 }
@@ -261,4 +263,13 @@ fn count(arguments: usize) -> String {
         1 => "1 argument".to_owned(),
         n => format!("{n} arguments"),
     }
+}
+
+/// The number that is meant by one with a decimal comma.
+fn with_point(word: &str) -> Option<String> {
+    let (whole, fraction) = word.split_once(',')?;
+    let is_number =
+        |digits: &str| !digits.is_empty() && digits.chars().all(|digit| digit.is_ascii_digit());
+    let is_meant = is_number(whole.trim_start_matches(['-', '+'])) && is_number(fraction);
+    is_meant.then(|| format!("{whole}.{fraction}"))
 }

@@ -6,8 +6,8 @@ use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::condition::without_preferences;
 use crate::lower::scope::Scope;
-use crate::suggest::nearest;
 use crate::syntax::Node;
+use elbowroom_text::nearest;
 
 /// When a part of a durative action is read or done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -217,7 +217,7 @@ impl Reader {
                 node.span,
                 format!("`{}` does not say when it must hold", node.quote()),
             )
-            .help("expected `(at start …)`, `(over all …)` or `(at end …)`")
+            .advise("expected `(at start …)`, `(over all …)` or `(at end …)`")
             .suggest(near);
     }
 }

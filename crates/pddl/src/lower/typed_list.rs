@@ -84,7 +84,7 @@ impl Reader {
             _ => {
                 self.report
                     .error(node.span, format!("`{}` is not a type", node.quote()))
-                    .help(format!(
+                    .advise(format!(
                         "expected a name, or `(either a b)` with at most {LONGEST_EITHER} names"
                     ));
                 Rc::new([])
@@ -110,7 +110,7 @@ impl Reader {
                 .nearest(name, self.names.types.keys().map(String::as_str));
             self.report
                 .error(*span, format!("unknown type `{name}`"))
-                .help("declare it under `:types`")
+                .advise("declare it under `:types`")
                 .suggest(near);
         }
         if ids.is_empty() {
@@ -137,13 +137,13 @@ impl Reader {
                         entry.node.span,
                         format!("`{}` is not a variable", entry.node.quote()),
                     )
-                    .help("expected `?name`, and perhaps `- type` after it");
+                    .advise("expected `?name`, and perhaps `- type` after it");
                 continue;
             };
             if name == "?duration" {
                 self.report
                     .error(entry.node.span, "`?duration` cannot be a parameter")
-                    .help("it always means the action's duration");
+                    .advise("it always means the action's duration");
             }
             if variables.iter().any(|v| v.name == *name) {
                 self.report
@@ -165,7 +165,7 @@ impl Reader {
         }
         self.report
             .error(node.span, "expected a list of variables")
-            .help("write `(?x - type)`, or `()` for none");
+            .advise("write `(?x - type)`, or `()` for none");
         Vec::new()
     }
 }

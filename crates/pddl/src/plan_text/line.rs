@@ -60,6 +60,9 @@ pub(super) struct RawStep<'s> {
     pub(super) words: Vec<Word<'s>>,
     /// The duration in brackets.
     pub(super) duration: Option<Word<'s>>,
+    /// What stands beside the duration, or in its place, and is not read: a unit of time, or a
+    /// number without brackets.
+    pub(super) stray: Option<Word<'s>>,
 }
 
 /// A word and its place.
@@ -86,7 +89,13 @@ pub(super) fn line(text: &str, start: usize) -> Line<'_> {
             Ok(None) if steps.is_empty() && is_announcement(text) => return Line::Separator,
             Ok(None) if steps.is_empty() => return Line::Noise,
             // What planners add behind an action.
-            Ok(None) => break,
+            Ok(None) => {
+                let last = steps.last_mut();
+                if let Some(step) = last.filter(|step: &&mut RawStep<'_>| step.duration.is_none()) {
+                    step.stray = cursor.bare_number();
+                }
+                break;
+            }
             Err((at, expected)) => return Line::Broken(start + at, expected),
         }
         cursor.skip_space();
@@ -108,6 +117,9 @@ fn is_announcement(text: &str) -> bool {
     let text = text.to_ascii_lowercase();
     ANNOUNCEMENTS.iter().any(|words| text.contains(words))
 }
+
+/// The number in brackets, and what stands behind it.
+type Duration<'s> = (Option<Word<'s>>, Option<Word<'s>>);
 
 /// A place in a line.
 struct Cursor<'s> {
@@ -195,11 +207,12 @@ impl<'s> Cursor<'s> {
         while self.eat(')') {
             self.skip_space();
         }
-        let duration = self.duration()?;
+        let (duration, stray) = self.duration()?;
         Ok(Some(RawStep {
             time,
             words,
             duration,
+            stray,
         }))
     }
 
@@ -221,10 +234,16 @@ impl<'s> Cursor<'s> {
         }
     }
 
-    /// `[10.0]`, `[D:10.0; C:0.1]`
-    fn duration(&mut self) -> Result<Option<Word<'s>>, (usize, &'static str)> {
+    /// A number that stands alone, as a duration does to which somebody gave no brackets.
+    fn bare_number(&mut self) -> Option<Word<'s>> {
+        let word = self.word(char::is_whitespace);
+        word.text.parse::<f64>().is_ok().then_some(word)
+    }
+
+    /// `[10.0]`, `[D:10.0; C:0.1]`; the second word is what stands behind the number.
+    fn duration(&mut self) -> Result<Duration<'s>, (usize, &'static str)> {
         if !self.eat('[') {
-            return Ok(None);
+            return Ok((None, None));
         }
         self.skip_space();
         if self.rest().starts_with(['D', 'd']) {
@@ -237,11 +256,18 @@ impl<'s> Cursor<'s> {
         let Some(end) = self.rest().find(']') else {
             return Err((self.at, "expected `]` after the duration"));
         };
+        let behind = &self.rest()[..end];
+        let unit = behind.trim();
+        let from = self.start + self.at + (behind.len() - behind.trim_start().len());
+        let stray = (!unit.is_empty() && !unit.starts_with(';')).then_some(Word {
+            text: unit,
+            range: from..from + unit.len(),
+        });
         self.at += end + 1;
         if duration.text.is_empty() {
             return Err((self.at - 1, "expected a duration in the brackets"));
         }
-        Ok(Some(duration))
+        Ok((Some(duration), stray))
     }
 }
 

@@ -9,11 +9,12 @@ use elbowroom_model::problem::{FunctionId, ObjectId, SchemaId};
 use elbowroom_model::{Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::plan_text::duration::{changing_functions, only_duration};
 use crate::plan_text::line::{Line, RawStep, Word, line};
 use crate::report::Report;
-use crate::source::{FileId, Source, Span};
+use crate::source::{FileId, Span};
+use elbowroom_text::Source;
+use elbowroom_text::{Diagnostic, Diagnostics};
 
 /// Longest duration that planners print for an action which has none.
 const NEGLIGIBLE: (i64, i64) = (1, 100);
@@ -22,37 +23,47 @@ const NEGLIGIBLE: (i64, i64) = (1, 100);
 ///
 /// Tolerates what planners print around it, `;` comments, upper case, `[D:…; C:…]`. Of several
 /// plans in one log, the last is read. Actions without times happen at 0, 1, 2, …. A duration
-/// that is not given is taken from the domain if it is one fixed number there.
+/// that is not given is taken from the domain if it is one fixed number there. The steps come
+/// [in order](TimeTriggeredPlan::in_order), whatever the order of the lines.
 ///
 /// # Errors
 /// When actions, objects, types or numbers do not fit the task.
 pub fn read_plan(
     source: &Source,
-    task: &mut Task,
+    task: &Task,
 ) -> Result<(TimeTriggeredPlan, Vec<Diagnostic>), Diagnostics> {
     let mut reader = PlanReader::new(source, task);
     let steps = reader.last_plan();
     let mut plan = TimeTriggeredPlan::default();
     let is_timed = steps.iter().any(|step| step.time.is_some());
+    if let (Some(first), false) = (steps.first(), is_timed) {
+        let message = "no action has a time: they are taken to start at 0, 1, 2, …";
+        reader
+            .report
+            .warning(span(&first.words[0].range), message)
+            .advise("write the time before the action: `0.000: (action argument …) [10.000]`");
+    }
     for (index, step) in steps.iter().enumerate() {
         plan.steps.extend(reader.step(step, index, is_timed));
     }
-    let plan = (!reader.report.is_failed()).then_some(plan);
+    let plan = (!reader.report.is_failed()).then(|| plan.in_order());
     Diagnostics::outcome(plan, reader.report.into_diagnostics())
 }
 
 struct PlanReader<'a> {
     source: &'a Source,
-    task: &'a mut Task,
+    task: &'a Task,
     report: Report,
     schemas: BTreeMap<String, SchemaId>,
     objects: BTreeMap<String, ObjectId>,
     /// Looked for when the first duration is missing.
     changing: OnceCell<BTreeSet<FunctionId>>,
+    /// Whether it was said that a duration is missing.
+    has_told_missing: bool,
 }
 
 impl<'a> PlanReader<'a> {
-    fn new(source: &'a Source, task: &'a mut Task) -> Self {
+    fn new(source: &'a Source, task: &'a Task) -> Self {
         let problem = task.problem();
         let schemas = (0..problem.schemas.len()).map(SchemaId::from);
         let objects = (0..problem.objects.len()).map(ObjectId::from);
@@ -67,6 +78,7 @@ impl<'a> PlanReader<'a> {
             task,
             report: Report::new(source, source),
             changing: OnceCell::new(),
+            has_told_missing: false,
         }
     }
 
@@ -101,7 +113,7 @@ impl<'a> PlanReader<'a> {
                     self.report
                         .error(span(&(at..at)), "this is not an action of a plan")
                         .label(expected)
-                        .help("expected `time: (action argument …) [duration]`");
+                        .advise("expected `time: (action argument …) [duration]`");
                 }
                 Line::Blank | Line::Separator | Line::Noise => {}
             }
@@ -117,7 +129,7 @@ impl<'a> PlanReader<'a> {
         if steps.is_empty() && !self.report.is_failed() {
             self.report
                 .warning(span(&(0..0)), "no actions in this plan")
-                .help("expected lines such as `0.000: (action argument …) [10.000]`");
+                .advise("expected lines such as `0.000: (action argument …) [10.000]`");
         }
         steps
     }
@@ -131,7 +143,7 @@ impl<'a> PlanReader<'a> {
                 self.report
                     .error(span(&raw.words[0].range), "an action without a time")
                     .label("other actions of this plan have one")
-                    .help("expected `time: (action argument …) [duration]`");
+                    .advise("expected `time: (action argument …) [duration]`");
                 None
             }
             None => Some(Rational::from(u32::try_from(index).unwrap_or(u32::MAX))),
@@ -149,14 +161,22 @@ impl<'a> PlanReader<'a> {
                 let expected = self.signature(schema);
                 self.report
                     .error(span(&(name.range.start..end)), error.to_string())
-                    .help(format!("expected `{expected}`"));
+                    .advise(format!("expected `{expected}`"));
                 return None;
             }
         };
+        if let Some(stray) = &raw.stray {
+            self.report
+                .warning(span(&stray.range), format!("`{}` is ignored", stray.text))
+                .advise("a duration is a number in brackets, in the domain's unit: `[10.000]`");
+        }
         let duration = match (action.durative(), duration) {
             (Some(_), Some(duration)) => Some(duration?),
             (Some(_), None) => match self.only_duration(schema, &arguments) {
-                Ok(duration) => Some(duration),
+                Ok(duration) => {
+                    self.tell_missing(name, &duration);
+                    Some(duration)
+                }
                 Err(why) => {
                     self.report
                         .error(
@@ -164,7 +184,7 @@ impl<'a> PlanReader<'a> {
                             format!("`{}` has no duration here", name.text),
                         )
                         .label(why)
-                        .help("write it behind the action: `[10.000]`");
+                        .advise("write it behind the action: `[10.000]`");
                     return None;
                 }
             },
@@ -187,6 +207,20 @@ impl<'a> PlanReader<'a> {
         })
     }
 
+    /// Says at the first action without a duration what is taken instead.
+    fn tell_missing(&mut self, name: &Word, duration: &Rational) {
+        if std::mem::replace(&mut self.has_told_missing, true) {
+            return;
+        }
+        let message = format!(
+            "`{}` has no duration here: {duration} is taken, as the domain says",
+            name.text
+        );
+        self.report
+            .warning(span(&name.range), message)
+            .advise("write it behind the action, as in `[10.000]`; this is said once for all");
+    }
+
     fn only_duration(&self, schema: SchemaId, arguments: &[ObjectId]) -> Result<Rational, String> {
         let schema = &self.task.problem().schemas[schema.index()];
         let changing = self
@@ -202,7 +236,7 @@ impl<'a> PlanReader<'a> {
             Ok(_) => {
                 self.report
                     .error(span(&word.range), "a negative time")
-                    .help("times and durations are at least 0");
+                    .advise("times and durations are at least 0");
                 None
             }
             Err(error) => {
@@ -221,7 +255,7 @@ impl<'a> PlanReader<'a> {
                 .nearest(&name, self.schemas.keys().map(String::as_str));
             self.report
                 .error(span(&word.range), format!("unknown action `{}`", word.text))
-                .help("the domain has no action of this name")
+                .advise("the domain has no action of this name")
                 .suggest(near);
         }
         found
@@ -236,7 +270,7 @@ impl<'a> PlanReader<'a> {
                 .nearest(&name, self.objects.keys().map(String::as_str));
             self.report
                 .error(span(&word.range), format!("unknown object `{}`", word.text))
-                .help("neither the domain nor the problem has an object of this name")
+                .advise("neither the domain nor the problem has an object of this name")
                 .suggest(near);
         }
         found

@@ -61,7 +61,7 @@ fn report_stray(first: char, span: Span, report: &mut Report) {
     };
     report
         .error(span, message)
-        .help("PDDL is plain text: parentheses, words, numbers and `;` comments");
+        .advise("PDDL is plain text: parentheses, words, numbers and `;` comments");
 }
 
 fn is_stray(character: char) -> bool {
@@ -87,7 +87,7 @@ fn operator_length(word: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Source;
+    use elbowroom_text::Source;
 
     fn words(text: &str) -> (Vec<String>, usize) {
         let source = Source::new("f", text);

@@ -174,7 +174,7 @@ impl<'s> Builder<'s> {
             report
                 .error(span, format!("lists nested more than {DEEPEST} deep"))
                 .label("this list is too deep")
-                .help("check the parentheses before this place");
+                .advise("check the parentheses before this place");
         } else {
             self.open.push((span, Vec::new()));
         }
@@ -191,7 +191,7 @@ impl<'s> Builder<'s> {
                 report
                     .warning(span, "`)` without a matching `(`")
                     .label("nothing is open here")
-                    .help("remove it, or check the parentheses before it");
+                    .advise("remove it, or check the parentheses before it");
             }
         }
     }
@@ -206,7 +206,7 @@ impl<'s> Builder<'s> {
         report
             .error(unclosed, "`(` without a matching `)`")
             .label("this list is still open …")
-            .help("close it before the next section");
+            .advise("close it before the next section");
         let label = report.label(span, format!("… where `({word}` begins"));
         report.attach(label);
         while self.open.len() > 1 {
@@ -235,7 +235,7 @@ impl<'s> Builder<'s> {
             report
                 .error(*unclosed, "`(` without a matching `)`")
                 .label("this list is never closed")
-                .help("add the missing `)`");
+                .advise("add the missing `)`");
         }
         self.too_deep = 0;
         while let Some((start, nodes)) = self.open.pop() {
@@ -259,7 +259,7 @@ fn list(start: Span, end: Span, nodes: Vec<Node>) -> Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Source;
+    use elbowroom_text::Source;
 
     fn parsed(text: &str) -> (String, Vec<String>) {
         let source = Source::new("f", text);
@@ -296,14 +296,20 @@ mod tests {
             tree,
             "[define [domain d] [:action a :effect [and [p]]] [:action b]]"
         );
-        assert_eq!(messages, ["f:2:2: error: `(` without a matching `)`"]);
+        assert_eq!(
+            messages,
+            ["f:2:2: error: `(` without a matching `)`; close it before the next section"]
+        );
     }
 
     #[test]
     fn an_unclosed_list_is_closed_at_the_end() {
         let (tree, messages) = parsed("(a (b");
         assert_eq!(tree, "[a [b]]");
-        assert_eq!(messages, ["f:1:4: error: `(` without a matching `)`"]);
+        assert_eq!(
+            messages,
+            ["f:1:4: error: `(` without a matching `)`; add the missing `)`"]
+        );
     }
 
     #[test]
@@ -312,7 +318,7 @@ mod tests {
         assert_eq!(messages.len(), 2);
         assert_eq!(
             messages[0],
-            "f:1:201: error: lists nested more than 200 deep"
+            "f:1:201: error: lists nested more than 200 deep; check the parentheses before this place"
         );
         let balanced = "(".repeat(1_000_000) + &")".repeat(1_000_000);
         assert_eq!(parsed(&balanced).1.len(), 1);

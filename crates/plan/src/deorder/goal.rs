@@ -11,13 +11,7 @@ use super::order::Order;
 use crate::stn_plan::{Node, NodeId, Reason, StnPlan};
 
 /// The goal is read after the last happening of the plan's actions, whichever that is.
-pub(super) fn order(
-    task: &Task,
-    plan: &StnPlan,
-    times: &[Rational],
-    epsilon: &Rational,
-    order: &mut Order,
-) {
+pub(super) fn order(task: &Task, plan: &StnPlan, times: &[Rational], order: &mut Order) {
     let goal = Footprint::of_condition(task, task.goal());
     let finals: Vec<NodeId> = plan
         .nodes()
@@ -41,7 +35,7 @@ pub(super) fn order(
         }
         if time(node) > time(last) {
             // Strictly later is enough; the original may be closer than ε.
-            let gap = (time(node) - time(last)).min(epsilon.clone());
+            let gap = (time(node) - time(last)).min(task.epsilon().clone());
             for &last in &finals {
                 order.demand(last, node, gap.clone(), Reason::Interference);
             }

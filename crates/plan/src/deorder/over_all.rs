@@ -24,7 +24,6 @@ pub(super) fn order(
     task: &Task,
     plan: &StnPlan,
     timeline: &Timeline<'_>,
-    epsilon: &Rational,
     order: &mut Order,
     sides: &mut Order,
 ) {
@@ -46,7 +45,12 @@ pub(super) fn order(
         if has_guards(body) {
             // In no time at all, anything would hold throughout.
             let duration = timeline.time(end) - timeline.time(start);
-            order.demand(start, end, duration.min(epsilon.clone()), Reason::OverAll);
+            order.demand(
+                start,
+                end,
+                duration.min(task.epsilon().clone()),
+                Reason::OverAll,
+            );
         }
         let required = Required::of(task, body);
         for &(fact, wanted) in &required.literals {
@@ -66,6 +70,7 @@ pub(super) fn order(
         // A required condition only gains when a moment in which it was read is lost. But an
         // effect that did not happen could happen then.
         let decisive = guards_throughout(task, body);
+        let epsilon = task.epsilon();
         for (footprint, distance) in [(&required.other, &Rational::ZERO), (&decisive, epsilon)] {
             for quantity in read_by(footprint) {
                 let writers = writers

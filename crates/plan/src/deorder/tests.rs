@@ -2,7 +2,7 @@ use elbowroom_model::Step;
 use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
-use super::{DeorderError, Deordered, Settings, deorder, pin_until_sound, pinned_to};
+use super::{DeorderError, Deordered, deorder, pin_until_sound, pinned_to};
 use crate::format;
 use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, NodeId, Reason};
@@ -10,7 +10,7 @@ use crate::testing::{number, rover};
 
 /// A plan of the rover: `start: action [duration]` on each line.
 fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {
-    let mut task = rover();
+    let task = rover();
     let mut plan = TimeTriggeredPlan::default();
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
         let (start, rest) = line.split_once(':').unwrap();
@@ -31,7 +31,7 @@ fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {
 
 fn deordered(text: &str) -> Deordered {
     let (task, plan) = plan(text);
-    deorder(&task, &plan, &Settings::default()).unwrap_or_else(|error| panic!("{error}"))
+    deorder(&task, &plan).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The constraints as an STN plan file has them.
@@ -122,7 +122,7 @@ fn rounded_times_are_mended_in_the_nominal_schedule() {
     // The duration is one ten-thousandth too long, the gap half a thousandth.
     let text = "0: refuel s1 [10.0001]
                 10.0005: refuel s2 [10]";
-    let Deordered { plan, nominal } = deordered(text);
+    let Deordered { plan, nominal, .. } = deordered(text);
     let schedule = elbowroom_stn::Schedule::new(nominal);
     assert!(schedule.holds_in(&plan.network(&[])));
     assert_eq!(schedule.times()[2], number("10"));
@@ -135,7 +135,7 @@ fn interfering_happenings_at_one_time_are_refused() {
         "0: navigate [7]
          7: navigate [7]",
     );
-    let error = deorder(&task, &plan, &Settings::default()).unwrap_err();
+    let error = deorder(&task, &plan).unwrap_err();
     assert_eq!(
         error,
         DeorderError::Simultaneous {
@@ -149,13 +149,9 @@ fn interfering_happenings_at_one_time_are_refused() {
 #[test]
 fn a_plan_past_its_deadline_has_no_schedule() {
     let (task, plan) = plan("99.9995: beep");
-    let mut settings = Settings::default();
-    assert!(
-        deorder(&task, &plan, &settings).is_ok(),
-        "rounded, and mended"
-    );
-    settings.epsilon = Rational::from(101);
-    let error = deorder(&task, &plan, &settings).unwrap_err();
+    assert!(deorder(&task, &plan).is_ok(), "rounded, and mended");
+    let task = task.with_epsilon(Rational::from(101));
+    let error = deorder(&task, &plan).unwrap_err();
     assert!(matches!(error, DeorderError::NoSchedule { .. }), "{error}");
 }
 
@@ -163,7 +159,7 @@ fn a_plan_past_its_deadline_has_no_schedule() {
 fn pins_are_as_few_as_the_oracle_needs() {
     let text = "0: collect s1 [15]
                 3: collect s2 [15]";
-    let Deordered { plan, nominal } = deordered(text);
+    let Deordered { plan, nominal, .. } = deordered(text);
     let (first, second) = (NodeId(1), NodeId(3));
     // Content once the second start is known to come no sooner than the first.
     let mut oracle = |plan: &crate::StnPlan| {
@@ -189,7 +185,7 @@ fn pins_are_as_few_as_the_oracle_needs() {
 
 #[test]
 fn an_oracle_that_is_never_content_gets_the_nominal_schedule_and_then_nothing() {
-    let Deordered { plan, nominal } = deordered("0: collect s1 [15]\n3: navigate [7]");
+    let Deordered { plan, nominal, .. } = deordered("0: collect s1 [15]\n3: navigate [7]");
     let rigid = pinned_to(plan.clone(), &nominal).network(&[]);
     assert!(elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&rigid));
     let mut asked = 0;

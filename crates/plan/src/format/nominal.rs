@@ -22,7 +22,7 @@ pub(super) struct Draft {
 ///
 /// What the domain fixes comes first; the rest is read off the earliest schedule of the network
 /// in which those bounds are limited by the parameters' ranges alone.
-pub(super) fn find(task: &mut Task, plan: &StnPlan, drafts: &[Draft]) -> Vec<Option<Rational>> {
+pub(super) fn find(task: &Task, plan: &StnPlan, drafts: &[Draft]) -> Vec<Option<Rational>> {
     let mut ranges: Vec<Interval> = drafts
         .iter()
         .map(|draft| match &draft.nominal {
@@ -54,7 +54,7 @@ pub(super) fn find(task: &mut Task, plan: &StnPlan, drafts: &[Draft]) -> Vec<Opt
 }
 
 /// The durations that the domain allows the instance, as far as the initial state tells.
-fn domain_durations(task: &mut Task, plan: &StnPlan, id: InstanceId) -> Option<Interval> {
+fn domain_durations(task: &Task, plan: &StnPlan, id: InstanceId) -> Option<Interval> {
     // The plan's own action no longer lists its duration constraints.
     let action = &plan.instance(id).action;
     let original = task.instantiate(action.schema, &action.arguments).ok()?;

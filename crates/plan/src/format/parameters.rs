@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
 use elbowroom_num::{End, Interval, Rational};
+use elbowroom_text::Report;
 
 use super::nominal::{self, Draft};
 use super::syntax::{File, Limit, ParameterItem};
-use super::tokens::{Mistakes, Span};
+use super::tokens::Span;
 use crate::parameter::{Parameter, ParameterId, ParameterKind};
-use crate::stn_plan::{Bound, Constraint, InstanceId, Node, StnPlan};
+use crate::stn_plan::{Bound, Constraint, InstanceId, StnPlan};
 use crate::unknowns::{self, OpenNumber};
 
 /// What each declared parameter stands for, judging by the constraints in which it occurs.
@@ -18,24 +19,18 @@ pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {
         let id = ParameterId::from(index);
         let duration = used[index]
             .iter()
-            .find_map(|&constraint| duration_of(plan, &plan.constraints[constraint], id));
+            .find_map(|&constraint| duration_set_to(plan, &plan.constraints[constraint], id));
         duration.map_or(ParameterKind::Bound, ParameterKind::Duration)
     };
     (0..used.len()).map(kind).collect()
 }
 
 /// The instance whose duration the constraint sets to the parameter.
-fn duration_of(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> Option<InstanceId> {
+fn duration_set_to(plan: &StnPlan, constraint: &Constraint, id: ParameterId) -> Option<InstanceId> {
     if constraint.lower != Bound::Parameter(id) || constraint.upper != Bound::Parameter(id) {
         return None;
     }
-    match (
-        plan.nodes[constraint.from.index()],
-        plan.nodes[constraint.to.index()],
-    ) {
-        (Node::Start(from), Node::End(to)) if from == to => Some(from),
-        _ => None,
-    }
+    plan.duration_of(constraint)
 }
 
 /// Takes the domain's duration constraints from all instances whose duration is a parameter, also
@@ -46,7 +41,7 @@ pub(super) fn free_durations(plan: &mut StnPlan, kinds: &[ParameterKind]) {
         .iter()
         .filter_map(|constraint| match constraint.lower {
             Bound::Parameter(id) if matches!(kinds[id.index()], ParameterKind::Duration(_)) => {
-                duration_of(plan, constraint, id)
+                duration_set_to(plan, constraint, id)
             }
             _ => None,
         })
@@ -61,12 +56,12 @@ pub(super) fn open_numbers(
     file: &File<'_>,
     task: &Task,
     plan: &StnPlan,
-    mistakes: &mut Mistakes,
+    mistakes: &mut Report,
 ) -> BTreeMap<OpenNumber, ParameterId> {
     let nowhere = Span { start: 0, end: 0 };
     if unknowns::occur_in_rules(task) {
         let message = "a derived predicate depends on `:synth-parameters`, which is not supported";
-        mistakes.add(nowhere, message, None);
+        mistakes.mistake(nowhere, message, None);
     }
     let mut declared = BTreeMap::new();
     for number in unknowns::possible(task, plan) {
@@ -82,7 +77,7 @@ pub(super) fn open_numbers(
             let name = number.name(task, plan);
             let message = format!("the domain leaves `{name}` open");
             let expected = format!("add `parameter {name} default VALUE;`");
-            mistakes.add(nowhere, message, expected);
+            mistakes.mistake(nowhere, message, expected);
         }
     }
     declared
@@ -90,11 +85,11 @@ pub(super) fn open_numbers(
 
 pub(super) fn parameters(
     file: &File<'_>,
-    task: &mut Task,
+    task: &Task,
     plan: &StnPlan,
     mut kinds: Vec<ParameterKind>,
     open: &BTreeMap<OpenNumber, ParameterId>,
-    mistakes: &mut Mistakes,
+    mistakes: &mut Report,
 ) -> Option<Vec<Parameter>> {
     for (number, id) in open {
         if kinds[id.index()] == ParameterKind::Bound {
@@ -117,7 +112,7 @@ pub(super) fn parameters(
     for (item, draft) in file.parameters.iter().zip(&drafts) {
         check_default(item, draft, mistakes);
     }
-    if !mistakes.is_empty() {
+    if mistakes.is_failed() {
         return None;
     }
     let nominal = nominal::find(task, plan, &drafts);
@@ -125,7 +120,7 @@ pub(super) fn parameters(
     for ((item, draft), nominal) in file.parameters.iter().zip(drafts).zip(nominal) {
         let Some(nominal) = nominal else {
             let message = format!("no nominal value of `{}` can be found", item.name.text);
-            mistakes.add(item.name.span, message, "give `default`".to_owned());
+            mistakes.mistake(item.name.span, message, "give `default`".to_owned());
             continue;
         };
         parameters.push(Parameter {
@@ -136,7 +131,7 @@ pub(super) fn parameters(
             range: draft.range,
         });
     }
-    mistakes.is_empty().then_some(parameters)
+    (!mistakes.is_failed()).then_some(parameters)
 }
 
 /// The range that `lb` and `ub` give, each side on its own, or else the natural one.
@@ -152,7 +147,7 @@ fn range(item: &ParameterItem<'_>, natural: Interval) -> Interval {
     }
 }
 
-fn check_default(item: &ParameterItem<'_>, draft: &Draft, mistakes: &mut Mistakes) {
+fn check_default(item: &ParameterItem<'_>, draft: &Draft, mistakes: &mut Report) {
     let name = item.name;
     if item
         .weight
@@ -160,17 +155,17 @@ fn check_default(item: &ParameterItem<'_>, draft: &Draft, mistakes: &mut Mistake
         .is_some_and(|weight| !weight.is_positive())
     {
         let message = format!("the weight of `{}` must be positive", name.text);
-        mistakes.add(name.span, message, None);
+        mistakes.mistake(name.span, message, None);
     }
     if draft.range.is_empty() {
         let message = format!("the range {} of `{}` is empty", draft.range, name.text);
-        mistakes.add(name.span, message, "change `lb` or `ub`".to_owned());
+        mistakes.mistake(name.span, message, "change `lb` or `ub`".to_owned());
     } else if let Some(default) = draft.nominal.as_ref().filter(|d| !draft.range.contains(d)) {
         let message = format!(
             "the default {default} of `{}` is not in its range {}",
             name.text, draft.range
         );
-        mistakes.add(
+        mistakes.mistake(
             name.span,
             message,
             "change `default`, `lb` or `ub`".to_owned(),

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body};
+use elbowroom_text::{Report, nearest};
 
 use super::syntax::{BoundText, ConstraintItem, File, InstanceItem, Limit, limit};
-use super::tokens::{Mistakes, Span, Token};
+use super::tokens::{Span, Token};
 use super::{did_you_mean, parameters};
 use crate::parameter::{ParameterId, ParametrizedPlan};
 use crate::stn_plan::{Bound, Constraint, Instance, Node, NodeId, Reason, StnPlan};
-use crate::suggestion::nearest;
 use crate::unknowns;
 
 /// The plan, or `None` after noting mistakes.
@@ -19,10 +19,10 @@ use crate::unknowns;
 /// for; everything else is checked all the same.
 pub(super) fn resolve(
     file: &File<'_>,
-    task: &mut Task,
-    mistakes: &mut Mistakes,
+    task: &Task,
+    mistakes: &mut Report,
 ) -> Option<ParametrizedPlan> {
-    let is_whole = mistakes.is_empty();
+    let is_whole = !mistakes.is_failed();
     let instances = instances(file, task, mistakes);
     let has_all_labels = is_whole && instances.len() == file.instances.len();
     let mut plan = StnPlan::unconstrained(task, instances);
@@ -44,7 +44,7 @@ pub(super) fn resolve(
         }
         plan.constraints.push(constraint);
     }
-    if !mistakes.is_empty() {
+    if mistakes.is_failed() {
         return None;
     }
     let kinds = parameters::kinds(&plan, &used);
@@ -57,6 +57,7 @@ pub(super) fn resolve(
         plan,
         parameters,
         initial: BTreeMap::new(),
+        told: BTreeMap::new(),
         goal,
     })
 }
@@ -74,13 +75,13 @@ fn constraint(
     item: &ConstraintItem<'_>,
     names: &Names<'_>,
     plan: &StnPlan,
-    mistakes: &mut Mistakes,
+    mistakes: &mut Report,
 ) -> Option<Constraint> {
     let mut point = |name: &Token<'_>| {
         let found = names.points.get(name.text).copied();
         if found.is_none() && names.has_all_points {
             let message = format!("there is no time point `{}`", name.text);
-            mistakes.add(
+            mistakes.mistake(
                 name.span,
                 message,
                 point_hint(name.text, plan, &names.points),
@@ -95,7 +96,7 @@ fn constraint(
         BoundText::Limit(limit, _) if limit == infinity => Some(Bound::Infinite),
         BoundText::Limit(_, span) => {
             let message = "this infinity is on the wrong side: nothing could satisfy it";
-            mistakes.add(*span, message, None);
+            mistakes.mistake(*span, message, None);
             None
         }
         BoundText::Name(name) => {
@@ -103,13 +104,21 @@ fn constraint(
             if found.is_none() && names.has_all_parameters {
                 let message = format!("there is no parameter `{}`", name.text);
                 let near = nearest(name.text, names.parameters.keys().copied());
-                mistakes.add(name.span, message, did_you_mean(near));
+                mistakes.mistake(name.span, message, did_you_mean(near));
             }
             found.map(Bound::Parameter)
         }
     };
     let lower = bound(&item.lower, &Limit::MinusInfinity);
     let upper = bound(&item.upper, &Limit::Infinity);
+    if let (BoundText::Limit(Limit::Number(least), from), BoundText::Limit(Limit::Number(most), to)) =
+        (&item.lower, &item.upper)
+        && least > most
+    {
+        let message = format!("nothing lies between {least} and {most}");
+        let advice = "the lower bound stands first, and is not above the upper one".to_owned();
+        mistakes.mistake(from.to(*to), message, advice);
+    }
     Some(Constraint {
         from: from?,
         to: to?,
@@ -119,17 +128,17 @@ fn constraint(
     })
 }
 
-fn instances(file: &File<'_>, task: &mut Task, mistakes: &mut Mistakes) -> Vec<Instance> {
+fn instances(file: &File<'_>, task: &Task, mistakes: &mut Report) -> Vec<Instance> {
     let mut labels: BTreeMap<&str, Span> = BTreeMap::new();
     let mut instances = Vec::with_capacity(file.instances.len());
     for item in &file.instances {
         let label = item.label;
         if label.text.starts_with('.') || limit(label.text).is_some() {
             let message = format!("`{}` cannot be a label", label.text);
-            mistakes.add(label.span, message, "choose a name".to_owned());
+            mistakes.mistake(label.span, message, "choose a name".to_owned());
         } else if labels.insert(label.text, label.span).is_some() {
             let message = format!("two instances are labelled `{}`", label.text);
-            mistakes.add(label.span, message, "labels must differ".to_owned());
+            mistakes.mistake(label.span, message, "labels must differ".to_owned());
         }
         if let Some(action) = action(item, task, mistakes) {
             instances.push(Instance {
@@ -141,14 +150,14 @@ fn instances(file: &File<'_>, task: &mut Task, mistakes: &mut Mistakes) -> Vec<I
     instances
 }
 
-fn action(item: &InstanceItem<'_>, task: &mut Task, mistakes: &mut Mistakes) -> Option<Action> {
+fn action(item: &InstanceItem<'_>, task: &Task, mistakes: &mut Report) -> Option<Action> {
     let (name, arguments) = item.action.split_first()?;
     let problem = task.problem();
     let schema = problem.schema(name.text);
     if schema.is_none() {
         let message = format!("the domain has no action `{}`", name.text);
         let near = nearest(name.text, problem.schemas.iter().map(|s| s.name.as_str()));
-        mistakes.add(name.span, message, did_you_mean(near));
+        mistakes.mistake(name.span, message, did_you_mean(near));
     }
     let mut objects = Vec::with_capacity(arguments.len());
     for argument in arguments {
@@ -159,7 +168,7 @@ fn action(item: &InstanceItem<'_>, task: &mut Task, mistakes: &mut Mistakes) -> 
                 argument.text,
                 problem.objects.iter().map(|o| o.name.as_str()),
             );
-            mistakes.add(argument.span, message, did_you_mean(near));
+            mistakes.mistake(argument.span, message, did_you_mean(near));
         }
         objects.extend(object);
     }
@@ -173,36 +182,36 @@ fn action(item: &InstanceItem<'_>, task: &mut Task, mistakes: &mut Mistakes) -> 
     let action = match task.instantiate(schema, &objects) {
         Ok(action) => action,
         Err(error) => {
-            mistakes.add(span, error.to_string(), None);
+            mistakes.mistake(span, error.to_string(), None);
             return None;
         }
     };
     match (&action.body, item.is_durative) {
         (Body::Instantaneous(_), true) => {
             let message = format!("`{}` is instantaneous", name.text);
-            mistakes.add(name.span, message, "write `action instance`".to_owned());
+            mistakes.mistake(name.span, message, "write `action instance`".to_owned());
         }
         (Body::Durative(_), false) => {
             let message = format!("`{}` takes time", name.text);
             let expected = "write `durative-action instance`".to_owned();
-            mistakes.add(name.span, message, expected);
+            mistakes.mistake(name.span, message, expected);
         }
         _ => {}
     }
     Some(action)
 }
 
-fn parameter_names<'a>(file: &File<'a>, mistakes: &mut Mistakes) -> BTreeMap<&'a str, ParameterId> {
+fn parameter_names<'a>(file: &File<'a>, mistakes: &mut Report) -> BTreeMap<&'a str, ParameterId> {
     let mut names = BTreeMap::new();
     for (index, item) in file.parameters.iter().enumerate() {
         let name = item.name;
         if limit(name.text).is_some() {
             let message = format!("`{}` cannot be a parameter's name", name.text);
-            mistakes.add(name.span, message, "choose another name".to_owned());
+            mistakes.mistake(name.span, message, "choose another name".to_owned());
         }
         if names.insert(name.text, ParameterId::from(index)).is_some() {
             let message = format!("two parameters are called `{}`", name.text);
-            mistakes.add(name.span, message, "names must differ".to_owned());
+            mistakes.mistake(name.span, message, "names must differ".to_owned());
         }
     }
     names

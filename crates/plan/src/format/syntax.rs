@@ -1,8 +1,9 @@
 //! The grammar of STN plan files: from words to items whose names are not looked up yet.
 
 use elbowroom_num::Rational;
+use elbowroom_text::{Report, Source};
 
-use super::tokens::{Mistakes, Span, Token, tokens};
+use super::tokens::{Span, Token, tokens};
 
 /// What an STN plan file says, by kind of item.
 #[derive(Debug, Default)]
@@ -56,12 +57,13 @@ pub(super) enum BoundText<'a> {
 }
 
 /// Reads all items; those with mistakes are left out.
-pub(super) fn parse(text: &str) -> (File<'_>, Mistakes) {
+pub(super) fn parse(source: &Source) -> (File<'_>, Report) {
+    let text = source.text();
     let mut parser = Parser {
         tokens: tokens(text),
         next: 0,
         end: text.len(),
-        mistakes: Mistakes::default(),
+        mistakes: Report::new(source),
     };
     let mut file = File::default();
     while parser.peek().is_some() {
@@ -91,7 +93,7 @@ struct Parser<'a> {
     next: usize,
     /// Where the text ends.
     end: usize,
-    mistakes: Mistakes,
+    mistakes: Report,
 }
 
 /// Each method that returns an `Option` gives `None` after noting a mistake.
@@ -143,7 +145,7 @@ impl<'a> Parser<'a> {
             };
             if is_again {
                 let message = format!("`{}` is given twice", option.text);
-                self.mistakes.add(option.span, message, None);
+                self.mistakes.mistake(option.span, message, None);
             }
             self.next += 1;
             match option.text.to_ascii_lowercase().as_str() {
@@ -260,7 +262,7 @@ impl<'a> Parser<'a> {
             let end = self.tokens[self.next - 1].span.end;
             let span = Span { start: end, end };
             self.mistakes
-                .add(span, "this item does not end", "expected `;`".to_owned());
+                .mistake(span, "this item does not end", "expected `;`".to_owned());
             return Some(());
         }
         self.fail("`;`")
@@ -331,11 +333,11 @@ impl<'a> Parser<'a> {
         if let Some(token) = self.peek() {
             let text: String = token.text.chars().take(60).collect();
             let message = format!("`{text}` is not expected here");
-            self.mistakes.add(token.span, message, expected);
+            self.mistakes.mistake(token.span, message, expected);
         } else {
             let (start, end) = (self.end, self.end);
             self.mistakes
-                .add(Span { start, end }, "the file ends here", expected);
+                .mistake(Span { start, end }, "the file ends here", expected);
         }
         None
     }

@@ -2,7 +2,9 @@ mod round_trip;
 
 use elbowroom_num::{Interval, Rational};
 
-use super::{FormatErrors, WriteError, read, write};
+use elbowroom_text::Diagnostics;
+
+use super::{WriteError, read, write};
 use crate::parameter::{Parameter, ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, Constraint, InstanceId, NodeId, Reason};
 use crate::testing::{number, rover};
@@ -20,11 +22,11 @@ const PAPER: &str = "
     c: b - cs1.end in [-inf, -.5]";
 
 fn parsed(text: &str) -> ParametrizedPlan {
-    read(text.as_bytes(), &mut rover()).unwrap_or_else(|errors| panic!("{errors}"))
+    read(text.as_bytes(), &rover()).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
 fn refused(text: &str) -> String {
-    let errors: FormatErrors = read(text.as_bytes(), &mut rover()).unwrap_err();
+    let errors: Diagnostics = read(text.as_bytes(), &rover()).unwrap_err();
     errors.to_string()
 }
 
@@ -129,15 +131,15 @@ c: n1.end - n1.start in [5, inf;
     assert_eq!(
         refused(text),
         "\
-line 2, column 13: `wieght` is not expected here: expected `weight`, `default`, `lb`, `ub` or `;`
-line 3, column 32: the domain has no action `navigat`: did you mean `navigate`?
-line 4, column 40: the problem has no object `s3`: did you mean `S1`?
-line 4, column 43: this item does not end: expected `;`
-line 5, column 23: `collect` takes time: write `durative-action instance`
-line 6, column 22: `on` is not expected here: expected `in`
-line 7, column 20: `;` is not expected here: expected a number such as 12.5 or 25/2
-line 8, column 32: `;` is not expected here: expected `]`
-line 9, column 1: `@@@` is not expected here: expected `parameter`, `durative-action instance`, \
+text:2:13: error: `wieght` is not expected here; expected `weight`, `default`, `lb`, `ub` or `;`
+text:3:32: error: the domain has no action `navigat`; did you mean `navigate`?
+text:4:40: error: the problem has no object `s3`; did you mean `S1`?
+text:4:43: error: this item does not end; expected `;`
+text:5:23: error: `collect` takes time; write `durative-action instance`
+text:6:22: error: `on` is not expected here; expected `in`
+text:7:20: error: `;` is not expected here; expected a number such as 12.5 or 25/2
+text:8:32: error: `;` is not expected here; expected `]`
+text:9:1: error: `@@@` is not expected here; expected `parameter`, `durative-action instance`, \
 `action instance` or `c:`"
     );
 }
@@ -146,12 +148,16 @@ line 9, column 1: `@@@` is not expected here: expected `parameter`, `durative-ac
 fn a_mistake_shows_its_line() {
     let errors = read(
         b"# \xff is no UTF-8\naction instance b : (beeep);",
-        &mut rover(),
+        &rover(),
     )
     .unwrap_err();
-    let error = &errors.errors[0];
-    assert_eq!((error.line, error.column, error.length), (2, 22, 5));
-    assert_eq!(error.excerpt, "action instance b : (beeep);");
+    let error = errors.errors().next().expect("a mistake");
+    assert_eq!((error.line(), error.column(), error.length()), (2, 22, 5));
+    assert!(
+        error
+            .render(false)
+            .contains("2 | action instance b : (beeep);")
+    );
 }
 
 #[test]
@@ -164,14 +170,14 @@ c: m.start - .zero in [inf, inf];";
     assert_eq!(
         refused(text),
         "\
-line 2, column 45: two instances are labelled `b`: labels must differ
-line 3, column 38: two parameters are called `speed`: names must differ
-line 3, column 65: `7` cannot be a parameter's name: choose another name
-line 4, column 4: there is no time point `n`: `n` takes time: write `n.start` or `n.end`
-line 4, column 8: there is no time point `b.end`: `b` is instantaneous: write `b`
-line 4, column 18: there is no parameter `sped`: did you mean `speed`?
-line 5, column 4: there is no time point `m.start`: did you mean `n.start`?
-line 5, column 24: this infinity is on the wrong side: nothing could satisfy it"
+text:2:45: error: two instances are labelled `b`; labels must differ
+text:3:38: error: two parameters are called `speed`; names must differ
+text:3:65: error: `7` cannot be a parameter's name; choose another name
+text:4:4: error: there is no time point `n`; `n` takes time: write `n.start` or `n.end`
+text:4:8: error: there is no time point `b.end`; `b` is instantaneous: write `b`
+text:4:18: error: there is no parameter `sped`; did you mean `speed`?
+text:5:4: error: there is no time point `m.start`; did you mean `n.start`?
+text:5:24: error: this infinity is on the wrong side: nothing could satisfy it"
     );
 }
 
@@ -180,15 +186,15 @@ fn open_numbers_of_the_domain_need_a_value() {
     let navigate = "durative-action instance n0 : (navigate);";
     assert_eq!(
         refused(navigate),
-        "line 1, column 1: the domain leaves `?s` open: add `parameter ?s default VALUE;`"
+        "text:1:1: error: the domain leaves `?s` open; add `parameter ?s default VALUE;`"
     );
     assert_eq!(
         refused(&format!("parameter ?s;{navigate}")),
-        "line 1, column 11: no nominal value of `?s` can be found: give `default`"
+        "text:1:11: error: no nominal value of `?s` can be found; give `default`"
     );
     assert_eq!(
         refused(&format!("parameter ?s default 3 ub 2;{navigate}")),
-        "line 1, column 11: the default 3 of `?s` is not in its range [0, 2]: \
+        "text:1:11: error: the default 3 of `?s` is not in its range [0, 2]; \
          change `default`, `lb` or `ub`"
     );
 }
@@ -218,7 +224,7 @@ c: b - cs1.end in [-inf, -0.5];
 
 #[test]
 fn timed_initials_are_written_as_absolute_times() {
-    let mut task = rover();
+    let task = rover();
     let mut plan = parsed("action instance a : (beep); action instance b : (beep);").plan;
     let (zero, a, b, timed) = (NodeId(0), NodeId(1), NodeId(2), NodeId(3));
     let mut add = |from, to, lower: &str, upper: Option<&str>| {
@@ -244,7 +250,7 @@ c: a - .zero in [0, 99];
 c: b - .zero in [100.001, 107];
 "
     );
-    let again = read(text.as_bytes(), &mut task).unwrap();
+    let again = read(text.as_bytes(), &task).unwrap();
     assert_eq!(write(&task, &again).unwrap(), text);
 }
 
@@ -268,4 +274,15 @@ fn what_the_format_cannot_say_is_refused() {
     plan.plan.instances[0].label = "a b".to_owned();
     let name = "a b".to_owned();
     assert_eq!(write(&task, &plan), Err(WriteError::Name { name }));
+}
+
+#[test]
+fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
+    let text = "action instance b : (beep);
+c: b - .zero in [9, 8];";
+    assert_eq!(
+        refused(text),
+        "text:2:18: error: nothing lies between 9 and 8; the lower bound stands first, and is not \
+         above the upper one"
+    );
 }

@@ -1,6 +1,4 @@
-//! Words and marks of an STN plan file, and mistakes by position.
-
-use super::FormatError;
+//! Words and marks of an STN plan file.
 
 /// A stretch of the text, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,6 +14,12 @@ impl Span {
             start: self.start,
             end: other.end,
         }
+    }
+}
+
+impl From<Span> for elbowroom_text::Span {
+    fn from(span: Span) -> Self {
+        span.start..span.end
     }
 }
 
@@ -63,64 +67,4 @@ pub(crate) fn tokens(text: &str) -> Vec<Token<'_>> {
         rest = &rest[length..];
     }
     tokens
-}
-
-/// The mistakes found so far.
-#[derive(Debug, Default)]
-pub(super) struct Mistakes {
-    found: Vec<(Span, String, Option<String>)>,
-}
-
-impl Mistakes {
-    /// More mistakes than anybody reads are not kept.
-    const MOST: usize = 100;
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.found.is_empty()
-    }
-
-    /// Notes what is wrong where, and what would be right.
-    pub(super) fn add(
-        &mut self,
-        span: Span,
-        message: impl Into<String>,
-        expected: impl Into<Option<String>>,
-    ) {
-        if self.found.len() < Self::MOST {
-            self.found.push((span, message.into(), expected.into()));
-        }
-    }
-
-    /// The mistakes in order of position, with lines and columns.
-    pub(super) fn located(mut self, text: &str) -> Vec<FormatError> {
-        self.found.sort_by_key(|(span, ..)| *span);
-        let mut line_starts = vec![0];
-        line_starts.extend(text.match_indices('\n').map(|(at, _)| at + 1));
-        self.found
-            .into_iter()
-            .map(|(span, message, expected)| {
-                let line = line_starts.partition_point(|&start| start <= span.start);
-                let line_start = line_starts[line - 1];
-                let line_text = text[line_start..].lines().next().unwrap_or_default();
-                let line_end = line_start + line_text.len();
-                let marked = &text[span.start..span.end.min(line_end).max(span.start)];
-                FormatError {
-                    line,
-                    column: text[line_start..span.start].chars().count() + 1,
-                    length: marked.chars().count(),
-                    excerpt: around(line_text, span.start.min(line_end) - line_start),
-                    message,
-                    expected,
-                }
-            })
-            .collect()
-    }
-}
-
-/// The line, or, if it is very long, what stands around the byte at `at`.
-fn around(line: &str, at: usize) -> String {
-    const REACH: usize = 80;
-    let before = line[..at].char_indices().rev().nth(REACH - 1);
-    let from = before.map_or(0, |(index, _)| index);
-    line[from..].chars().take(2 * REACH).collect()
 }

@@ -1,7 +1,9 @@
 //! Constants in a ground action: where they stand, and parameters in their place.
 
 use elbowroom_model::Task;
-use elbowroom_model::ground::{Action, Body, Change, Condition, Effect, Expression, SnapAction};
+use elbowroom_model::ground::{
+    Action, Body, Change, Condition, Effect, Expression, FluentId, SnapAction,
+};
 use elbowroom_model::problem::{self, FunctionId, Unknown};
 use elbowroom_num::Rational;
 
@@ -22,6 +24,20 @@ pub(super) fn constants(task: &Task, action: &Action, place: Place) -> Vec<Ratio
     let _ = rewritten(task, action, place, &mut |leaf| {
         if let Expression::Constant(value) = leaf {
             found.push(value.clone());
+        }
+        None
+    });
+    found.sort();
+    found.dedup();
+    found
+}
+
+/// The fluents that are read there.
+pub(super) fn fluents(task: &Task, action: &Action, place: Place) -> Vec<FluentId> {
+    let mut found = Vec::new();
+    let _ = rewritten(task, action, place, &mut |leaf| {
+        if let Expression::Fluent(fluent) = leaf {
+            found.push(*fluent);
         }
         None
     });

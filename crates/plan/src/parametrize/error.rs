@@ -11,6 +11,16 @@ pub enum ParametrizeError {
         /// What would have been right.
         expected: String,
     },
+    /// There is no such kind of quantity.
+    #[error("`--vary {spec}`: there is no kind of quantity `{name}`{}", suggestion(.nearest.as_ref()))]
+    UnknownKind {
+        /// The text.
+        spec: String,
+        /// The word that stands where a kind is expected.
+        name: String,
+        /// A similar kind that there is.
+        nearest: Option<String>,
+    },
     /// A name means nothing in the domain, the problem or the plan.
     #[error("`--vary {spec}`: there is no {kind} `{name}`{}", suggestion(.nearest.as_ref()))]
     UnknownName {

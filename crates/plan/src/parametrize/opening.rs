@@ -9,7 +9,7 @@ use elbowroom_num::{End, Interval, Rational};
 use super::constants::Place;
 use super::{ParametrizeError, Target, VarySpec, select};
 use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
-use crate::stn_plan::InstanceId;
+use crate::stn_plan::{Bound, InstanceId, NodeId, Reason};
 use crate::unknowns::{self, OpenNumber};
 
 /// A quantity that at most one parameter stands for.
@@ -184,6 +184,25 @@ impl<'a> Opening<'a> {
             }
         }
         unknowns::fill(&mut plan.plan, &mut plan.goal, &self.open_numbers);
+        self.plan.told = self.told();
         Ok(self.plan)
+    }
+
+    /// How long those actions are planned to take that the executor tells how long to.
+    fn told(&self) -> BTreeMap<InstanceId, Rational> {
+        let plan = &self.plan.plan;
+        let told = plan.constraints.iter().filter_map(|constraint| {
+            let Reason::Duration(id) = constraint.reason else {
+                return None;
+            };
+            let is_left_open = constraint.lower != constraint.upper;
+            let is_parameter = |bound: &Bound| bound.parameter().is_some();
+            if !is_left_open || is_parameter(&constraint.lower) || is_parameter(&constraint.upper) {
+                return None;
+            }
+            let time = |node: NodeId| &self.nominal[node.index()];
+            Some((id, time(plan.end(id)) - time(plan.start(id))))
+        });
+        told.collect()
     }
 }

@@ -1,14 +1,15 @@
 //! Opening durations, constants, initial values and the times of timed initials.
 
 use elbowroom_model::Footprint;
-use elbowroom_model::problem::FunctionId;
+use elbowroom_model::ground::FluentId;
+use elbowroom_model::problem::{Comparison, FunctionId};
 use elbowroom_num::Rational;
 
 use super::constants::{self, Place};
 use super::opening::{Opening, Quantity};
 use super::{ConstantTarget, ParametrizeError, VarySpec, nothing, select};
 use crate::parameter::{Parameter, ParameterId, ParameterKind};
-use crate::stn_plan::{Bound, Constraint, InstanceId, NodeId, Reason};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason};
 
 impl Opening<'_> {
     pub(super) fn open_durations(
@@ -82,11 +83,18 @@ impl Opening<'_> {
                 (Some(value), _) if found.contains(value) => value.clone(),
                 (None, [value]) => value.clone(),
                 (_, []) | (Some(_), _) => {
-                    let why = format!(
+                    let mut why = format!(
                         "`{}` has no such number for `{function}`{}",
                         instance.action.name,
                         select::listed(", only ", &found)
                     );
+                    let read = constants::fluents(self.task, &instance.action, place);
+                    // That the function itself is read does not say how much it changes.
+                    let mut others = read.into_iter();
+                    if let Some(other) = others.find(|fluent| self.names_other(*fluent, target)) {
+                        let name = self.task.fluent_name(other);
+                        why = format!("{why}; {name} says how much: `initial {name}`");
+                    }
                     return Err(nothing(spec, why));
                 }
                 (None, several) => {
@@ -123,6 +131,28 @@ impl Opening<'_> {
         Ok(())
     }
 
+    /// Whether a fluent is not of the target's function.
+    fn names_other(&self, fluent: FluentId, target: &ConstantTarget) -> bool {
+        let function = self.task.problem().function(&target.function);
+        Some(self.task.function_of(fluent)) != function
+    }
+
+    /// An action whose duration is whatever the fluent is at time 0.
+    fn lasts(&self, fluent: FluentId) -> Option<&str> {
+        let mut instances = self.plan.plan.instances.iter();
+        let reads = |instance: &&Instance| {
+            instance.action.durative().is_some_and(|body| {
+                body.duration.iter().any(|constraint| {
+                    let mut is_read = false;
+                    let bound = &constraint.bound;
+                    bound.visit_fluents(&mut |other| is_read |= other == fluent);
+                    is_read && constraint.comparison == Comparison::Equal
+                })
+            })
+        };
+        instances.find(reads).map(|instance| &*instance.action.name)
+    }
+
     pub(super) fn open_initial(
         &mut self,
         spec: &VarySpec,
@@ -133,6 +163,13 @@ impl Opening<'_> {
             let why = format!("{} has no initial value", self.task.fluent_name(fluent));
             return Err(nothing(spec, why));
         };
+        if let Some(action) = self.lasts(fluent) {
+            let why = format!(
+                "the duration of {action} is {}, and the plan fixes it; vary `duration {action}`",
+                self.task.fluent_name(fluent)
+            );
+            return Err(nothing(spec, why));
+        }
         let name = format!("initial_{}", joined(atom));
         let kind = ParameterKind::Initial(fluent);
         let id = self.parameter(spec, Quantity::Initial(fluent), name, kind, value)?;
@@ -183,7 +220,7 @@ impl Opening<'_> {
             let constraint = Constraint {
                 from: plan.timed(first),
                 to: plan.timed(second),
-                lower: Bound::Finite(gap.min(Rational::new(1, 1000))),
+                lower: Bound::Finite(gap.min(self.task.epsilon().clone())),
                 upper: Bound::Infinite,
                 reason: Reason::Interference,
             };

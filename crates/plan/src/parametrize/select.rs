@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use super::{ParametrizeError, Selection, VarySpec, nothing};
 use crate::stn_plan::{InstanceId, StnPlan};
-use crate::suggestion::nearest;
+use elbowroom_text::nearest;
 
 /// The instances meant; at least one.
 pub(super) fn instances(

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use elbowroom_num::Rational;
+use elbowroom_text::nearest;
 
 use super::ParametrizeError;
 use crate::format::{Limit, Token, limit, tokens};
@@ -107,12 +108,23 @@ impl FromStr for VarySpec {
                     spec.weight = Some(weight.ok_or_else(|| words.wrong("a positive weight"))?);
                 }
                 "in" => spec.range = Some(words.range()?),
-                _ => return Err(words.wrong("`weight W`, `in [LB, UB]` or nothing more")),
+                _ => return Err(words.surplus(&spec.target, word)),
             }
         }
         Ok(spec)
     }
 }
+
+/// The words with which a specification begins.
+const KINDS: [&str; 7] = [
+    "duration",
+    "controllable",
+    "constant",
+    "condition",
+    "initial",
+    "deadline",
+    "timed",
+];
 
 /// The words not read yet.
 struct Words<'a> {
@@ -280,6 +292,31 @@ impl<'a> Words<'a> {
 
     fn skip(&mut self) {
         self.tokens = self.tokens.get(1..).unwrap_or_default();
+    }
+
+    /// What is wrong with a word after everything that is read.
+    fn surplus(&self, target: &Target, word: &str) -> ParametrizeError {
+        match target {
+            // No action is followed by a list, or by a name.
+            Target::Duration(Selection::Named(name))
+                if word == "(" || is_word(word) && nearest(name, KINDS).is_some() =>
+            {
+                ParametrizeError::UnknownKind {
+                    spec: self.text.trim().to_owned(),
+                    name: name.clone(),
+                    nearest: nearest(name, KINDS).map(str::to_owned),
+                }
+            }
+            Target::Initial(atom) | Target::Timed { atom, .. }
+                if atom.len() == 1 && is_word(word) && !self.text.contains('(') =>
+            {
+                let mut words = self.text.split_whitespace();
+                let kind = words.next().unwrap_or_default();
+                let atom: Vec<&str> = words.collect();
+                self.wrong(&format!("parentheses, as in `{kind} ({})`", atom.join(" ")))
+            }
+            _ => self.wrong("`weight W`, `in [LB, UB]` or nothing more"),
+        }
     }
 
     fn wrong(&self, expected: &str) -> ParametrizeError {

@@ -14,9 +14,9 @@ fn plan() -> (StnPlan, Vec<Rational>) {
         durative-action instance n2 : (refuel s2);
         action instance n3 : (beep);
         parameter n2.?r default 4;";
-    let mut plan = format::read(text.as_bytes(), &mut rover()).unwrap().plan;
+    let mut plan = format::read(text.as_bytes(), &rover()).unwrap().plan;
     // As if nothing had read the file: the refuelling's number is open again.
-    let mut task = rover();
+    let task = rover();
     for instance in &mut plan.instances {
         let action = &instance.action;
         instance.action = task.instantiate(action.schema, &action.arguments).unwrap();

@@ -4,12 +4,11 @@ use elbowroom_model::TimeTriggeredPlan;
 use elbowroom_num::Rational;
 
 use super::compile::Unsupported;
+use super::tuning::Tuning;
 
 /// How to plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How far apart interfering happenings must be, in the domain's unit of time; positive.
-    pub epsilon: Rational,
     /// About how many bytes the search may keep. When they are used up, the search ends as if it
     /// had been interrupted.
     pub max_memory: usize,
@@ -18,6 +17,8 @@ pub struct Settings {
     pub first_plan_only: bool,
     /// What makes a plan better than another.
     pub objective: Objective,
+    /// The constants of the search.
+    pub tuning: Tuning,
 }
 
 /// What makes a plan better than another.
@@ -32,13 +33,13 @@ pub enum Objective {
 }
 
 impl Default for Settings {
-    /// ε is 0.001, memory 2 GiB, any number of plans, the problem's own metric.
+    /// Memory 2 GiB, any number of plans, the problem's own metric.
     fn default() -> Self {
         Self {
-            epsilon: Rational::new(1, 1000),
             max_memory: 2 << 30,
             first_plan_only: false,
             objective: Objective::Metric,
+            tuning: Tuning::default(),
         }
     }
 }
@@ -64,7 +65,7 @@ pub enum Phase {
     #[default]
     Grounding,
     /// Searching for a first plan, quickly and not everywhere.
-    Hasty,
+    Incomplete,
     /// Searching everywhere.
     Complete,
     /// Looking for better plans.

@@ -8,12 +8,13 @@ mod places;
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
+use super::bound::MetricBound;
 use super::compile::{Compiled, NONE};
+use super::expressions::{Form, Moment};
 use super::formula::set;
 use super::network::{NodeId, SETTLED};
-use super::search::Limit;
 use super::state::{Open, State};
-use super::symbolic::{self, Form, Moment};
+use super::symbolic;
 use super::time::{NEVER, Ticks};
 use durations::demand_duration;
 use places::{forget_past, insert, reach_foreseen_end, reach_timed, settle};
@@ -24,7 +25,7 @@ pub(crate) enum Step {
     /// The action starts, or happens if it takes no time.
     Start(u32),
     /// The action starts, and ends before anything else in the order of happenings.
-    Whole(u32),
+    Compressed(u32),
     /// The action at that place among those under way ends.
     End(u32),
     /// The next timed initials happen.
@@ -38,7 +39,7 @@ pub(crate) struct Stepper<'a> {
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
     /// What a plan must be better than, where that depends on times.
-    pub(crate) limit: Option<Limit>,
+    pub(crate) limit: Option<MetricBound>,
     /// If present, all happenings stay in the network, to be read off at the end, and what is
     /// needed to compute their times exactly is noted here.
     pub(crate) log: Option<Log>,
@@ -71,7 +72,7 @@ impl<'a> Stepper<'a> {
     /// The state after the step, if the step is possible.
     pub(crate) fn apply(&mut self, state: &State, step: Step) -> Option<State> {
         // Most impossible steps are seen without a copy.
-        if let Step::Start(action) | Step::Whole(action) = step {
+        if let Step::Start(action) | Step::Compressed(action) = step {
             let action = self.compiled.action(action);
             let snap = self.compiled.snap(action.start);
             if !snap
@@ -94,7 +95,7 @@ impl<'a> Stepper<'a> {
             Step::Start(action) => {
                 self.start(state, action)?;
             }
-            Step::Whole(action) => {
+            Step::Compressed(action) => {
                 let place = self.start(state, action)?;
                 self.keeps_conditions(state)?;
                 self.end(state, place)?;
@@ -295,9 +296,9 @@ impl<'a> Stepper<'a> {
                 state.values[*fluent as usize] = Some(value.clone());
             }
         }
-        for &stamp in &timed.marks {
-            let stamp = &mut state.stamps[stamp as usize];
-            *stamp = (*stamp).max(timed.time);
+        for &annotation in &timed.marks {
+            let annotation = &mut state.annotations[annotation as usize];
+            *annotation = (*annotation).max(timed.time);
         }
         state.derive(self.compiled);
         Some(())

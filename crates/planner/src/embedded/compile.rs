@@ -2,17 +2,17 @@
 //!
 //! Every action becomes one or two *snaps* (Fox & Long's name for starts, ends and instants);
 //! facts, fluents and tests become small numbers; and what keeps happenings apart becomes a list
-//! of *stamps*. A stamp is the latest time at which something of a kind happened, such as "fact 7
-//! was read". Each snap says which stamps it must keep what distance from, and which ones it sets;
+//! of *annotations* (POPF; Coles, Coles, Fox & Long, ICAPS 2010). An annotation is the latest time at which something of a kind happened, such as "fact 7
+//! was read". Each snap says which annotations it must keep what distance from, and which ones it sets;
 //! so the order that PDDL's no-moving-targets rule and over-all conditions ask for is settled
 //! here once, and the search only takes maxima.
 
+mod beginning;
 mod builder;
+mod completeness;
+mod compressibility;
+mod compression;
 mod directions;
-mod eager;
-mod eagerness;
-mod gaps;
-mod initial;
 mod interference;
 mod metric;
 mod reads;
@@ -26,13 +26,14 @@ use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::problem::{Comparison, ObjectId, SchemaId, UpdateOperator};
 use elbowroom_num::Rational;
 
+pub(crate) use beginning::Beginning;
 pub(crate) use builder::{Failure, Wanted, compile};
 pub(crate) use metric::Metric;
 pub use unsupported::Unsupported;
 
 use super::formula::{Formula, Numeric, Test};
-use super::state::State;
 use super::time::{Scale, Ticks};
+use super::tuning::Tuning;
 
 /// No snap, action or the like.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -42,7 +43,9 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Compiled {
     pub(crate) scale: Scale,
     pub(crate) epsilon: Ticks,
-    /// The longest distance from any stamp.
+    /// How it is searched.
+    pub(crate) tuning: Tuning,
+    /// The longest distance from any annotation.
     pub(crate) longest_distance: Ticks,
     /// When the situation is; nothing new happens earlier.
     pub(crate) now: Ticks,
@@ -53,11 +56,11 @@ pub(crate) struct Compiled {
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,
-    /// For each fact the stamps of its latest addition and deletion; [`NONE`] if nothing waits for
+    /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits for
     /// them.
-    pub(crate) fact_stamps: Vec<[u32; 2]>,
-    /// How many stamps there are.
-    pub(crate) stamp_count: usize,
+    pub(crate) fact_annotations: Vec<[u32; 2]>,
+    /// How many annotations there are.
+    pub(crate) annotation_count: usize,
     /// The timed initials to come, by time.
     pub(crate) timed: Vec<Timed>,
     pub(crate) goal: Formula,
@@ -69,14 +72,14 @@ pub(crate) struct Compiled {
     pub(crate) strata: Vec<Vec<Rule>>,
     /// The derived facts, by stratum.
     pub(crate) derived: Vec<Vec<u32>>,
-    pub(crate) initial: State,
+    pub(crate) beginning: Beginning,
     /// Whether all of this is exact, so that a search that finds nothing proves something.
     pub(crate) is_exact: bool,
     /// Whether an instance of some action could be needed that this form cannot express; also an
     /// obstacle to proofs. Says why.
-    pub(crate) gap: Option<&'static str>,
+    pub(crate) incomplete_because: Option<&'static str>,
     /// The same for a form in which numbers, and what is reached once, are never lost.
-    pub(crate) relaxed_gap: Option<&'static str>,
+    pub(crate) relaxation_incomplete_because: Option<&'static str>,
     /// Whether some value depends on when things happen.
     pub(crate) is_symbolic: bool,
 }
@@ -89,11 +92,11 @@ pub(crate) struct Snap {
     pub(crate) deletes: Vec<u32>,
     pub(crate) updates: Vec<Update>,
     pub(crate) conditional: Vec<Conditional>,
-    /// What it adds to [`State::cost`].
+    /// What it adds to `State::cost`.
     pub(crate) cost: Option<Numeric>,
-    /// Stamps, and how long after them this must happen.
+    /// Annotations, and how long after them this must happen.
     pub(crate) after: Vec<(u32, Ticks)>,
-    /// Stamps that this sets.
+    /// Annotations that this sets.
     pub(crate) marks: Vec<u32>,
     /// Timed initials, and how long before them this must happen if it comes first; ascending.
     pub(crate) before_timed: Vec<(u32, Ticks)>,
@@ -122,7 +125,7 @@ pub(crate) enum Change {
     Add(u32),
     Delete(u32),
     Update(Update),
-    /// Something is added to [`State::cost`].
+    /// Something is added to `State::cost`.
     Cost(Numeric),
 }
 
@@ -142,25 +145,29 @@ pub(crate) struct Action {
     pub(crate) flows: Vec<Flow>,
     /// Timed initials that would break the over-all condition while the action runs; ascending.
     pub(crate) breaking_timed: Vec<u32>,
-    /// What is lost if it ends as soon as it has started, as far as the order of happenings goes.
-    pub(crate) eagerness: Eagerness,
-    /// Whether its end only adds facts that matter where they are true; see `eager`.
-    pub(crate) only_adds_at_end: bool,
+    /// Whether a search may compress it.
+    pub(crate) compressibility: Compressibility,
+    /// Whether its end only adds facts that matter where they are true; see `compression`.
+    pub(crate) is_compression_safe: bool,
     /// Whether it cannot start while another instance of it runs.
     pub(crate) excludes_itself: bool,
     /// Whether something reads `?duration`, or changes continuously.
     pub(crate) uses_duration: bool,
 }
 
-/// What is lost if an action ends before anything else happens, in the order of happenings.
+/// How much is lost by *compressing* an action: ending it before anything else happens, in the order
+/// of happenings (compression-safe actions; Coles, Coles, Fox & Long, ICAPS 2009). The safer ones come
+/// later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Eagerness {
-    /// What it offers to others while it runs.
-    Offers,
-    /// That others use what is left of the quantity from which it borrows while it runs.
-    Lends,
+pub(crate) enum Compressibility {
+    /// Others may need what it offers while it runs: it is an envelope (Coles, Fox, Halsey, Long &
+    /// Smith, "Managing concurrency in temporal planning", AIJ 173, 2009).
+    Envelope,
+    /// Others can use only what it leaves of a quantity: it takes some at its start and gives it back
+    /// at its end (a renewable resource; Laborie, AIJ 143, 2003).
+    HoldsResource,
     /// Little.
-    Free,
+    Safe,
 }
 
 /// How long an action may take.
@@ -211,7 +218,7 @@ pub(crate) struct Rule {
 impl Compiled {
     /// Whether a goal that is out of reach of a relaxation is out of reach.
     pub(crate) fn is_relaxation_exact(&self) -> bool {
-        self.is_exact && self.relaxed_gap.is_none()
+        self.is_exact && self.relaxation_incomplete_because.is_none()
     }
 
     /// The snap of that number.

@@ -4,10 +4,11 @@ use elbowroom_model::validate::{self, Verdict};
 use elbowroom_model::{Situation, Step as PlanStep, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
 
-use super::answer::Settings;
 use super::apply::{Log, Step, Stepper};
 use super::compile::{Compiled, NONE};
 use super::network::{Network, NodeId, SETTLED};
+use super::root::root;
+use super::state::State;
 use super::symbolic;
 use super::time::NEVER;
 
@@ -22,94 +23,129 @@ struct Timing {
 
 /// The plan that the choices stand for, everything as early as possible; `None` if the judge does
 /// not find it valid.
-#[allow(
-    clippy::too_many_lines,
-    reason = "replays the choices, then reads off the plan"
-)]
 pub(crate) fn plan_of(
-    task: &mut Task,
+    task: &Task,
     situation: &Situation,
     compiled: &Compiled,
     steps: &[Step],
-    settings: &Settings,
 ) -> Option<(TimeTriggeredPlan, validate::Report)> {
-    let mut stepper = Stepper::new(compiled);
-    stepper.log = Some(Log::default());
-    let mut state = compiled.initial.clone();
-    let under_way = situation.running.len();
-    let mut timings: Vec<Timing> = (0..under_way)
-        .map(|number| Timing {
-            action: u32::try_from(number).unwrap_or(NONE),
-            start: None,
-            end: None,
-        })
-        .collect();
-    // For each action under way, its step.
-    let mut open: Vec<usize> = (0..under_way).collect();
+    let mut replay = Replay::new(compiled);
     for &step in steps {
-        let node = NodeId::try_from(state.network.node_count()).ok()?;
-        let foreseen_end = match step {
-            Step::End(place) => state.open[place as usize].end,
-            _ => SETTLED,
-        };
-        let ended = match step {
-            Step::End(place) => Some(open.remove(place as usize)),
-            _ => None,
-        };
-        stepper.advance(&mut state, step)?;
-        match step {
-            Step::Start(action) | Step::Whole(action) => {
-                let place = state.open.iter().position(|open| open.node == node);
-                let is_whole = matches!(step, Step::Whole(_));
-                timings.push(Timing {
-                    action,
-                    start: Some(node),
-                    end: is_whole.then_some(node + 1),
-                });
-                if let Some(place) = place {
-                    open.insert(place, timings.len() - 1);
-                }
-            }
-            Step::End(_) => {
-                let node = if foreseen_end == SETTLED {
-                    node
-                } else {
-                    foreseen_end
-                };
-                timings[ended?].end = Some(node);
-            }
-            Step::Timed => {}
-        }
+        replay.take(step)?;
     }
-    if state.symbolic.is_some() {
-        stepper.reach_goal(&mut state)?;
+    if replay.state.symbolic.is_some() {
+        replay.stepper.reach_goal(&mut replay.state)?;
     }
-    // The goal may need a timed initial that comes after all else: then something must wait.
-    let needed = compiled
-        .goal_timed
-        .iter()
-        .filter(|&&timed| timed < state.timed)
-        .map(|&timed| compiled.timed[timed as usize].time)
-        .max()
-        .unwrap_or(-NEVER);
-    if state.earliest_end() < needed {
-        let mut nodes = (0..state.network.node_count()).rev();
-        state.network = nodes.find_map(|node| {
-            let mut network = state.network.clone();
-            let node = NodeId::try_from(node).ok()?;
-            network.delay(node, needed).ok().map(|()| network)
-        })?;
-    }
+    replay.wait_for_timed()?;
+    let Replay {
+        stepper,
+        state,
+        timings,
+        ..
+    } = replay;
     let log = stepper.log.as_ref()?;
     let times = if state.symbolic.is_none() {
-        exact_times(compiled, &state.network, log, settings)?
+        exact_times(compiled, &state.network, log, task.epsilon())?
     } else {
         let exact = exact_distances(log);
         symbolic::solve(&state, compiled.scale, &exact, compiled.metric.as_ref())?
     };
+    let plan = written(task, situation, compiled, &timings, &times)?;
+    match validate_from(task, situation, &plan, &validate::Settings::default()) {
+        Verdict::Valid(report) => Some((plan, report)),
+        Verdict::Invalid(_) | Verdict::Undecided(_) => None,
+    }
+}
+
+/// Takes the choices again, and remembers which node is which happening.
+struct Replay<'a> {
+    stepper: Stepper<'a>,
+    state: State,
+    timings: Vec<Timing>,
+    /// For each action under way, its timing.
+    open: Vec<usize>,
+}
+
+impl<'a> Replay<'a> {
+    fn new(compiled: &'a Compiled) -> Self {
+        let mut stepper = Stepper::new(compiled);
+        stepper.log = Some(Log::default());
+        let under_way = compiled.beginning.running.len();
+        let timings = (0..).take(under_way).map(|action| Timing {
+            action,
+            start: None,
+            end: None,
+        });
+        Self {
+            stepper,
+            state: root(compiled),
+            timings: timings.collect(),
+            open: (0..under_way).collect(),
+        }
+    }
+
+    fn take(&mut self, step: Step) -> Option<()> {
+        let node = NodeId::try_from(self.state.network.node_count()).ok()?;
+        let (ended, foreseen_end) = match step {
+            Step::End(place) => {
+                let place = place as usize;
+                (Some(self.open.remove(place)), self.state.open[place].end)
+            }
+            _ => (None, SETTLED),
+        };
+        self.stepper.advance(&mut self.state, step)?;
+        match step {
+            Step::Start(action) | Step::Compressed(action) => {
+                let place = self.state.open.iter().position(|open| open.node == node);
+                let is_compressed = matches!(step, Step::Compressed(_));
+                self.timings.push(Timing {
+                    action,
+                    start: Some(node),
+                    end: is_compressed.then_some(node + 1),
+                });
+                if let Some(place) = place {
+                    self.open.insert(place, self.timings.len() - 1);
+                }
+            }
+            Step::End(_) => {
+                let is_new = foreseen_end == SETTLED;
+                self.timings[ended?].end = Some(if is_new { node } else { foreseen_end });
+            }
+            Step::Timed => {}
+        }
+        Some(())
+    }
+
+    /// The goal may need a timed initial that comes after all else: then something must wait.
+    fn wait_for_timed(&mut self) -> Option<()> {
+        let (compiled, state) = (self.stepper.compiled, &mut self.state);
+        let goals = compiled.goal_timed.iter();
+        let past = goals.filter(|&&timed| timed < state.timed);
+        let times = past.map(|&timed| compiled.timed[timed as usize].time);
+        let needed = times.max().unwrap_or(-NEVER);
+        if state.earliest_end() < needed {
+            let mut nodes = (0..state.network.node_count()).rev();
+            state.network = nodes.find_map(|node| {
+                let mut network = state.network.clone();
+                let node = NodeId::try_from(node).ok()?;
+                network.delay(node, needed).ok().map(|()| network)
+            })?;
+        }
+        Some(())
+    }
+}
+
+/// The plan with these times of its nodes.
+fn written(
+    task: &Task,
+    situation: &Situation,
+    compiled: &Compiled,
+    timings: &[Timing],
+    times: &[Rational],
+) -> Option<TimeTriggeredPlan> {
+    let at = |node: NodeId| times[node as usize].clone();
     let mut plan = TimeTriggeredPlan::default();
     for (number, timing) in timings.iter().enumerate() {
-        let at = |node: NodeId| times[node as usize].clone();
         if let Some(running) = situation.running.get(number) {
             let duration = at(timing.end?) - &running.start;
             plan.steps.push(running.step(duration));
@@ -128,15 +164,8 @@ pub(crate) fn plan_of(
             duration,
         });
     }
-    plan.steps[under_way..].sort_by(|a, b| a.start.cmp(&b.start));
-    let strictness = validate::Settings {
-        epsilon: Some(settings.epsilon.clone()),
-        ..validate::Settings::default()
-    };
-    match validate_from(task, situation, &plan, &strictness) {
-        Verdict::Valid(report) => Some((plan, report)),
-        Verdict::Invalid(_) | Verdict::Undecided(_) => None,
-    }
+    plan.steps[situation.running.len()..].sort_by(|a, b| a.start.cmp(&b.start));
+    Some(plan)
 }
 
 /// The distances between starts and ends, exactly.
@@ -158,7 +187,7 @@ fn exact_times(
     compiled: &Compiled,
     network: &Network,
     log: &Log,
-    settings: &Settings,
+    epsilon: &Rational,
 ) -> Option<Vec<Rational>> {
     let scale = compiled.scale;
     let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
@@ -166,7 +195,7 @@ fn exact_times(
         .ends
         .iter()
         .all(|(_, _, least, most)| is_on_grid(least) && most.as_ref().is_none_or(is_on_grid));
-    let is_exact = are_durations_on_grid && compiled.is_exact && is_on_grid(&settings.epsilon);
+    let is_exact = are_durations_on_grid && compiled.is_exact && is_on_grid(epsilon);
     if is_exact {
         let nodes = 0..network.node_count();
         return nodes
@@ -191,7 +220,7 @@ fn exact_times(
         .map(|(from, to, distance)| {
             let exact = of_end(from, to).unwrap_or_else(|| {
                 if distance == compiled.epsilon {
-                    settings.epsilon.clone()
+                    epsilon.clone()
                 } else {
                     scale.units(distance)
                 }

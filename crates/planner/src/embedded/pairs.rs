@@ -142,7 +142,7 @@ impl<'a> Pairs<'a> {
 
     /// Whether no plan can begin like this: the goal, with all that is under way over, comes too
     /// late, or never.
-    pub(crate) fn is_hopeless(&mut self, state: &State) -> bool {
+    pub(crate) fn is_dead_end(&mut self, state: &State) -> bool {
         let ended = self.prepare(state);
         loop {
             self.round += 1;
@@ -215,13 +215,13 @@ impl<'a> Pairs<'a> {
             if !literal.holds(&state.facts) {
                 continue;
             }
-            let stamp =
-                compiled.fact_stamps[literal.fact() as usize][usize::from(!literal.truth())];
+            let annotation =
+                compiled.fact_annotations[literal.fact() as usize][usize::from(!literal.truth())];
             let mut time = compiled.now;
-            if stamp != NONE {
-                time = time.max(state.stamps[stamp as usize]);
+            if annotation != NONE {
+                time = time.max(state.annotations[annotation as usize]);
                 for &(marked, node) in &state.network.marks {
-                    if marked == stamp {
+                    if marked == annotation {
                         time = time.max(state.network.earliest(node));
                     }
                 }

@@ -3,10 +3,11 @@
 use elbowroom_model::Task;
 
 use super::answer::Proof;
-use super::compile::{Compiled, Eagerness};
+use super::compile::{Compiled, Compressibility};
 use super::formula::Literal;
 use super::pairs::Pairs;
 use super::relaxed::{Missing, Relaxed};
+use super::root::root;
 use super::time::Ticks;
 
 /// The most deadlines that are looked at one by one.
@@ -53,22 +54,23 @@ impl Names {
 /// A proof that no plan exists, if the goal is out of reach from the beginning even when nothing
 /// that was reached is ever lost.
 pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
-    let no_haste: Option<Eagerness> = None;
-    let mut relaxed = Relaxed::new(compiled, no_haste);
-    if relaxed.evaluate(&compiled.initial).is_some() {
+    let uncompressed: Option<Compressibility> = None;
+    let initial = root(compiled);
+    let mut relaxed = Relaxed::new(compiled, uncompressed);
+    if relaxed.evaluate(&initial).is_some() {
         return None;
     }
     let suspects = (0..relaxed.timetable_count()).map(|number| {
-        let mut copy = Relaxed::new(compiled, no_haste);
+        let mut copy = Relaxed::new(compiled, uncompressed);
         copy.ignore_timetable(number)
     });
     let suspects: Vec<_> = suspects.collect();
     let mut fails_without = |ignored: &[usize]| {
-        let mut without = Relaxed::new(compiled, no_haste);
+        let mut without = Relaxed::new(compiled, uncompressed);
         for &number in ignored {
             without.ignore_timetable(number);
         }
-        without.evaluate(&compiled.initial).is_none()
+        without.evaluate(&initial).is_none()
     };
     let missing = relaxed.missing_goals();
     Some(explained(
@@ -87,8 +89,9 @@ pub(crate) fn pairs_proof(
     compiled: &Compiled,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Option<Proof> {
+    let initial = root(compiled);
     let mut pairs = Pairs::of(compiled)?;
-    if !pairs.is_hopeless(&compiled.initial) {
+    if !pairs.is_dead_end(&initial) {
         return None;
     }
     let missing = pairs.missing_goals();
@@ -110,11 +113,11 @@ pub(crate) fn pairs_proof(
             .iter()
             .map(|&number| (number, pairs.ignore_timetable(number)))
             .collect();
-        let is_hopeless = pairs.is_hopeless(&compiled.initial);
+        let is_dead_end = pairs.is_dead_end(&initial);
         for (number, spans) in kept {
             pairs.restore_timetable(number, spans);
         }
-        is_hopeless
+        is_dead_end
     };
     Some(explained(
         names,

@@ -8,29 +8,29 @@
 //! numeric effects are taken to reach any value at once. So a state without relaxed plan has no
 //! plan.
 
+mod consumables;
 mod deadlines;
 mod graph;
 mod numbers;
 mod plan;
 mod resources;
-mod stocks;
 
 use super::apply::Step;
-use super::compile::{Compiled, Eagerness};
+use super::compile::{Compiled, Compressibility};
 use super::formula::Literal;
-use super::guide::Guide;
 use super::network::SETTLED;
 use super::spans::Spans;
 use super::state::{Open, State};
+use super::step_costs::StepCosts;
 use super::time::{NEVER, Ticks};
+use consumables::Consumables;
+pub(crate) use consumables::{Consumable, consumables};
 use deadlines::Deadlines;
 pub(crate) use deadlines::in_windows;
 pub(crate) use graph::Graph;
 use graph::Kind;
 use resources::Resources;
 pub(crate) use resources::floors;
-use stocks::Stocks;
-pub(crate) use stocks::{Stock, stocks};
 
 /// Beyond this, costs are all alike.
 const MOST: u32 = 1 << 15;
@@ -50,6 +50,8 @@ pub(crate) struct Estimate {
     pub(crate) applicable: Vec<Step>,
     /// Those among them that are in the relaxed plan.
     pub(crate) preferred: Vec<Step>,
+    /// The literals that the relaxed plan brings about, if they were asked for.
+    pub(crate) subgoals: Vec<Literal>,
 }
 
 /// Something that is out of reach.
@@ -79,22 +81,24 @@ pub(crate) struct Relaxed<'a> {
     applicable: Vec<u32>,
     deadlines: Deadlines,
     resources: Resources,
-    stocks: Stocks,
+    consumables: Consumables,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
     /// Whether what happens next happens no earlier than what was chosen last.
     pub(crate) is_chronological: bool,
+    /// Whether an estimate lists what its relaxed plan brings about.
+    pub(crate) lists_subgoals: bool,
 }
 
 impl<'a> Relaxed<'a> {
-    /// Actions that are at least as eager as `haste` count as one step.
-    pub(crate) fn new(compiled: &'a Compiled, haste: Option<Eagerness>) -> Self {
-        let graph = Graph::of(compiled, haste);
+    /// Actions that can be compressed at least as safely as `compresses` count as one step.
+    pub(crate) fn new(compiled: &'a Compiled, compresses: Option<Compressibility>) -> Self {
+        let graph = Graph::of(compiled, compresses);
         let (propositions, operators) = (graph.proposition_count, graph.operators.len());
         Self {
             compiled,
             resources: Resources::default(),
-            stocks: Stocks::default(),
+            consumables: Consumables::default(),
             cost: vec![UNREACHED; propositions],
             achiever: vec![NO_OPERATOR; propositions],
             repetitions: vec![1; propositions],
@@ -108,13 +112,14 @@ impl<'a> Relaxed<'a> {
             deadlines: Deadlines::default(),
             horizon: NEVER,
             is_chronological: false,
+            lists_subgoals: false,
             graph,
         }
     }
 
     /// From now on a step counts for what it costs, not for one.
-    pub(crate) fn weigh(&mut self, guide: &Guide) {
-        self.graph.weigh(guide);
+    pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
+        self.graph.weigh(step_costs);
     }
 
     /// From now on, what a relaxed plan uses up is counted, and filled up.
@@ -123,8 +128,8 @@ impl<'a> Relaxed<'a> {
     }
 
     /// From now on, a relaxed plan draws on what is never filled up.
-    pub(crate) fn draw_on_stocks(&mut self) {
-        self.stocks = Stocks::of(self.compiled, &self.graph);
+    pub(crate) fn count_consumables(&mut self) {
+        self.consumables = Consumables::of(self.compiled, &self.graph);
     }
 
     /// The number of operators.
@@ -210,6 +215,19 @@ impl<'a> Relaxed<'a> {
         Some(estimate)
     }
 
+    /// The steps that are applicable, without an estimate; `None` if what is under way cannot end in
+    /// time, as far as that was looked at.
+    pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
+        let is_in_time = self.prepare(state);
+        if is_in_time {
+            self.spread_at_cost_zero(state);
+        }
+        self.buckets.iter_mut().for_each(Vec::clear);
+        let mut estimate = Estimate::default();
+        self.list_applicable(state, &mut estimate);
+        is_in_time.then_some(estimate)
+    }
+
     /// Costs of what holds in the state. Whether all that is under way may end in time, as far as
     /// that was looked at.
     fn prepare(&mut self, state: &State) -> bool {
@@ -285,6 +303,26 @@ impl<'a> Relaxed<'a> {
 
     /// Dijkstra's algorithm from what holds.
     fn spread(&mut self, state: &State) {
+        self.fire_sources(state);
+        let mut cost = 0;
+        while cost < self.buckets.len() {
+            let Some(proposition) = self.buckets[cost].pop() else {
+                cost += 1;
+                continue;
+            };
+            self.reach(proposition, cost);
+        }
+    }
+
+    /// The same for what holds and what follows from it by rules.
+    fn spread_at_cost_zero(&mut self, state: &State) {
+        self.fire_sources(state);
+        while let Some(proposition) = self.buckets.first_mut().and_then(Vec::pop) {
+            self.reach(proposition, 0);
+        }
+    }
+
+    fn fire_sources(&mut self, state: &State) {
         for position in 0..self.graph.sources.len() {
             let operator = self.graph.sources[position];
             let is_past = matches!(
@@ -295,28 +333,25 @@ impl<'a> Relaxed<'a> {
                 self.fire(operator);
             }
         }
-        let mut cost = 0;
-        while cost < self.buckets.len() {
-            let Some(proposition) = self.buckets[cost].pop() else {
-                cost += 1;
-                continue;
-            };
-            #[allow(clippy::cast_possible_truncation, reason = "below MOST")]
-            let reached = cost as u32;
-            // Each cost that a proposition had is in the queue once; only the last one counts.
-            if self.cost[proposition as usize] != reached {
-                continue;
-            }
-            for position in self.graph.needing(proposition) {
-                let operator = self.graph.needing_list[position] as usize;
-                self.operator_cost[operator] = self.operator_cost[operator]
-                    .saturating_add(reached)
-                    .min(MOST);
-                self.missing[operator] -= 1;
-                if self.missing[operator] == 0 {
-                    #[allow(clippy::cast_possible_truncation, reason = "counted by u32")]
-                    self.fire(operator as u32);
-                }
+    }
+
+    /// The proposition's turn has come, at that cost.
+    fn reach(&mut self, proposition: u32, cost: usize) {
+        #[allow(clippy::cast_possible_truncation, reason = "below MOST")]
+        let reached = cost as u32;
+        // Each cost that a proposition had is in the queue once; only the last one counts.
+        if self.cost[proposition as usize] != reached {
+            return;
+        }
+        for position in self.graph.needing(proposition) {
+            let operator = self.graph.needing_list[position] as usize;
+            self.operator_cost[operator] = self.operator_cost[operator]
+                .saturating_add(reached)
+                .min(MOST);
+            self.missing[operator] -= 1;
+            if self.missing[operator] == 0 {
+                #[allow(clippy::cast_possible_truncation, reason = "counted by u32")]
+                self.fire(operator as u32);
             }
         }
     }

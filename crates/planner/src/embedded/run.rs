@@ -9,13 +9,16 @@ use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 
 use super::answer::{Answer, Counts, Found, Objective, Phase, Progress, Proof, Settings, Stopped};
 use super::apply::Step;
-use super::compile::{self, Compiled, Eagerness};
+use super::bound::MetricBound;
+use super::compile::{self, Compiled, Compressibility};
 use super::extract;
 use super::formula::Literal;
+use super::needless::without_needless;
 use super::reasons::{self, Names};
 use super::relaxed;
-use super::search::{Aim, Limit, PATIENCE, Search, Style, Turn};
+use super::search::{Aim, Search, Strategy, Turn};
 use super::symmetry::Symmetry;
+use super::tuning::{Member, Technique};
 
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
@@ -29,25 +32,13 @@ const REPORT_SYMBOLIC_TURNS: u64 = 8;
 /// The most turns between two reports.
 const REPORT_TURNS: u64 = 256;
 
-/// How many states the hasty search may look at before the complete one gets its first turns.
-const HASTE: u64 = 20_000;
-
-/// The same where hasty searches that count resources, and others that do not, take turns.
-const HASTE_WITH_RESOURCES: u64 = 2_048;
-
-/// The same where hasty searches and chronological ones take turns.
-const HASTE_WITH_CONCURRENCY: u64 = 4_096;
-
-/// How many turns the hasty search gets for each one of the complete search.
-const COMPLETE_SHARE: u64 = 8;
-
 pub(super) fn none_found(stopped: Stopped, counts: Counts) -> Answer {
     Answer::NoneFound { stopped, counts }
 }
 
 /// One run.
 pub(super) struct Planner<'a> {
-    pub(super) task: &'a mut Task,
+    pub(super) task: &'a Task,
     pub(super) situation: &'a Situation,
     pub(super) settings: &'a Settings,
     pub(super) observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
@@ -57,19 +48,19 @@ pub(super) struct Planner<'a> {
     pub(super) progress: Progress,
     pub(super) best: Option<Found>,
     /// Whether something is used up and filled up.
-    pub(super) has_resources: bool,
+    pub(super) has_reservoirs: bool,
 }
 
 impl Planner<'_> {
     pub(super) fn run(mut self) -> Answer {
         let compiled = self.compiled;
         let mut searches: Vec<Search<'_>> = self
-            .styles()
+            .strategies()
             .into_iter()
-            .map(|style| Search::new(compiled, self.symmetry, style))
+            .map(|strategy| Search::new(compiled, self.symmetry, strategy))
             .collect();
         let mut is_over = vec![false; searches.len()];
-        let mut stopped = match self.work(&mut searches[0], PATIENCE) {
+        let mut stopped = match self.work(&mut searches[0], compiled.tuning.root_check_after) {
             Outcome::Stop(stopped) => Some(stopped),
             Outcome::Better | Outcome::BudgetSpent => None,
             Outcome::Over => {
@@ -78,6 +69,7 @@ impl Planner<'_> {
             }
         };
         if self.best.is_none()
+            && compiled.tuning.uses(Technique::DeadEnds)
             && stopped.is_none_or(|stopped| stopped == Stopped::Exhausted)
             && compiled.is_relaxation_exact()
             && let Some(proof) = self.pairs_proof()
@@ -85,19 +77,22 @@ impl Planner<'_> {
             let counts = self.progress.counts;
             return Answer::Unsolvable { proof, counts };
         }
+        let tuning = &compiled.tuning;
         let mut budget = if self.needs_concurrency() {
-            HASTE_WITH_CONCURRENCY
-        } else if self.has_resources {
-            HASTE_WITH_RESOURCES
+            tuning.first_round_with_concurrency
+        } else if self.has_reservoirs {
+            tuning.first_round_with_reservoirs
         } else {
-            HASTE
+            tuning.first_round
         };
+        let most = tuning.first_round_work / (1 + searches[0].size());
+        budget = budget.min(most.max(tuning.root_check_after));
         while stopped.is_none() && !self.is_first_plan_enough() {
             for (search, is_over) in searches.iter_mut().zip(&mut is_over) {
                 if *is_over {
                     continue;
                 }
-                match self.work(search, share(search, budget)) {
+                match self.work(search, share(search, budget, compiled)) {
                     Outcome::Stop(reason) => stopped = Some(reason),
                     Outcome::Better | Outcome::BudgetSpent => {}
                     Outcome::Over if search.is_incomplete() => *is_over = true,
@@ -114,7 +109,7 @@ impl Planner<'_> {
         }
         let is_proof = stopped == Some(Stopped::Exhausted)
             && compiled.is_exact
-            && compiled.gap.is_none()
+            && compiled.incomplete_because.is_none()
             && searches.iter().any(|search| !search.is_incomplete());
         let freed: usize = searches.iter().map(|search| search.counts().memory).sum();
         drop(searches);
@@ -147,30 +142,44 @@ impl Planner<'_> {
     /// The searches that take turns, the complete one last. Where something is used up and filled
     /// up, estimates that count it find most plans sooner, but not all. Where actions offer
     /// something while they run, some searches choose happenings in the order of time.
-    fn styles(&self) -> Vec<Style> {
-        let mut hastes = vec![Eagerness::Lends];
-        let lends = |action: &compile::Action| action.eagerness == Eagerness::Lends;
-        if self.compiled.actions.iter().any(lends) {
-            hastes.push(Eagerness::Free);
+    fn strategies(&self) -> Vec<Strategy> {
+        let tuning = &self.compiled.tuning;
+        if let Some(member) = tuning.only {
+            return vec![Strategy::of(member, tuning)];
         }
-        let mut styles = Vec::new();
-        for haste in hastes {
-            if self.has_resources {
-                styles.push(Style::hasty(haste).filling_up());
+        let mut compressing = vec![Member::Compressing];
+        let holds =
+            |action: &compile::Action| action.compressibility == Compressibility::HoldsResource;
+        if self.compiled.actions.iter().any(holds) {
+            compressing.push(Member::CompressingSafe);
+        }
+        let mut strategies = Vec::new();
+        for member in compressing {
+            let strategy = Strategy::of(member, tuning);
+            if self.has_reservoirs {
+                strategies.push(strategy.replenishing());
             }
-            styles.push(Style::hasty(haste));
+            strategies.push(strategy);
         }
+        let mut add = |member| strategies.push(Strategy::of(member, tuning));
         if self.needs_concurrency() {
-            styles.push(Style::CHRONOLOGICAL);
-            if !relaxed::stocks(self.compiled).is_empty() {
-                styles.push(Style::CHRONOLOGICAL.sparing());
+            add(Member::Chronological);
+            if tuning.uses(Technique::Consumables)
+                && !relaxed::consumables(self.compiled).is_empty()
+            {
+                add(Member::Saving);
             }
         }
         if !self.compiled.is_symbolic {
-            styles.push(Style::hasty(Eagerness::Lends).seeking_novelty());
+            if tuning.uses(Technique::Width) {
+                add(Member::Width);
+            }
+            if tuning.uses(Technique::Novelty) {
+                add(Member::Novelty);
+            }
         }
-        styles.push(Style::COMPLETE);
-        styles
+        add(Member::Complete);
+        strategies
     }
 
     /// Whether things may have to happen at the same time: some action offers to others what they
@@ -197,9 +206,11 @@ impl Planner<'_> {
                 .literals
                 .iter()
                 .any(|literal| !is_kept(literal));
-            waits || action.eagerness == Eagerness::Offers && action.flows.is_empty()
+            waits || action.compressibility == Compressibility::Envelope && action.flows.is_empty()
         };
-        !compiled.is_symbolic && compiled.actions.iter().any(needs)
+        compiled.tuning.uses(Technique::Chronological)
+            && !compiled.is_symbolic
+            && compiled.actions.iter().any(needs)
     }
 
     /// A proof from the bound on pairs. Told to stop meanwhile, it names no deadlines.
@@ -219,8 +230,8 @@ impl Planner<'_> {
     fn work(&mut self, search: &mut Search<'_>, budget: u64) -> Outcome {
         self.progress.phase = if self.best.is_some() {
             Phase::Improving
-        } else if search.is_hasty() {
-            Phase::Hasty
+        } else if search.prunes_unsafely() {
+            Phase::Incomplete
         } else {
             Phase::Complete
         };
@@ -277,19 +288,21 @@ impl Planner<'_> {
 
     /// Looks at the choices that a search takes for a plan.
     fn consider(&mut self, steps: &[Step], search: &mut Search<'_>) -> Option<Outcome> {
-        let judged = extract::plan_of(
-            self.task,
-            self.situation,
-            self.compiled,
-            steps,
-            self.settings,
-        );
+        let judged = extract::plan_of(self.task, self.situation, self.compiled, steps);
         let Some((plan, report)) = judged else {
             search.has_lost = true;
             return None;
         };
-        let found = self.value(plan, &report);
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
+        let whole = self.value(plan.clone(), &report);
+        let (plan, report) = without_needless(self.task, self.situation, plan, report);
+        // A metric can prefer what nothing needs, such as one that rewards time.
+        let fewer = self.value(plan, &report);
+        let found = if worth(&fewer) <= worth(&whole) {
+            fewer
+        } else {
+            whole
+        };
         if self
             .best
             .as_ref()
@@ -327,7 +340,7 @@ impl Planner<'_> {
         if may_equal {
             search.set_horizon(end - 1);
         }
-        search.set_limit(Limit {
+        search.set_limit(MetricBound {
             value: best.value.clone(),
             may_equal,
         });
@@ -357,11 +370,11 @@ impl Planner<'_> {
 }
 
 /// How many turns a search gets of a round.
-fn share(search: &Search<'_>, budget: u64) -> u64 {
-    if search.is_hasty() {
+fn share(search: &Search<'_>, budget: u64, compiled: &Compiled) -> u64 {
+    if search.prunes_unsafely() {
         budget
     } else {
-        budget / COMPLETE_SHARE
+        budget / compiled.tuning.incomplete_share.max(1)
     }
 }
 

@@ -7,57 +7,43 @@
 //! A search for plans of a better metric weighs what a state has spent against what the relaxed
 //! plan will still cost, and drops what cannot become better than the best plan (branch and bound).
 
-mod doubt;
+mod dead_ends;
 mod goals;
 mod known;
-mod limit;
 mod novelty;
 mod queue;
-mod style;
+mod strategy;
 mod successors;
 
 use std::collections::VecDeque;
 
 use super::answer::Counts;
 use super::apply::{Step, Stepper};
+use super::bound::MetricBound;
 use super::compile::Compiled;
-use super::guide::Guide;
 use super::hash::Map;
-use super::relaxed::{Relaxed, Stock, stocks};
-use super::state::{Outlook, State};
+use super::relaxed::{Consumable, Relaxed, consumables};
+use super::root::root;
+use super::state::{Projection, State};
+use super::step_costs::StepCosts;
 use super::symmetry::Symmetry;
 use super::time::{NEVER, Ticks};
-use doubt::Doubt;
-pub(crate) use limit::Limit;
-use novelty::Novelty;
+use super::tuning::Technique;
+use dead_ends::DeadEnds;
+use novelty::{Novelty, Progress};
 use queue::Queue;
-pub(crate) use style::{Aim, Style};
-
-/// How many turns the preferred successors get for a better estimate.
-const BOOST: i64 = 1000;
-
-/// What a chronological search keeps of a state at most: it remembers a distance for each pair.
-const MOST_UNSETTLED: u64 = 96;
-
-/// Each turn of that number goes to the successor that has waited longest, in a complete search. So
-/// it does not lose itself where an estimate is good, and endlessly many states are no goal.
-const FAIRNESS: u64 = 32;
-
-/// After how many states the stronger bound is asked about the beginning.
-pub(crate) const PATIENCE: u64 = 64;
-
-/// After how many states the stronger bound is asked about the next ones too.
-const DOUBT: u64 = 512;
+use strategy::NoveltyOf;
+pub(crate) use strategy::{Aim, Strategy};
 
 /// A search in progress.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     compiled: &'a Compiled,
     symmetry: &'a Symmetry,
-    style: Style,
+    strategy: Strategy,
     stepper: Stepper<'a>,
     relaxed: Relaxed<'a>,
-    doubt: Doubt<'a>,
+    dead_ends: DeadEnds<'a>,
     has_begun: bool,
     nodes: Vec<Node>,
     /// The nodes of each discrete hash.
@@ -73,13 +59,13 @@ pub(crate) struct Search<'a> {
     /// What was seen before, if new states come first.
     novelty: Option<Novelty>,
     /// What is used up and not filled up, if it is to be spared.
-    stocks: Vec<Stock>,
+    consumables: Vec<Consumable>,
     /// Whether times are irrelevant but for their distances.
     is_timeless: bool,
     /// What steps cost, in a search for a better metric.
-    guide: Option<Guide>,
+    step_costs: Option<StepCosts>,
     /// What plans must be better than.
-    limit: Option<Limit>,
+    limit: Option<MetricBound>,
     /// Nothing may happen later, whatever it costs.
     horizon: Ticks,
     /// Whether something was dropped that could have led to a plan.
@@ -100,18 +86,21 @@ struct Node {
     step: Step,
     state: State,
     /// What of the unsettled past matters, in a search that compares it exactly.
-    outlook: Option<Box<Outlook>>,
-    hope: Hope,
+    projection: Option<Box<Projection>>,
+    dead_end: DeadEnd,
+    /// How far the way to it has come, in a search for new states.
+    progress: Option<Box<Progress>>,
 }
 
 /// What the stronger bound says of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Hope {
+enum DeadEnd {
     /// It was not asked.
-    Unknown,
+    Unchecked,
     /// There may be a plan, or nobody asks any more.
-    Some,
-    None,
+    Unproved,
+    /// No plan goes through the state.
+    Proved,
 }
 
 const ROOT: u32 = u32::MAX;
@@ -127,37 +116,38 @@ pub(crate) enum Turn {
 }
 
 impl<'a> Search<'a> {
-    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, style: Style) -> Self {
-        let has_deadline = |most: Ticks| most < NEVER;
-        let is_weighing = style.aim != Aim::Goal;
+    pub(crate) fn new(compiled: &'a Compiled, symmetry: &'a Symmetry, strategy: Strategy) -> Self {
+        let is_weighing = strategy.aim != Aim::Goal;
         let metric = compiled.metric.as_ref().filter(|_| is_weighing);
-        let guide = metric.map(|metric| Guide::of(compiled, metric));
-        let mut relaxed = Relaxed::new(compiled, style.haste);
-        relaxed.is_chronological = style.is_chronological;
-        if style.is_chronological && !style.is_sparing {
-            relaxed.draw_on_stocks();
+        let step_costs = metric.map(|metric| StepCosts::of(compiled, metric));
+        let mut relaxed = Relaxed::new(compiled, strategy.compresses);
+        relaxed.is_chronological = strategy.is_chronological;
+        let draws = compiled.tuning.uses(Technique::Consumables);
+        if draws && strategy.is_chronological && !strategy.saves_consumables {
+            relaxed.count_consumables();
         }
         let mut stepper = Stepper::new(compiled);
-        stepper.is_chronological = style.is_chronological;
-        if style.fills_up {
+        stepper.is_chronological = strategy.is_chronological;
+        if strategy.replenishes {
             relaxed.count_resources();
         }
-        if let Some(guide) = &guide {
-            relaxed.weigh(guide);
+        relaxed.lists_subgoals = strategy.novelty == Some(NoveltyOf::Successors);
+        if let Some(step_costs) = &step_costs {
+            relaxed.weigh(step_costs);
         }
         let is_timeless = compiled.timed.is_empty()
-            && metric.is_none_or(Limit::is_timeless)
-            && !compiled
-                .initial
-                .open
+            && metric.is_none_or(MetricBound::is_timeless)
+            && compiled
+                .beginning
+                .running
                 .iter()
-                .any(|open| has_deadline(open.most));
+                .all(|running| running.most.is_none());
         Self {
             compiled,
             symmetry,
-            style,
+            strategy,
             stepper,
-            doubt: Doubt::new(compiled, relaxed.size()),
+            dead_ends: DeadEnds::new(compiled, relaxed.size()),
             relaxed,
             has_begun: false,
             nodes: Vec::new(),
@@ -168,17 +158,17 @@ impl<'a> Search<'a> {
             turns: [0, 0],
             best_steps: u32::MAX,
             first_estimate: 0,
-            novelty: style.seeks_novelty.then(|| Novelty::new(compiled)),
-            stocks: if style.is_sparing {
-                stocks(compiled)
+            novelty: strategy.novelty.map(|_| Novelty::new(compiled)),
+            consumables: if strategy.saves_consumables {
+                consumables(compiled)
             } else {
                 Vec::new()
             },
             is_timeless,
-            guide,
+            step_costs,
             limit: None,
             horizon: NEVER,
-            has_lost: style.is_chronological,
+            has_lost: strategy.is_chronological,
             price: 1,
             drawn: 0,
             expanded: 0,
@@ -195,7 +185,7 @@ impl<'a> Search<'a> {
     }
 
     /// From now on only plans count that are within the limit.
-    pub(crate) fn set_limit(&mut self, limit: Limit) {
+    pub(crate) fn set_limit(&mut self, limit: MetricBound) {
         if self.compiled.is_symbolic {
             self.stepper.limit = Some(limit.clone());
         }
@@ -208,13 +198,13 @@ impl<'a> Search<'a> {
     }
 
     /// Whether it loses plans for the sake of speed.
-    pub(crate) fn is_hasty(&self) -> bool {
-        !self.style.is_complete()
+    pub(crate) fn prunes_unsafely(&self) -> bool {
+        !self.strategy.is_complete()
     }
 
     /// What it looks for.
     pub(crate) fn aim(&self) -> Aim {
-        self.style.aim
+        self.strategy.aim
     }
 
     /// Statistics.
@@ -240,14 +230,14 @@ impl<'a> Search<'a> {
 
     /// How many pairs the stronger bound has looked up.
     pub(crate) fn lookups(&self) -> u64 {
-        self.doubt.lookups()
+        self.dead_ends.lookups()
     }
 
     /// Looks at one more state.
     pub(crate) fn turn(&mut self) -> Turn {
         self.price = 1;
         if !std::mem::replace(&mut self.has_begun, true) {
-            let initial = self.compiled.initial.clone();
+            let initial = root(self.compiled);
             if initial.earliest_end() > self.horizon {
                 return Turn::Over;
             }
@@ -270,13 +260,17 @@ impl<'a> Search<'a> {
     /// Whose turn it is.
     fn next_entry(&mut self) -> Option<(u32, Step)> {
         self.drawn += 1;
-        if self.drawn.is_multiple_of(FAIRNESS)
+        if self
+            .drawn
+            .is_multiple_of(self.compiled.tuning.exploration_interval)
             && !self.all.is_empty()
             && let Some(oldest) = self.oldest.pop_front()
         {
             return Some(oldest);
         }
-        let is_preferred_turn = self.turns[0] <= self.turns[1] && !self.preferred.is_empty();
+        let is_preferred_turn = self.turns[0] <= self.turns[1]
+            && !self.preferred.is_empty()
+            && self.compiled.tuning.uses(Technique::PreferredOperators);
         let queue = usize::from(!is_preferred_turn);
         self.turns[queue] += 1;
         match queue {
@@ -288,7 +282,7 @@ impl<'a> Search<'a> {
     fn visit(&mut self, parent: u32, step: Step, state: State) -> Turn {
         let unsettled = state.network.node_count() as u64;
         self.price += unsettled * unsettled / (8 * (1 + self.size()));
-        if self.style.is_chronological && unsettled > MOST_UNSETTLED {
+        if self.strategy.is_chronological && unsettled > self.compiled.tuning.most_unsettled {
             return Turn::Nothing;
         }
         let latest_end = self.latest_end(&state);
@@ -297,15 +291,20 @@ impl<'a> Search<'a> {
             return Turn::Nothing;
         }
         let hash = state.discrete_hash();
-        let outlook = (self.style.haste.is_none() && !state.network.is_empty())
-            .then(|| Box::new(state.outlook()));
-        if self.is_known(hash, &state, outlook.as_deref()) {
+        let projection = (self.strategy.compresses.is_none() && !state.network.is_empty())
+            .then(|| Box::new(state.projection()));
+        if self.is_known(hash, &state, projection.as_deref()) {
             return Turn::Nothing;
         }
         self.evaluated += 1;
-        let Some(mut estimate) = self.relaxed.evaluate(&state) else {
-            // In haste, what the relaxed plan does without may be what a plan needs.
-            self.has_lost |= self.style.haste.is_some();
+        let estimate = if self.needs_estimate(parent, &state) {
+            self.relaxed.evaluate(&state)
+        } else {
+            self.relaxed.list(&state)
+        };
+        let Some(mut estimate) = estimate else {
+            // Where actions are compressed, what the relaxed plan does without may be what a plan needs.
+            self.has_lost |= self.strategy.compresses.is_some();
             return Turn::Nothing;
         };
         self.symmetry
@@ -316,15 +315,18 @@ impl<'a> Search<'a> {
             .retain(|step| kept.binary_search(step).is_ok());
         let number = u32::try_from(self.nodes.len()).expect("memory is used up long before");
         self.known.entry(hash).or_default().push(number);
-        let outlook_size = outlook.as_ref().map_or(0, |outlook| outlook.size());
-        self.memory += state.size() + outlook_size + size_of::<Node>() + 64;
+        let projection_size = projection
+            .as_ref()
+            .map_or(0, |projection| projection.size());
+        self.memory += state.size() + projection_size + size_of::<Node>() + 64;
         let is_goal = self.is_goal(&state);
         self.nodes.push(Node {
             parent,
             step,
             state,
-            outlook,
-            hope: Hope::Unknown,
+            projection,
+            dead_end: DeadEnd::Unchecked,
+            progress: None,
         });
         // A state in which the goal holds may still have successors worth looking at: the judge can
         // refuse the plan, and another one can be better.
@@ -339,19 +341,26 @@ impl<'a> Search<'a> {
     /// successor of a state has its turn.
     fn is_cut(&mut self, number: u32) -> bool {
         let node = &mut self.nodes[number as usize];
-        match node.hope {
-            Hope::Some => return false,
-            Hope::None => return true,
-            Hope::Unknown => {}
+        match node.dead_end {
+            DeadEnd::Unproved => return false,
+            DeadEnd::Proved => return true,
+            DeadEnd::Unchecked => {}
         }
-        if self.is_timeless || self.evaluated < DOUBT {
+        if self.is_timeless
+            || !self.compiled.tuning.uses(Technique::DeadEnds)
+            || self.evaluated < self.compiled.tuning.dead_end_checks_after
+        {
             return false;
         }
-        self.doubt.evaluated = self.evaluated;
-        self.doubt.horizon = self.stepper.horizon;
-        let is_hopeless = self.doubt.is_hopeless(&node.state);
-        node.hope = if is_hopeless { Hope::None } else { Hope::Some };
-        is_hopeless
+        self.dead_ends.evaluated = self.evaluated;
+        self.dead_ends.horizon = self.stepper.horizon;
+        let is_dead_end = self.dead_ends.is_dead_end(&node.state);
+        node.dead_end = if is_dead_end {
+            DeadEnd::Proved
+        } else {
+            DeadEnd::Unproved
+        };
+        is_dead_end
     }
 
     /// The latest time at which a plan may end that begins like this; `None` if there is none.

@@ -5,11 +5,11 @@ use std::hash::{Hash, Hasher};
 
 use elbowroom_num::Rational;
 
-use super::compile::Compiled;
+use super::compile::{Compiled, Metric};
+use super::expressions::Symbolic;
 use super::formula::set;
 use super::hash::Mixer;
 use super::network::{Network, NodeId, SETTLED};
-use super::symbolic::Symbolic;
 use super::time::{NEVER, Ticks};
 
 /// See the module.
@@ -26,7 +26,7 @@ pub(crate) struct State {
     /// What the metric sums up: see [`Metric`](super::compile::Metric).
     pub(crate) cost: Rational,
     /// The latest settled time at which each kind of thing happened.
-    pub(crate) stamps: Vec<Ticks>,
+    pub(crate) annotations: Vec<Ticks>,
     /// What has started and not ended, by action.
     pub(crate) open: Vec<Open>,
     /// How many of the timed initials have happened.
@@ -118,19 +118,15 @@ impl Open {
 
 impl State {
     /// The state in which the search begins; nothing is under way yet.
-    pub(crate) fn new(
-        compiled: &Compiled,
-        facts: impl Iterator<Item = bool>,
-        values: Vec<Option<Rational>>,
-    ) -> Self {
+    pub(crate) fn new(compiled: &Compiled, facts: &[bool], values: Vec<Option<Rational>>) -> Self {
         let mut bits = vec![0; compiled.facts.len().div_ceil(64)];
-        for (fact, truth) in facts.enumerate() {
+        for (fact, &truth) in facts.iter().enumerate() {
             set(&mut bits, u32::try_from(fact).expect("few facts"), truth);
         }
         let mut state = Self {
             facts: bits,
             values,
-            stamps: vec![-NEVER; compiled.stamp_count],
+            annotations: vec![-NEVER; compiled.annotation_count],
             // Before anything that happens now.
             settled_end: compiled.now - 1,
             ..Self::default()
@@ -224,7 +220,7 @@ impl State {
     }
 
     /// What matters of the unsettled past: all that what follows can push, and how far.
-    pub(crate) fn outlook(&self) -> Outlook {
+    pub(crate) fn projection(&self) -> Projection {
         let open = self.open.iter().map(|open| open.node);
         let open: Vec<NodeId> = open
             .chain([self.last.node])
@@ -232,53 +228,59 @@ impl State {
             .collect();
         let rows = open.iter().map(|&node| {
             let distances = self.network.distances_from(node);
-            let mut to_stamps: Vec<(u32, Ticks)> = self
+            let mut to_annotations: Vec<(u32, Ticks)> = self
                 .network
                 .marks
                 .iter()
-                .map(|&(stamp, node)| (stamp, distances[node as usize]))
+                .map(|&(annotation, node)| (annotation, distances[node as usize]))
                 .filter(|&(_, distance)| distance > -NEVER)
                 .collect();
-            to_stamps.sort_unstable_by_key(|&(stamp, distance)| (stamp, -distance));
-            to_stamps.dedup_by_key(|&mut (stamp, _)| stamp);
+            to_annotations.sort_unstable_by_key(|&(annotation, distance)| (annotation, -distance));
+            to_annotations.dedup_by_key(|&mut (annotation, _)| annotation);
             Row {
                 earliest: self.network.earliest(node),
                 latest: self.network.latest_given(&distances),
                 to_open: open.iter().map(|&o| distances[o as usize]).collect(),
-                to_stamps,
+                to_annotations,
             }
         });
-        Outlook {
+        Projection {
             rows: rows.collect(),
         }
     }
 
     /// Whether everything settled was no later here, and what is not settled can be as early as
     /// there. Both must be discretely the same.
-    pub(crate) fn has_no_later_stamps_than(&self, other: &Self) -> bool {
+    pub(crate) fn has_no_later_annotations_than(&self, other: &Self) -> bool {
         if self.settled_end > other.settled_end {
             return false;
         }
         if self.network.marks.is_empty() && other.network.marks.is_empty() {
-            return at_most(&self.stamps, &other.stamps);
+            return at_most(&self.annotations, &other.annotations);
         }
-        at_most(&self.latest_stamps(), &other.latest_stamps())
+        at_most(&self.latest_annotations(), &other.latest_annotations())
     }
 
-    /// The stamps, those of unsettled happenings at their earliest.
-    fn latest_stamps(&self) -> Vec<Ticks> {
-        let mut stamps = self.stamps.clone();
-        for &(stamp, node) in &self.network.marks {
-            let stamp = &mut stamps[stamp as usize];
-            *stamp = (*stamp).max(self.network.earliest(node));
+    /// The annotations, those of unsettled happenings at their earliest.
+    fn latest_annotations(&self) -> Vec<Ticks> {
+        let mut annotations = self.annotations.clone();
+        for &(annotation, node) in &self.network.marks {
+            let annotation = &mut annotations[annotation as usize];
+            *annotation = (*annotation).max(self.network.earliest(node));
         }
-        stamps
+        annotations
+    }
+
+    /// What has been spent of the metric, without the time; `None` if that depends on times that
+    /// are not chosen yet.
+    pub(crate) fn spent(&self, metric: &Metric) -> Option<Rational> {
+        Some(metric.values.value(&self.values, None)? + &self.cost)
     }
 
     /// An estimate of the memory it takes, in bytes.
     pub(crate) fn size(&self) -> usize {
         size_of::<Self>()
-            + 8 * (self.facts.len() + self.stamps.len())
+            + 8 * (self.facts.len() + self.annotations.len())
             + size_of::<Option<Rational>>() * self.values.len()
             + size_of::<Open>() * self.open.len()
             + self.network.size()
@@ -288,11 +290,11 @@ impl State {
 
 /// The network of a state, seen from what can still be pushed: the starts under way.
 ///
-/// Later happenings only push these, and are only pushed by the stamps. So of two states that are
+/// Later happenings only push these, and are only pushed by the annotations. So of two states that are
 /// discretely the same and whose settled pasts compare, the one with the smaller distances and the
 /// later latest times allows every schedule that the other allows.
 #[derive(Clone, Debug)]
-pub(crate) struct Outlook {
+pub(crate) struct Projection {
     rows: Vec<Row>,
 }
 
@@ -305,11 +307,11 @@ struct Row {
     /// The least distances to the starts under way, and to what was chosen last where choices come
     /// in the order of time.
     to_open: Vec<Ticks>,
-    /// The least distances to the stamps, by stamp.
-    to_stamps: Vec<(u32, Ticks)>,
+    /// The least distances to the annotations, by annotation.
+    to_annotations: Vec<(u32, Ticks)>,
 }
 
-impl Outlook {
+impl Projection {
     /// Whether what can follow the other, in time, can follow this. With `is_timeless`, only
     /// distances matter, as nothing happens at a fixed time.
     pub(crate) fn is_no_later_than(&self, other: &Self, is_timeless: bool) -> bool {
@@ -317,11 +319,11 @@ impl Outlook {
             (is_timeless || mine.earliest <= theirs.earliest)
                 && mine.latest >= theirs.latest
                 && at_most(&mine.to_open, &theirs.to_open)
-                && mine.to_stamps.iter().all(|&(stamp, distance)| {
+                && mine.to_annotations.iter().all(|&(annotation, distance)| {
                     theirs
-                        .to_stamps
-                        .binary_search_by_key(&stamp, |entry| entry.0)
-                        .is_ok_and(|found| distance <= theirs.to_stamps[found].1)
+                        .to_annotations
+                        .binary_search_by_key(&annotation, |entry| entry.0)
+                        .is_ok_and(|found| distance <= theirs.to_annotations[found].1)
                 })
         })
     }
@@ -329,7 +331,7 @@ impl Outlook {
     /// An estimate of the memory it takes, in bytes.
     pub(crate) fn size(&self) -> usize {
         let row = |row: &Row| {
-            size_of::<Row>() + 8 * row.to_open.capacity() + 16 * row.to_stamps.capacity()
+            size_of::<Row>() + 8 * row.to_open.capacity() + 16 * row.to_annotations.capacity()
         };
         self.rows.iter().map(row).sum()
     }

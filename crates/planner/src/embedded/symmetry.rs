@@ -14,17 +14,14 @@ use super::formula::{Formula, Linear, Literal, Numeric, is_set};
 use super::hash::Map;
 use super::state::State;
 
-/// The most comparisons of actions spent on finding interchangeable objects.
-const MOST_COMPARISONS: usize = 300_000;
-
 /// A pair of interchangeable objects.
 #[derive(Clone, Debug)]
 struct Exchange {
     /// The facts that change places.
     facts: Vec<(u32, u32)>,
     fluents: Vec<(u32, u32)>,
-    /// The stamps of these facts that change places.
-    stamps: Vec<(u32, u32)>,
+    /// The annotations of these facts that change places.
+    annotations: Vec<(u32, u32)>,
     /// The actions with one of the objects, and what they become; ascending.
     actions: Vec<(u32, u32)>,
 }
@@ -67,7 +64,7 @@ impl Symmetry {
                 continue;
             }
             steps.retain(|step| match step {
-                Step::Start(action) | Step::Whole(action) => {
+                Step::Start(action) | Step::Compressed(action) => {
                     let found = exchange.actions.binary_search_by_key(action, |pair| pair.0);
                     found.map_or(true, |place| exchange.actions[place].1 >= *action)
                 }
@@ -92,9 +89,10 @@ impl Exchange {
                 .all(|&(a, b)| state.values[a as usize] == state.values[b as usize])
             && state.open.iter().all(|open| !touches(open.action))
             && (is_timeless && state.network.is_empty()
-                || self.stamps.iter().all(|&(a, b)| {
-                    let is_marked = |stamp| state.network.marks.iter().any(|m| m.0 == stamp);
-                    state.stamps[a as usize] == state.stamps[b as usize]
+                || self.annotations.iter().all(|&(a, b)| {
+                    let is_marked =
+                        |annotation| state.network.marks.iter().any(|m| m.0 == annotation);
+                    state.annotations[a as usize] == state.annotations[b as usize]
                         && (a == b || !is_marked(a) && !is_marked(b))
                 }))
             && state
@@ -123,11 +121,11 @@ struct Images {
 impl<'a> Finder<'a> {
     fn new(task: &'a Task, compiled: &'a Compiled) -> Self {
         let facts = compiled.facts.iter().map(|&fact| {
-            let (predicate, arguments) = task.symbol_of_fact(fact);
+            let (predicate, arguments) = task.atom(fact);
             (predicate.0, arguments)
         });
         let fluents = compiled.fluents.iter().map(|&fluent| {
-            let (function, arguments) = task.symbol_of_fluent(fluent);
+            let (function, arguments) = task.application(fluent);
             (function.0, arguments)
         });
         let actions = (0..).zip(&compiled.actions);
@@ -140,7 +138,7 @@ impl<'a> Finder<'a> {
             actions: actions
                 .map(|(number, action)| ((action.schema.0, action.arguments.clone()), number))
                 .collect(),
-            budget: MOST_COMPARISONS,
+            budget: compiled.tuning.most_symmetry_comparisons,
         }
     }
 
@@ -180,8 +178,8 @@ impl<'a> Finder<'a> {
             pairs.filter(|(from, to)| from < to).collect()
         };
         let facts = moved(&images.facts);
-        // The stamps of actions' marks: equal for snaps that change places.
-        let mut stamps: Vec<(u32, u32)> = Vec::new();
+        // The annotations of actions' marks: equal for snaps that change places.
+        let mut annotations: Vec<(u32, u32)> = Vec::new();
         for &(from, to) in &actions {
             let (from, to) = (self.compiled.action(from), self.compiled.action(to));
             for (a, b) in [(from.start, to.start), (from.end, to.end)] {
@@ -191,18 +189,21 @@ impl<'a> Finder<'a> {
                         let after = snap.after.iter().map(|entry| entry.0);
                         after.chain(snap.marks.iter().copied()).collect()
                     };
-                    for stamp in all(a).into_iter().filter(|stamp| !all(b).contains(stamp)) {
-                        stamps.extend(all(b).into_iter().map(|other| (stamp, other)));
+                    for annotation in all(a)
+                        .into_iter()
+                        .filter(|annotation| !all(b).contains(annotation))
+                    {
+                        annotations.extend(all(b).into_iter().map(|other| (annotation, other)));
                     }
                 }
             }
         }
-        stamps.sort_unstable();
-        stamps.dedup();
+        annotations.sort_unstable();
+        annotations.dedup();
         Some(Exchange {
             facts,
             fluents: moved(&images.fluents),
-            stamps,
+            annotations,
             actions,
         })
     }

@@ -11,22 +11,17 @@ use crate::world::task;
 /// Stops the planner at its report of that number. Returns the answer, and the phase of each
 /// report that was made.
 fn stopped_at(task: &Task, number: usize) -> (Answer, Vec<Phase>) {
-    let mut task = task.clone();
+    let task = task.clone();
     let situation = Situation::initial(&task);
     let mut phases = Vec::new();
-    let answer = plan(
-        &mut task,
-        &situation,
-        &Settings::default(),
-        &mut |progress| {
-            phases.push(progress.phase);
-            if phases.len() < number {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
-        },
-    );
+    let answer = plan(&task, &situation, &Settings::default(), &mut |progress| {
+        phases.push(progress.phase);
+        if phases.len() < number {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
+    });
     (answer, phases)
 }
 

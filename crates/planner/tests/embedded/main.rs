@@ -11,6 +11,7 @@ mod cancellation;
 mod concurrency;
 mod features;
 mod metric;
+mod portfolio;
 mod resources;
 mod situations;
 mod twin;

@@ -9,10 +9,10 @@ use crate::world::{describe, task};
 
 /// Searches until there is nothing left, and returns all plans that were reported.
 fn plans(domain: &str, problem: &str, settings: &Settings) -> (Vec<Found>, Answer) {
-    let mut task = task(domain, problem);
+    let task = task(domain, problem);
     let situation = Situation::initial(&task);
     let (mut plans, mut left) = (Vec::new(), 2000);
-    let answer = plan(&mut task, &situation, settings, &mut |progress| {
+    let answer = plan(&task, &situation, settings, &mut |progress| {
         plans.extend(progress.plan.clone());
         left -= 1;
         if left == 0 {

@@ -19,7 +19,7 @@ const DELIVERY: &str = "
 
 /// It is 6; an action without arguments has been under way since 0, and its start has made a fact
 /// false.
-fn under_way(task: &mut Task, schema: &str, gone: &str, duration: Interval) -> Situation {
+fn under_way(task: &Task, schema: &str, gone: &str, duration: Interval) -> Situation {
     let schema = task.problem().schema(schema).expect("as written");
     let action = task.instantiate(schema, &[]).expect("as written");
     let mut situation = Situation::initial(task);
@@ -39,29 +39,29 @@ fn under_way(task: &mut Task, schema: &str, gone: &str, duration: Interval) -> S
 fn on_the_way(closing: &str, duration: Interval) -> (Task, Situation) {
     let problem =
         format!("(:init (here) (loaded) (open) (at {closing} (not (open)))) (:goal (delivered))");
-    let mut task = task(DELIVERY, &problem);
-    let situation = under_way(&mut task, "go", "here", duration);
+    let task = task(DELIVERY, &problem);
+    let situation = under_way(&task, "go", "here", duration);
     (task, situation)
 }
 
 #[test]
 fn the_effect_of_what_is_under_way_is_used() {
-    let (mut task, situation) = on_the_way("20", Interval::closed(8.into(), 15.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = on_the_way("20", Interval::closed(8.into(), 15.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (go) [8]\n8: (drop) [2]");
 }
 
 #[test]
 fn what_is_under_way_cannot_have_ended_before_now() {
-    let (mut task, situation) = on_the_way("20", Interval::closed(2.into(), 15.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = on_the_way("20", Interval::closed(2.into(), 15.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (go) [6]\n6: (drop) [2]");
 }
 
 #[test]
 fn a_deadline_after_now_can_be_out_of_reach() {
-    let (mut task, situation) = on_the_way("11.9", Interval::closed(10.into(), 15.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = on_the_way("11.9", Interval::closed(10.into(), 15.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert_eq!(
         describe(&answer),
         "no plan exists: `(delivered)` cannot be reached before `(open)` closes at 11.9"
@@ -70,11 +70,11 @@ fn a_deadline_after_now_can_be_out_of_reach() {
 
 #[test]
 fn a_deadline_that_has_passed_does_not_come_again() {
-    let (mut task, mut situation) = on_the_way("5", Interval::closed(8.into(), 15.into()));
+    let (task, mut situation) = on_the_way("5", Interval::closed(8.into(), 15.into()));
     let open = task.problem().predicate("open").expect("as written above");
     let open = task.find_fact(open, &[]).expect("as written above");
     situation.state.facts.remove(&open);
-    let answer = answer_from(&mut task, &situation, 100);
+    let answer = answer_from(&task, &situation, 100);
     assert!(matches!(answer, Answer::Unsolvable { .. }));
 }
 
@@ -98,22 +98,22 @@ fn endless() -> Task {
 
 #[test]
 fn a_search_ends_when_it_is_told_to() {
-    let mut task = endless();
+    let task = endless();
     let situation = Situation::initial(&task);
-    let answer = answer_from(&mut task, &situation, 5);
+    let answer = answer_from(&task, &situation, 5);
     assert_eq!(describe(&answer), "none found: Interrupted");
 }
 
 #[test]
 fn a_search_ends_when_its_memory_is_used_up() {
-    let mut task = endless();
+    let task = endless();
     let situation = Situation::initial(&task);
     let settings = Settings {
         max_memory: 1 << 20,
         ..Settings::default()
     };
     let mut most = 0;
-    let answer = plan(&mut task, &situation, &settings, &mut |progress| {
+    let answer = plan(&task, &situation, &settings, &mut |progress| {
         most = most.max(progress.counts.memory);
         ControlFlow::Continue(())
     });
@@ -127,26 +127,21 @@ fn a_search_ends_when_its_memory_is_used_up() {
 #[test]
 fn the_same_problem_has_the_same_answer_and_reports() {
     let run = || {
-        let mut task = task(
+        let task = task(
             GRID,
             "(:objects a b c - place) (:init (at a) (next a b) (next b c) (next c a) (next b a)
              (= (steps) 0)) (:goal (and (been c) (at a) (>= (steps) 5)))",
         );
         let situation = Situation::initial(&task);
         let mut reports = Vec::new();
-        let answer = plan(
-            &mut task,
-            &situation,
-            &Settings::default(),
-            &mut |progress| {
-                reports.push(format!("{progress:?}"));
-                if reports.len() > 30 {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
-                }
-            },
-        );
+        let answer = plan(&task, &situation, &Settings::default(), &mut |progress| {
+            reports.push(format!("{progress:?}"));
+            if reports.len() > 30 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
         (describe(&answer), reports)
     };
     assert_eq!(run(), run());
@@ -167,17 +162,17 @@ fn filling(duration: Interval) -> (Task, Situation) {
           :effect (and (at start (decrease (level) 16)) (at end (drained))))";
     let problem = "(:init (idle) (= (level) 0) (= (pumped) 0)) (:goal (drained))
         (:metric minimize (pumped))";
-    let mut task = task(domain, problem);
-    let situation = under_way(&mut task, "fill", "idle", duration);
+    let task = task(domain, problem);
+    let situation = under_way(&task, "fill", "idle", duration);
     (task, situation)
 }
 
 #[test]
 fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
-    let (mut task, situation) = filling(Interval::closed(8.into(), 8.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = filling(Interval::closed(8.into(), 8.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (fill) [8]\n8001/1000: (drain) [1]");
-    let whole = plan(&mut task, &situation, &Settings::default(), &mut |_| {
+    let whole = plan(&task, &situation, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     });
     let found = whole.found().expect("there is a plan");
@@ -187,12 +182,12 @@ fn what_is_under_way_changes_numbers_by_how_long_it_lasts() {
 #[test]
 fn what_takes_longer_than_it_should_changes_numbers_more() {
     // The duration is known, and not the domain's.
-    let (mut task, situation) = filling(Interval::closed(10.into(), 10.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = filling(Interval::closed(10.into(), 10.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert_eq!(describe(&answer), "0: (fill) [10]\n10001/1000: (drain) [1]");
     // It may last from 7 to 10: then it lasts as long as it has to.
-    let (mut task, situation) = filling(Interval::closed(7.into(), 10.into()));
-    let answer = answer_from(&mut task, &situation, 100);
+    let (task, situation) = filling(Interval::closed(7.into(), 10.into()));
+    let answer = answer_from(&task, &situation, 100);
     assert!(
         !matches!(answer, Answer::Unsolvable { .. }),
         "{}",

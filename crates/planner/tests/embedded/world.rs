@@ -21,7 +21,7 @@ pub(crate) fn task(domain: &str, problem: &str) -> Task {
 }
 
 /// The first plan, or what is known after so many reports.
-pub(crate) fn answer_from(task: &mut Task, situation: &Situation, turns: usize) -> Answer {
+pub(crate) fn answer_from(task: &Task, situation: &Situation, turns: usize) -> Answer {
     let settings = Settings {
         first_plan_only: true,
         ..Settings::default()
@@ -38,9 +38,9 @@ pub(crate) fn answer_from(task: &mut Task, situation: &Situation, turns: usize) 
 }
 
 pub(crate) fn answer(domain: &str, problem: &str) -> Answer {
-    let mut task = task(domain, problem);
+    let task = task(domain, problem);
     let situation = Situation::initial(&task);
-    answer_from(&mut task, &situation, 400)
+    answer_from(&task, &situation, 400)
 }
 
 /// The steps of a plan, or why there is none.

@@ -16,8 +16,8 @@ use std::ops::Range;
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{PredicateId, Problem};
+use elbowroom_text::{Diagnostics, Report, Source};
 
-use super::mistakes::{LikelihoodErrors, Mistakes};
 use super::{Likelihoods, PartialFlip, Success, is_changed, names};
 
 /// A stretch of the text without white space.
@@ -31,12 +31,13 @@ struct Word<'a> {
 ///
 /// # Errors
 /// All mistakes found: of syntax, of names, of numbers, and what is missing.
-pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> {
-    let text = String::from_utf8_lossy(bytes);
+pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
+    let source = source.into();
+    let text = source.text();
     let mut reader = Reader {
         problem: task.problem(),
         likelihoods: Likelihoods::default(),
-        mistakes: Mistakes::default(),
+        mistakes: Report::new(&source),
     };
     let mut separator = None;
     let mut at = 0;
@@ -54,14 +55,15 @@ pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> 
     }
     if separator.is_none() {
         let end = text.trim_end().len();
-        reader.mistakes.add(
+        reader.mistakes.mistake(
             end..end,
             "the line `-` between facts and actions is missing",
             None,
         );
     }
     reader.check_facts(&separator.unwrap_or(0..0));
-    reader.mistakes.none_or(reader.likelihoods, &text)
+    let read = reader.mistakes.finish(Some(reader.likelihoods));
+    read.map(|(likelihoods, _warnings)| likelihoods)
 }
 
 fn words(line: &str, at: usize) -> Vec<Word<'_>> {
@@ -77,17 +79,17 @@ fn words(line: &str, at: usize) -> Vec<Word<'_>> {
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
-    mistakes: Mistakes,
+    mistakes: Report,
 }
 
 impl Reader<'_> {
     fn object(&mut self, span: &Range<usize>, (message, expected): names::Objection) {
-        self.mistakes.add(span.clone(), message, expected);
+        self.mistakes.mistake(span.clone(), message, expected);
     }
 
     fn fact(&mut self, name: &Word<'_>, numbers: &[Word<'_>]) {
         let [becomes_true, becomes_false] = numbers else {
-            self.mistakes.add(
+            self.mistakes.mistake(
                 name.span.clone(),
                 format!("{} numbers after the fact `{}`", numbers.len(), name.text),
                 "two: P(false becomes true) P(true becomes false)".to_owned(),
@@ -106,7 +108,7 @@ impl Reader<'_> {
         };
         if self.likelihoods.facts.insert(fact, flip).is_some() {
             let message = format!("`{}` is listed twice", name.text);
-            self.mistakes.add(name.span.clone(), message, None);
+            self.mistakes.mistake(name.span.clone(), message, None);
         }
     }
 
@@ -139,7 +141,7 @@ impl Reader<'_> {
             Err(objection) => return self.object(&name.span, objection),
         };
         let Some((start, effects)) = rest.split_first() else {
-            self.mistakes.add(
+            self.mistakes.mistake(
                 name.span.clone(),
                 format!("no number after the action `{}`", name.text),
                 "P(start succeeds)".to_owned(),
@@ -158,7 +160,7 @@ impl Reader<'_> {
             .find(|(predicate, _)| !success.effects.contains_key(predicate));
         if let Some((predicate, _)) = lacking {
             let predicate = &self.problem.predicates[predicate.index()].name;
-            self.mistakes.add(
+            self.mistakes.mistake(
                 name.span.clone(),
                 format!(
                     "the effect of `{}` on {predicate} has no probability",
@@ -170,7 +172,7 @@ impl Reader<'_> {
         let key = (schema, objects);
         if self.likelihoods.actions.insert(key, success).is_some() {
             let message = format!("`{}` is listed twice", name.text);
-            self.mistakes.add(name.span.clone(), message, None);
+            self.mistakes.mistake(name.span.clone(), message, None);
         }
     }
 
@@ -181,7 +183,7 @@ impl Reader<'_> {
         effects: &mut BTreeMap<PredicateId, f64>,
     ) {
         let Some((name, number)) = word.text.split_once('%') else {
-            self.mistakes.add(
+            self.mistakes.mistake(
                 word.span.clone(),
                 format!("`{}` is not an effect with its probability", word.text),
                 "predicate%P".to_owned(),
@@ -203,7 +205,7 @@ impl Reader<'_> {
             && effects.insert(predicate, probability).is_some()
         {
             let message = format!("two probabilities for the effect on {name}");
-            self.mistakes.add(name_span, message, None);
+            self.mistakes.mistake(name_span, message, None);
         }
     }
 
@@ -234,7 +236,7 @@ impl Reader<'_> {
                 } else {
                     ", and of others"
                 };
-                self.mistakes.add(
+                self.mistakes.mistake(
                     separator.clone(),
                     format!("the file says nothing of {first}{others}"),
                     "one line for each fact, before this one".to_owned(),

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use elbowroom_model::Task;
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
+use elbowroom_text::{Diagnostics, Report, Source, nearest};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::mistakes::{LikelihoodErrors, Mistakes};
 use super::{Likelihoods, PartialFlip, Success, is_changed, names};
 
 /// What `format` says in our files.
@@ -19,31 +19,24 @@ pub(super) const VERSION: &str = "1";
 ///
 /// # Errors
 /// All mistakes found: of syntax, of names, of numbers, and what is missing.
-pub fn read(bytes: &[u8], task: &Task) -> Result<Likelihoods, LikelihoodErrors> {
-    let text = match std::str::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(error) => {
-            let lossy = String::from_utf8_lossy(bytes);
-            let mut mistakes = Mistakes::default();
-            let at = error.valid_up_to();
-            mistakes.add(at..at, "this is not text in UTF-8", None);
-            return mistakes.none_or(Likelihoods::default(), &lossy);
-        }
-    };
+pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
+    let source = source.into();
+    let text = source.text();
     let (document, errors) = DeTable::parse_recoverable(text);
     let mut reader = Reader {
         problem: task.problem(),
         likelihoods: Likelihoods::default(),
-        mistakes: Mistakes::default(),
+        mistakes: Report::new(&source),
     };
     for error in &errors {
         let span = error.span().unwrap_or(0..0);
-        reader.mistakes.add(span, error.message(), None);
+        reader.mistakes.mistake(span, error.message(), None);
     }
     if errors.is_empty() {
         reader.document(document.get_ref());
     }
-    reader.mistakes.none_or(reader.likelihoods, text)
+    let read = reader.mistakes.finish(Some(reader.likelihoods));
+    read.map(|(likelihoods, _warnings)| likelihoods)
 }
 
 type Key<'a> = Spanned<std::borrow::Cow<'a, str>>;
@@ -55,12 +48,12 @@ struct Noted;
 struct Reader<'a> {
     problem: &'a Problem,
     likelihoods: Likelihoods,
-    mistakes: Mistakes,
+    mistakes: Report,
 }
 
 impl Reader<'_> {
     fn object(&mut self, span: Range<usize>, (message, expected): names::Objection) {
-        self.mistakes.add(span, message, expected);
+        self.mistakes.mistake(span, message, expected);
     }
 
     fn document(&mut self, document: &DeTable<'_>) {
@@ -78,7 +71,7 @@ impl Reader<'_> {
                 _ => self.unknown(key, &SECTIONS),
             }
         }
-        if self.mistakes.count() == 0 {
+        if !self.mistakes.is_failed() {
             self.check_complete(document);
         }
     }
@@ -86,12 +79,12 @@ impl Reader<'_> {
     fn header(&mut self, document: &DeTable<'_>) {
         match document.get("format") {
             Some(value) if value.get_ref().as_str() == Some(FORMAT) => {}
-            Some(value) => self.mistakes.add(
+            Some(value) => self.mistakes.mistake(
                 value.span(),
                 "this is another kind of file",
                 format!("format = \"{FORMAT}\""),
             ),
-            None => self.mistakes.add(
+            None => self.mistakes.mistake(
                 0..0,
                 "the file does not say what it is",
                 format!("format = \"{FORMAT}\""),
@@ -100,13 +93,13 @@ impl Reader<'_> {
         match document.get("version") {
             Some(value) => match value.get_ref() {
                 DeValue::Integer(number) if number.as_str() == VERSION => {}
-                _ => self.mistakes.add(
+                _ => self.mistakes.mistake(
                     value.span(),
                     "this version is not known",
                     format!("version = {VERSION}"),
                 ),
             },
-            None => self.mistakes.add(
+            None => self.mistakes.mistake(
                 0..0,
                 "the version of the format is missing",
                 format!("version = {VERSION}"),
@@ -116,12 +109,12 @@ impl Reader<'_> {
 
     fn unknown(&mut self, key: &Key<'_>, known: &[&str]) {
         let name = key.get_ref().as_ref();
-        let expected = match elbowroom_plan::nearest(name, known.iter().copied()) {
+        let expected = match nearest(name, known.iter().copied()) {
             Some(name) => format!("did you mean `{name}`?"),
             None => format!("one of {}", known.join(", ")),
         };
         let message = format!("unknown entry `{name}`");
-        self.mistakes.add(key.span(), message, expected);
+        self.mistakes.mistake(key.span(), message, expected);
     }
 
     /// Calls `entry` for each entry of a table.
@@ -143,7 +136,7 @@ impl Reader<'_> {
             other => {
                 let message = format!("`{}` is {}", key.get_ref(), described(other));
                 let expected = format!("a table: [{}]", key.get_ref());
-                self.mistakes.add(value.span(), message, expected);
+                self.mistakes.mistake(value.span(), message, expected);
             }
         }
     }
@@ -241,7 +234,7 @@ impl Reader<'_> {
             _ => {
                 let message = format!("`{}` is not an effect", key.get_ref());
                 let expected = "a predicate, or `not` and a predicate".to_owned();
-                return self.mistakes.add(key.span(), message, expected);
+                return self.mistakes.mistake(key.span(), message, expected);
             }
         };
         let predicate = match names::predicate(self.problem, name) {
@@ -271,7 +264,7 @@ impl Reader<'_> {
         let Some(arguments) = arguments else {
             let message = format!("`{}` is a predicate, not a fact", key.get_ref());
             let expected = "a predicate with its objects".to_owned();
-            return self.mistakes.add(key.span(), message, expected);
+            return self.mistakes.mistake(key.span(), message, expected);
         };
         if let Some(probability) = self.probability(value) {
             let key_of = (predicate, arguments);
@@ -323,7 +316,7 @@ impl Reader<'_> {
     fn check_new(&mut self, is_new: bool, key: &Key<'_>) {
         if !is_new {
             let message = format!("`{}` is there twice", key.get_ref());
-            self.mistakes.add(key.span(), message, None);
+            self.mistakes.mistake(key.span(), message, None);
         }
     }
 
@@ -379,7 +372,7 @@ impl Reader<'_> {
                 missing.is_none()
             });
             if let Some(fact) = missing {
-                self.mistakes.add(
+                self.mistakes.mistake(
                     section("facts"),
                     format!("the file does not say how {fact} changes by itself"),
                     format!("[facts.{}], or [defaults]", predicate.name),
@@ -418,7 +411,7 @@ impl Reader<'_> {
             missing.is_none()
         });
         if let Some(missing) = missing {
-            self.mistakes.add(
+            self.mistakes.mistake(
                 section.clone(),
                 format!("the file does not say {missing}"),
                 format!("[actions.{}], or [defaults]", schema.name),

@@ -1,7 +1,7 @@
 //! Names of facts and actions in likelihood files, and what they stand for.
 
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId, Variable};
-use elbowroom_plan::nearest;
+use elbowroom_text::nearest;
 
 /// What is wrong with a name, and what to do.
 pub(super) type Objection = (String, Option<String>);

@@ -162,8 +162,7 @@ impl Compiler<'_> {
     /// A fact of our own that remembers whether a guard held.
     fn memory(&mut self) -> FactId {
         let last = self.facts.last().map_or(0, |fact| fact.0 + 1);
-        let own = u32::try_from(self.task.fact_count()).expect("fewer than 2^32 facts");
-        let memory = FactId(last.max(own));
+        let memory = FactId(last.max(FactId::FIRST_FREE.0));
         self.facts.push(memory);
         self.flips.push(Flip::NEVER);
         memory

@@ -67,9 +67,9 @@ impl Requirement {
     }
 }
 
-/// Whether rules define the fact. Memories have ids beyond the task's table.
+/// Whether rules define the fact. Memories have ids that no task gives.
 pub(crate) fn is_derived(task: &Task, fact: FactId) -> bool {
-    fact.index() < task.fact_count() && task.is_derived(fact)
+    fact < FactId::FIRST_FREE && task.is_derived(fact)
 }
 
 /// Calls `visit` for each basic fact and memory that the condition reads, also through rules.

@@ -12,7 +12,7 @@ use crate::model::Model;
 #[derive(Clone, Debug)]
 pub(crate) struct Separations {
     pub(crate) epsilon: Rational,
-    /// Whether two nodes must be `epsilon` apart; symmetric.
+    /// Whether two nodes must be ε apart; symmetric.
     apart: Vec<Vec<bool>>,
     /// For each node, those that may not come after it.
     never_after: Vec<Vec<NodeId>>,
@@ -25,7 +25,7 @@ pub(crate) struct Separations {
 }
 
 impl Separations {
-    pub(crate) fn of(model: &Model, epsilon: &Rational, keeps_interference: bool) -> Self {
+    pub(crate) fn of(model: &Model, keeps_interference: bool) -> Self {
         let (task, plan) = (model.task(), model.plan());
         let footprint = |node: Node| match node {
             Node::Zero => Footprint::default(),
@@ -83,7 +83,7 @@ impl Separations {
             });
         let ids = || plan.instances().map(|(id, _)| id);
         Self {
-            epsilon: epsilon.clone(),
+            epsilon: task.epsilon().clone(),
             apart,
             never_after,
             timed: timed.collect(),

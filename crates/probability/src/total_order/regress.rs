@@ -12,7 +12,7 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use super::Layer;
-use crate::model::{Event, Model, Requirement};
+use crate::model::{Event, Model, Requirement, is_fact};
 
 /// What is needed in one layer.
 #[derive(Clone, Debug, Default)]
@@ -89,13 +89,13 @@ impl Needed {
         let literals = literals.map(|&(fact, truth)| (model.facts[fact], truth));
         let mut conditions: Vec<Condition> = Vec::new();
         for condition in &self.conditions {
-            let condition = without_memories(model, condition);
+            let condition = without_memories(condition);
             if !condition.is_trivial() && !conditions.contains(&condition) {
                 conditions.push(condition);
             }
         }
         Layer {
-            literals: literals.filter(|(fact, _)| model.is_fact(*fact)).collect(),
+            literals: literals.filter(|(fact, _)| is_fact(*fact)).collect(),
             conditions,
             running,
         }
@@ -231,15 +231,12 @@ fn value_after(model: &Model, event: &Event, fluent: FluentId) -> Result<Option<
 
 /// The condition without what only the network remembers: an effect that depends on it is taken
 /// for one that takes place.
-fn without_memories(model: &Model, condition: &Condition) -> Condition {
-    let of_all = |parts: &[Condition]| {
-        let parts = parts.iter();
-        parts.map(|part| without_memories(model, part)).collect()
-    };
+fn without_memories(condition: &Condition) -> Condition {
+    let of_all = |parts: &[Condition]| parts.iter().map(without_memories).collect();
     match condition {
-        Condition::Fact(fact) if !model.is_fact(*fact) => Condition::TRUE,
+        Condition::Fact(fact) if !is_fact(*fact) => Condition::TRUE,
         Condition::Fact(_) | Condition::Compare(..) => condition.clone(),
-        Condition::Not(part) => Condition::Not(Box::new(without_memories(model, part))),
+        Condition::Not(part) => Condition::Not(Box::new(without_memories(part))),
         Condition::And(parts) => Condition::And(of_all(parts)),
         Condition::Or(parts) => Condition::Or(of_all(parts)),
     }

@@ -1,7 +1,9 @@
 //! The authors' domains and likelihoods, and the plans the experiments began with. Tests that need
 //! files beside the repository say so and pass where they are absent.
 #![allow(dead_code, reason = "each test uses some of it")]
-#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
+
+#[path = "../../../../testing/skipped.rs"]
+mod skipped;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,10 +11,10 @@ use std::sync::Arc;
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_plan::PartialOrderPlan;
-use elbowroom_plan::deorder::Settings;
 use elbowroom_plan::partial_order::partial_order;
 use elbowroom_probability::likelihoods::read_authors;
 use elbowroom_probability::{Likelihoods, Model, Semantics};
+pub(crate) use skipped::skipped;
 
 /// The plan that POPF gave the authors for SF3: all at once.
 pub(crate) const SF3_PLAN: &str = "
@@ -49,7 +51,7 @@ pub(crate) fn data() -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    println!("skipped: there is no {}", folder.display());
+    skipped(format_args!("there is no {}", folder.display()));
     None
 }
 
@@ -97,9 +99,9 @@ pub(crate) fn read_task(domain: &str, problem: &str, plan: &str) -> (Task, Parti
     let problem = Source::new("problem.pddl", problem);
     let read = read_problem(&domain, &problem);
     let (problem, _) = read.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
-    let mut task = Task::new(problem);
-    let read = read_plan(&Source::new("plan", plan), &mut task);
+    let task = Task::new(problem);
+    let read = read_plan(&Source::new("plan", plan), &task);
     let (plan, _) = read.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
-    let plan = partial_order(&task, &plan, &Settings::default());
+    let plan = partial_order(&task, &plan);
     (task, plan)
 }

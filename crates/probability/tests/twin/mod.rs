@@ -277,7 +277,8 @@ impl<'a> Worlds<'a> {
         match condition {
             Condition::Fact(fact) if self.task.is_derived(*fact) => {
                 // The rules of these tests do not depend on each other.
-                let mut rules = self.task.rules_of(*fact).iter();
+                let rules = self.task.rules();
+                let mut rules = rules.of(*fact).iter();
                 rules.any(|rule| self.holds(&rule.body, world))
             }
             Condition::Fact(fact) => world.facts[fact.index()],

@@ -10,11 +10,12 @@ use elbowroom_execution::{
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 
+use super::line::{Line, LookedLine, ObservationLine, PassedLine, PlannedLine, StepLine};
 use super::{FORMAT, VERSION};
-use crate::Names;
-use crate::wire::{field_number, mention, read_number, read_observation};
+use crate::wire::read_observation;
 
 /// A trace that cannot be played back.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,12 +31,15 @@ pub struct TraceError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
     /// The first line.
-    pub header: Value,
+    header: Map<String, Value>,
     /// The other lines. A last one that was cut off is left out.
-    pub entries: Vec<Value>,
+    pub lines: Vec<Line>,
     /// Whether the last line was cut off.
     pub is_cut_off: bool,
 }
+
+/// What is wrong with another kind of file.
+const NO_TRACE: &str = "this is no trace of a run, as `--trace` writes it";
 
 impl Stored {
     /// Reads a trace.
@@ -48,54 +52,77 @@ impl Stored {
             message,
         };
         let lines: Vec<&str> = text.lines().collect();
-        let mut values = Vec::with_capacity(lines.len());
-        let mut is_cut_off = false;
-        for (index, line) in lines.iter().enumerate() {
-            match serde_json::from_str::<Value>(line) {
-                Ok(value) => values.push(value),
-                Err(_) if index > 0 && index + 1 == lines.len() => is_cut_off = true,
-                Err(error) => return Err(wrong(index, format!("this is not JSON: {error}"))),
-            }
+        let Some((first, rest)) = lines.split_first() else {
+            return Err(wrong(0, "the trace is empty".to_owned()));
+        };
+        let no_trace = |_| wrong(0, NO_TRACE.to_owned());
+        let header: Value = serde_json::from_str(first).map_err(no_trace)?;
+        let (format, version) = (header.get("format"), header.get("version"));
+        if format.and_then(Value::as_str) != Some(FORMAT) {
+            return Err(wrong(0, NO_TRACE.to_owned()));
         }
-        let mut values = values.into_iter();
-        let header = values
-            .next()
-            .ok_or_else(|| wrong(0, "the trace is empty".to_owned()))?;
-        if header.get("format").and_then(Value::as_str) != Some(FORMAT) {
-            return Err(wrong(0, "this is no trace of a run".to_owned()));
-        }
-        if header.get("version").and_then(Value::as_u64) != Some(VERSION) {
+        if version.and_then(Value::as_u64) != Some(VERSION) {
             return Err(wrong(0, format!("this program reads version {VERSION}")));
+        }
+        let Value::Object(mut header) = header else {
+            return Err(wrong(0, "this is no trace of a run".to_owned()));
+        };
+        for own in ["event", "format", "version"] {
+            header.shift_remove(own);
+        }
+        let mut read = Vec::with_capacity(rest.len());
+        let mut is_cut_off = false;
+        for (index, line) in rest.iter().enumerate() {
+            match serde_json::from_str(line) {
+                Ok(line) => read.push(line),
+                // What was cut off ends in the middle of its JSON.
+                Err(error) if error.is_eof() && index + 1 == rest.len() => is_cut_off = true,
+                Err(error) => {
+                    let what = if error.is_data() {
+                        "this is no line of a trace"
+                    } else {
+                        "this is not JSON"
+                    };
+                    return Err(wrong(index + 1, format!("{what}: {error}")));
+                }
+            }
         }
         Ok(Self {
             header,
-            entries: values.collect(),
+            lines: read,
             is_cut_off,
         })
     }
 
-    fn of_kind(&self, kinds: &'static [&'static str]) -> VecDeque<(usize, Value)> {
-        let numbered = self.entries.iter().enumerate();
-        let is_it = |entry: &Value| {
-            let kind = entry.get("event").and_then(Value::as_str);
-            kind.is_some_and(|kind| kinds.contains(&kind))
-        };
-        numbered
-            .filter(|(_, entry)| is_it(entry))
-            .map(|(index, entry)| (index + 2, entry.clone()))
-            .collect()
+    /// What was run: the first line, without what it says about the trace itself.
+    ///
+    /// # Errors
+    /// When it is of another kind, such as that of another version of this program.
+    pub fn header<T: DeserializeOwned>(&self) -> Result<T, TraceError> {
+        let header = Value::Object(self.header.clone());
+        serde_json::from_value(header).map_err(|error| TraceError {
+            line: 1,
+            message: error.to_string(),
+        })
+    }
+
+    /// Whether the trace has the end of the run.
+    pub fn is_complete(&self) -> bool {
+        matches!(self.lines.last(), Some(Line::Over(_)))
+    }
+
+    /// The lines by their number in the file.
+    fn numbered(&self) -> impl Iterator<Item = (usize, &Line)> {
+        (2..).zip(&self.lines)
     }
 
     /// The plan that the run began with, if it was given one: `start`, `(action …)`, duration.
     ///
     /// # Errors
     /// When its actions are none of the task.
-    pub fn first_plan(&self, task: &mut Task) -> Result<Option<TimeTriggeredPlan>, TraceError> {
-        match self.entries.first() {
-            Some(entry) if entry.get("event").and_then(Value::as_str) == Some("plan") => {
-                let steps = entry.get("steps").unwrap_or(&Value::Null);
-                read_plan(steps, task, None, 2).map(Some)
-            }
+    pub fn first_plan(&self, task: &Task) -> Result<Option<TimeTriggeredPlan>, TraceError> {
+        match self.lines.first() {
+            Some(Line::Plan(plan)) => read_plan(&plan.steps, task, None, 2).map(Some),
             _ => Ok(None),
         }
     }
@@ -103,42 +130,42 @@ impl Stored {
 
 /// A world that reports what a trace says it reported.
 pub struct ReplayWorld {
-    names: Names,
     task: Arc<Task>,
-    has_grown: bool,
-    passages: VecDeque<(usize, Value)>,
+    passages: VecDeque<(usize, Rational, Vec<ObservationLine>)>,
 }
 
 impl ReplayWorld {
     /// The world of a trace.
-    pub fn new(stored: &Stored, task: &Task) -> Self {
+    pub fn new(stored: &Stored, task: &Arc<Task>) -> Self {
+        let passages = stored.numbered().filter_map(|(number, line)| match line {
+            Line::Passed(PassedLine {
+                now, observations, ..
+            })
+            | Line::Looked(LookedLine { now, observations }) => {
+                Some((number, now.0.clone(), observations.clone()))
+            }
+            _ => None,
+        });
         Self {
-            names: Names::of(task),
-            task: Arc::new(task.clone()),
-            has_grown: false,
-            passages: stored.of_kind(&["passed", "looked"]),
+            passages: passages.collect(),
+            task: Arc::clone(task),
         }
     }
 
     fn next(&mut self) -> Result<Passage, WorldError> {
-        let (line, entry) = self
+        let (line, now, reported) = self
             .passages
             .pop_front()
             .ok_or_else(|| WorldError::new(END))?;
-        let error =
-            |message: String| WorldError::new(format!("line {line} of the trace: {message}"));
-        let now = field_number(&entry, "now").map_err(|wrong| error(wrong.message))?;
-        let reported = entry.get("observations").and_then(Value::as_array);
-        let observations = reported.map(Vec::as_slice).unwrap_or_default().iter();
-        for observation in observations.clone() {
-            self.has_grown |= mention(observation, &mut self.names, &mut self.task);
+        let mut observations = Vec::with_capacity(reported.len());
+        let reported: Vec<Value> = reported.iter().map(message).collect();
+        for observation in &reported {
+            let read = read_observation(observation, &self.task);
+            observations.push(read.map_err(|wrong| {
+                WorldError::new(format!("line {line} of the trace: {}", wrong.message))
+            })?);
         }
-        let observations = observations
-            .map(|it| read_observation(it, &self.names).map_err(|wrong| error(wrong.message)));
-        Ok(Passage {
-            now,
-            observations: observations.collect::<Result<_, _>>()?,
-        })
+        Ok(Passage { now, observations })
     }
 }
 
@@ -160,34 +187,29 @@ impl World for ReplayWorld {
     ) -> Result<Vec<elbowroom_execution::Observation>, WorldError> {
         self.next().map(|passage| passage.observations)
     }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.names.learn(task);
-        self.task = Arc::clone(task);
-    }
-
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        std::mem::take(&mut self.has_grown).then(|| Arc::clone(&self.task))
-    }
 }
 
 /// A planner that makes the plans that a trace says it made.
 pub struct ReplayPlanner {
-    plans: VecDeque<(usize, Value)>,
+    plans: VecDeque<(usize, PlannedLine)>,
 }
 
 impl ReplayPlanner {
     /// The planner of a trace.
     pub fn new(stored: &Stored) -> Self {
+        let plans = stored.numbered().filter_map(|(number, line)| match line {
+            Line::Planned(planned) => Some((number, planned.clone())),
+            _ => None,
+        });
         Self {
-            plans: stored.of_kind(&["planned"]),
+            plans: plans.collect(),
         }
     }
 }
 
 impl Planner for ReplayPlanner {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
-        let Some((line, entry)) = self.plans.pop_front() else {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        let Some((line, planned)) = self.plans.pop_front() else {
             return PlannerAnswer {
                 answer: PlanAnswer::NotFound {
                     why: END.to_owned(),
@@ -195,57 +217,54 @@ impl Planner for ReplayPlanner {
                 seconds: None,
             };
         };
-        let text = |name: &str| entry.get(name).and_then(Value::as_str).unwrap_or_default();
-        let is_unsolvable = entry.get("unsolvable").and_then(Value::as_bool);
-        let answer = match entry.get("plan") {
-            Some(steps) if !steps.is_null() => {
-                match read_plan(steps, task, Some(situation), line) {
-                    Ok(plan) => PlanAnswer::Plan(plan),
-                    Err(error) => PlanAnswer::NotFound {
-                        why: error.to_string(),
-                    },
-                }
-            }
-            _ if is_unsolvable == Some(true) => PlanAnswer::Unsolvable,
-            _ => PlanAnswer::NotFound {
-                why: text("why_not").to_owned(),
+        let answer = match &planned.plan {
+            Some(steps) => match read_plan(steps, task, Some(situation), line) {
+                Ok(plan) => PlanAnswer::Plan(plan),
+                Err(error) => PlanAnswer::NotFound {
+                    why: error.to_string(),
+                },
+            },
+            None if planned.is_unsolvable => PlanAnswer::Unsolvable,
+            None => PlanAnswer::NotFound {
+                why: planned.why_not.clone().unwrap_or_default(),
             },
         };
         PlannerAnswer {
             answer,
-            seconds: entry.get("took").and_then(read_number),
+            seconds: Some(planned.took.0),
         }
     }
 }
 
 fn read_plan(
-    steps: &Value,
-    task: &mut Task,
+    steps: &[StepLine],
+    task: &Task,
     situation: Option<&Situation>,
     line: usize,
 ) -> Result<TimeTriggeredPlan, TraceError> {
-    let wrong = |message: String| TraceError { line, message };
     let mut plan = TimeTriggeredPlan::default();
     let running = situation.map_or(&[][..], |situation| &situation.running);
-    for (index, step) in steps.as_array().into_iter().flatten().enumerate() {
-        let name = step
-            .get("action")
-            .and_then(Value::as_str)
-            .unwrap_or_default();
+    for (index, step) in steps.iter().enumerate() {
         let action = match running.get(index) {
             Some(running) => running.action.clone(),
-            None => instantiate(name, task).map_err(wrong)?,
+            None => {
+                instantiate(&step.action, task).map_err(|message| TraceError { line, message })?
+            }
         };
         plan.steps.push(Step {
-            start: field_number(step, "start").map_err(|error| wrong(error.message))?,
-            duration: step.get("duration").and_then(read_number),
+            start: step.start.0.clone(),
+            duration: step.duration.as_ref().map(|duration| duration.0.clone()),
             action,
         });
     }
     Ok(plan)
 }
 
-fn instantiate(name: &str, task: &mut Task) -> Result<elbowroom_model::ground::Action, String> {
+fn message(line: &ObservationLine) -> Value {
+    serde_json::to_value(line).unwrap_or(Value::Null)
+}
+
+fn instantiate(name: &str, task: &Task) -> Result<elbowroom_model::ground::Action, String> {
     let mut words = name.trim_matches(['(', ')']).split_whitespace();
     let problem = task.problem();
     let schema = words.next().and_then(|word| problem.schema(word));
@@ -262,15 +281,15 @@ pub struct Difference {
     /// The line of the trace, from 1 on.
     pub line: usize,
     /// What the trace has there.
-    pub stored: Value,
+    pub stored: Line,
     /// What the replay came to.
-    pub replayed: Value,
+    pub replayed: Line,
 }
 
 /// Compares a run, entry by entry, with a stored trace.
 pub struct Replay {
     task: Arc<Task>,
-    stored: VecDeque<Value>,
+    stored: VecDeque<Line>,
     line: usize,
     difference: Option<Difference>,
     is_to_end: Arc<AtomicBool>,
@@ -281,7 +300,7 @@ impl Replay {
     pub fn new(stored: &Stored, task: Arc<Task>) -> Self {
         Self {
             task,
-            stored: stored.entries.iter().cloned().collect(),
+            stored: stored.lines.iter().cloned().collect(),
             line: 1,
             difference: None,
             is_to_end: Arc::default(),
@@ -300,8 +319,7 @@ impl Replay {
     }
 
     fn look_ahead(&self) {
-        let next = self.stored.front().and_then(|entry| entry.get("event"));
-        let is_to_end = next.and_then(Value::as_str) == Some("interrupted");
+        let is_to_end = matches!(self.stored.front(), Some(Line::Interrupted(_)));
         self.is_to_end.store(is_to_end, Ordering::SeqCst);
     }
 
@@ -321,7 +339,7 @@ impl Recorder for Replay {
             return;
         };
         self.look_ahead();
-        let replayed = super::entry(&self.task, recorded);
+        let replayed = Line::of(&self.task, recorded);
         if stored == replayed {
             self.line += 1;
         } else {
@@ -331,9 +349,5 @@ impl Recorder for Replay {
                 replayed,
             });
         }
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.task = Arc::clone(task);
     }
 }

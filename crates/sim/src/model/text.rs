@@ -3,37 +3,33 @@
 mod changes;
 mod section;
 
-use std::ops::Range;
-
 use elbowroom_model::Problem;
 use elbowroom_num::Rational;
+use elbowroom_text::{Diagnostic, Severity, Source, Span};
 use toml::Spanned;
 
-use super::{
-    Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldFileError, WorldModel,
-};
+use super::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldModel};
 use crate::draw::Distribution;
 use crate::pattern::{ActionPattern, Names};
 use section::{File, Section, Shape};
 
 /// A distribution where it stands, with its minimum and maximum.
-type Found = (Range<usize>, Distribution, Limit, Limit);
+type Found = (Span, Distribution, Limit, Limit);
 
 /// A minimum or a maximum, where it stands.
-type Limit = Option<(Range<usize>, f64)>;
+type Limit = Option<(Span, f64)>;
 
-/// The text, to find lines in.
+/// The text, and what its names stand for.
 struct Reader<'a> {
-    text: &'a str,
+    source: &'a Source,
     problem: &'a Problem,
 }
 
-type Read<T> = Result<T, WorldFileError>;
+type Read<T> = Result<T, Diagnostic>;
 
-pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
-    let reader = Reader { text, problem };
-    let file: File = toml::from_str(text)
-        .map_err(|error| reader.wrong(&error.span().unwrap_or(0..0), in_words(error.message())))?;
+pub(super) fn read(source: &Source, problem: &Problem) -> Read<WorldModel> {
+    let reader = Reader { source, problem };
+    let file: File = elbowroom_text::toml::read(source)?;
     if file.format.get_ref() != "elbowroom-world" {
         return Err(reader.wrong(&file.format.span(), "write format = \"elbowroom-world\""));
     }
@@ -42,7 +38,7 @@ pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
     }
     let mut model = WorldModel::as_planned();
     if let Some(resolution) = &file.resolution {
-        let value = exact(*resolution.get_ref());
+        let value = Rational::from_f64_as_written(*resolution.get_ref());
         model.resolution = value
             .filter(Rational::is_positive)
             .ok_or_else(|| reader.wrong(&resolution.span(), "it must be greater than 0"))?;
@@ -73,12 +69,9 @@ pub(super) fn read(text: &str, problem: &Problem) -> Read<WorldModel> {
 }
 
 impl Reader<'_> {
-    fn wrong(&self, at: &Range<usize>, message: impl Into<String>) -> WorldFileError {
-        let before = self.text.get(..at.start).unwrap_or(self.text);
-        WorldFileError {
-            line: 1 + before.matches('\n').count(),
-            message: message.into().trim().replace('\n', " "),
-        }
+    fn wrong(&self, at: &Span, message: impl Into<String>) -> Diagnostic {
+        let message = message.into().trim().replace('\n', " ");
+        Diagnostic::new(Severity::Error, self.source, at.clone(), message)
     }
 
     fn pattern(&self, text: &Spanned<String>, names: Names) -> Read<ActionPattern> {
@@ -301,7 +294,7 @@ impl Reader<'_> {
         let value = match becomes.get_ref() {
             toml::Value::Boolean(truth) => Becomes::Truth(*truth),
             toml::Value::Integer(value) => Becomes::Value(Some(Rational::from(*value))),
-            toml::Value::Float(value) => Becomes::Value(exact(*value)),
+            toml::Value::Float(value) => Becomes::Value(Rational::from_f64_as_written(*value)),
             _ => {
                 let message = "write true or false for a fact, or a number for a fluent";
                 return Err(self.wrong(&becomes.span(), message));
@@ -389,17 +382,4 @@ impl Reader<'_> {
 enum Becomes {
     Truth(bool),
     Value(Option<Rational>),
-}
-
-/// The message of the reader of TOML, which speaks of Rust's types.
-fn in_words(message: &str) -> String {
-    let message = message.replace("expected f64", "expected a number");
-    let message = message.replace("expected i64", "expected a whole number");
-    let message = message.replace("expected a boolean", "expected true or false");
-    message.replace("expected struct Shape", "expected numbers in braces, { … }")
-}
-
-/// The number as it is written, not as a float rounds it.
-fn exact(value: f64) -> Option<Rational> {
-    value.is_finite().then(|| value.to_string().parse().ok())?
 }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use elbowroom_execution::{Command, Ending, Event, Observation, Passage, World, WorldError};
-use elbowroom_model::Task;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
@@ -59,10 +58,6 @@ impl World for SimWorld<'_> {
             now: self.now.clone(),
             observations: std::mem::take(&mut self.untold),
         })
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.truth.know(Arc::clone(task));
     }
 
     fn look(

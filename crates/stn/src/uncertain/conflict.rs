@@ -62,4 +62,19 @@ impl<W: Weight> Conflict<W> {
         }
         (early, late)
     }
+
+    /// The same conflict in other numbers.
+    pub(super) fn map<V>(self, number: impl Fn(W) -> V) -> Conflict<V> {
+        let steps = self.steps.into_iter().map(|step| Step {
+            from: step.from,
+            to: step.to,
+            bound: step.bound.map(&number),
+            ground: step.ground,
+        });
+        Conflict {
+            steps: steps.collect(),
+            is_whole: self.is_whole,
+            total: self.total.map(&number),
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! A network in a form by which it can be executed event by event.
 
-use super::dynamic::{EdgeId, Graph, Kind, Origin};
+use super::graph::{EdgeId, Graph, Kind, Origin};
 use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
 use crate::{Constraint, Network, NodeId, Weight};
 

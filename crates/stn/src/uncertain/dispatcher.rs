@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use elbowroom_num::Rational;
 
-use super::dynamic::EdgeId;
+use super::graph::EdgeId;
 use super::{Dispatchable, LinkId, Step};
 use crate::{NodeId, Weight, WindowEnd};
 

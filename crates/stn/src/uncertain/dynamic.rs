@@ -24,70 +24,15 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::conflict::{Conflict, Ground, Step};
+use super::conflict::Conflict;
 use super::dispatchable::Dispatchable;
 use super::extended::Extended;
+use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Way, WayId};
 use super::{LinkId, UncertainNetwork};
-use crate::{ConstraintId, NodeId, Weight};
+use crate::{NodeId, Weight};
 
 /// A conflict is spelt out up to so many steps.
 const MOST_STEPS: usize = 10_000;
-
-/// An edge by its place in [`Graph::edges`].
-pub(super) type EdgeId = usize;
-
-/// `to - from <= bound`, or, for a wait, "until the link has ended".
-#[derive(Clone, Debug)]
-pub(super) struct Edge<W> {
-    pub(super) from: NodeId,
-    pub(super) to: NodeId,
-    pub(super) bound: Extended<W>,
-    pub(super) kind: Kind,
-    pub(super) origin: Origin,
-}
-
-/// When an edge holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    /// Always.
-    Plain,
-    /// If the world lets the link end early.
-    Lower(LinkId),
-    /// Until the link has ended.
-    Upper(LinkId),
-}
-
-/// Where an edge comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Origin {
-    Requirement(ConstraintId),
-    Link(LinkId),
-    /// It stands for a way.
-    Way(WayId),
-}
-
-/// A way by its place in [`Graph::ways`].
-pub(super) type WayId = usize;
-
-/// An edge, and the rest of the way behind it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
-    pub(super) edge: EdgeId,
-    pub(super) rest: Option<WayId>,
-}
-
-/// The network as a graph, with the edges found.
-#[derive(Clone, Debug)]
-pub(super) struct Graph<W> {
-    pub(super) edges: Vec<Edge<W>>,
-    pub(super) ways: Vec<Way>,
-    /// For each node, the edges not negative that end there, upper-case ones excepted.
-    positive_into: Vec<Vec<EdgeId>>,
-    /// For each node, the negative plain edges of the network that end there.
-    negative_into: Vec<Vec<EdgeId>>,
-    /// For each node, the upper-case edges of the network that end there.
-    upper_into: Vec<Vec<EdgeId>>,
-}
 
 impl<W: Weight> UncertainNetwork<W> {
     /// The network's dispatchable form, if it is dynamically controllable.
@@ -111,137 +56,32 @@ impl<W: Weight> UncertainNetwork<W> {
         self.search(false).is_ok()
     }
 
-    fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
-        let mut search = Search {
-            links: self,
-            graph: Graph::new(self),
-            stage: vec![Stage::New; self.requirements.node_count()],
-            frames: Vec::new(),
-            keeps_edges,
-        };
+    pub(super) fn search(&self, keeps_edges: bool) -> Result<Graph<W>, Conflict<W>> {
+        let mut graph = Graph::new(self);
+        let mut search = Search::new(self, &mut graph, keeps_edges);
         for node in self.requirements.nodes() {
             search.settle(node)?;
         }
-        Ok(search.graph)
-    }
-}
-
-impl<W: Weight> Graph<W> {
-    fn new(network: &UncertainNetwork<W>) -> Self {
-        let count = network.requirements.node_count();
-        let mut graph = Self {
-            edges: Vec::with_capacity(network.requirements.constraints().len()),
-            ways: Vec::new(),
-            positive_into: vec![Vec::new(); count],
-            negative_into: vec![Vec::new(); count],
-            upper_into: vec![Vec::new(); count],
-        };
-        for id in network.requirements.constraint_ids() {
-            let constraint = network.requirements.constraint(id);
-            graph.add(Edge {
-                from: constraint.from,
-                to: constraint.to,
-                bound: constraint.bound.clone().into(),
-                kind: Kind::Plain,
-                origin: Origin::Requirement(id),
-            });
-        }
-        for id in network.link_ids() {
-            let link = network.link(id);
-            graph.add(Edge {
-                from: link.activation,
-                to: link.end,
-                bound: link.lower.clone().into(),
-                kind: Kind::Lower(id),
-                origin: Origin::Link(id),
-            });
-            let upper = link
-                .upper
-                .clone()
-                .map_or_else(Extended::infinity, Into::into);
-            let is_upper = upper > Extended::zero();
-            graph.add(Edge {
-                from: link.end,
-                to: link.activation,
-                bound: upper.negated(),
-                // A link without any duration has a plain edge back.
-                kind: if is_upper {
-                    Kind::Upper(id)
-                } else {
-                    Kind::Plain
-                },
-                origin: Origin::Link(id),
-            });
-        }
-        graph
-    }
-
-    fn add(&mut self, edge: Edge<W>) -> EdgeId {
-        let id = self.edges.len();
-        let to = edge.to.index();
-        match edge.kind {
-            Kind::Upper(_) => self.upper_into[to].push(id),
-            Kind::Plain if edge.bound.is_negative() => self.negative_into[to].push(id),
-            Kind::Plain | Kind::Lower(_) => self.positive_into[to].push(id),
-        }
-        self.edges.push(edge);
-        id
-    }
-
-    /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
-    ///
-    /// Whether these are all.
-    pub(super) fn spelt_out(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
-        let mut stack = vec![edge];
-        while let Some(id) = stack.pop() {
-            let Origin::Way(way) = self.edges[id].origin else {
-                if into.len() >= most {
-                    return false;
-                }
-                into.push(id);
-                continue;
-            };
-            let mut along = Vec::new();
-            let mut next = Some(way);
-            while let Some(way) = next {
-                along.push(self.ways[way].edge);
-                next = self.ways[way].rest;
-            }
-            stack.extend(along.into_iter().rev());
-        }
-        true
-    }
-
-    /// One edge of the network in a conflict.
-    pub(super) fn step(&self, id: EdgeId) -> Step<W> {
-        let edge = &self.edges[id];
-        let ground = match (edge.kind, edge.origin) {
-            (_, Origin::Requirement(id)) => Ground::Requirement(id),
-            (Kind::Lower(link), _) => Ground::Early(link),
-            (Kind::Upper(link), _) | (_, Origin::Link(link)) => Ground::Late(link),
-            (_, Origin::Way(_)) => unreachable!("ways are spelt out"),
-        };
-        Step {
-            from: edge.from,
-            to: edge.to,
-            bound: edge.bound.clone(),
-            ground,
-        }
+        Ok(graph)
     }
 }
 
 /// How far the search has come with a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+pub(super) enum Stage {
     New,
     Underway,
     Done,
 }
 
-struct Search<'a, W> {
+/// Looks for a conflict; what it finds on the way it leaves in the graph.
+pub(super) struct Search<'a, W> {
     links: &'a UncertainNetwork<W>,
-    graph: Graph<W>,
-    stage: Vec<Stage>,
+    graph: &'a mut Graph<W>,
+    pub(super) stage: Vec<Stage>,
+    /// For each node that has been dealt with, those by which negative ways lead to it. What was
+    /// found for it depends on nothing but them, and on the edges that end there.
+    pub(super) regions: Vec<Vec<NodeId>>,
     /// The negative nodes being dealt with, each for the sake of the one before.
     frames: Vec<Frame<W>>,
     /// Whether negative edges found are kept, for the sake of dispatching.
@@ -260,6 +100,7 @@ struct Frame<W> {
     /// Whether the plain edges have been begun with.
     is_last: bool,
     reached: BTreeMap<NodeId, Reached<W>>,
+    region: Vec<NodeId>,
     queue: BinaryHeap<Reverse<(Extended<W>, NodeId)>>,
 }
 
@@ -272,15 +113,33 @@ struct Reached<W> {
     way: Option<WayId>,
 }
 
-impl<W: Weight> Search<'_, W> {
+impl<'a, W: Weight> Search<'a, W> {
+    /// Nothing has been dealt with.
+    pub(super) fn new(
+        links: &'a UncertainNetwork<W>,
+        graph: &'a mut Graph<W>,
+        keeps_edges: bool,
+    ) -> Self {
+        let count = links.requirements.node_count();
+        Self {
+            links,
+            graph,
+            stage: vec![Stage::New; count],
+            regions: vec![Vec::new(); count],
+            frames: Vec::new(),
+            keeps_edges,
+        }
+    }
+
     /// Deals with a node, and with those that have to be dealt with before.
-    fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
+    pub(super) fn settle(&mut self, node: NodeId) -> Result<(), Conflict<W>> {
         self.begin(node);
         while let Some(frame) = self.frames.last_mut() {
             let Some(Reverse((distance, node))) = frame.queue.pop() else {
                 if !self.next_pass() {
                     let done = self.frames.pop().expect("the last frame is there");
                     self.stage[done.node.index()] = Stage::Done;
+                    self.regions[done.node.index()] = done.region;
                 }
                 continue;
             };
@@ -300,6 +159,7 @@ impl<W: Weight> Search<'_, W> {
                     self.begin(node);
                 }
                 Stage::Done => {
+                    frame.region.push(node);
                     if self.keep(node) {
                         self.extend(node);
                     }
@@ -327,6 +187,7 @@ impl<W: Weight> Search<'_, W> {
             plain: Vec::new(),
             is_last: false,
             reached: BTreeMap::new(),
+            region: Vec::new(),
             queue: BinaryHeap::new(),
         });
     }

@@ -30,6 +30,14 @@ impl<W: Weight> Extended<W> {
         (self.infinite == 0).then_some(self.finite)
     }
 
+    /// The same with another finite part.
+    pub(crate) fn map<V>(self, number: impl FnOnce(W) -> V) -> Extended<V> {
+        Extended {
+            infinite: self.infinite,
+            finite: number(self.finite),
+        }
+    }
+
     pub(crate) fn is_negative(&self) -> bool {
         *self < Self::zero()
     }

@@ -5,7 +5,10 @@ use std::collections::BTreeSet;
 use elbowroom_num::{Delta, Rational};
 
 use super::{ContingentLink, LinkId, UncertainNetwork};
-use crate::{Constraint, Network, NodeId};
+use crate::{Constraint, Network, NodeId, Weight};
+
+/// How many parts make up a unit of the whole numbers in which times are compared.
+const PARTS: i128 = 1 << 40;
 
 /// Chooses when links end, so that the executor loses if it can be made to lose.
 ///
@@ -89,32 +92,70 @@ impl Spoiler {
         happened: &[Option<Rational>],
         later: &BTreeSet<LinkId>,
     ) -> bool {
-        let Some(rest) = self.rest(now, happened, later) else {
-            return true;
-        };
-        !rest.is_dynamically_controllable()
+        let times = happened.iter().flatten().chain([now]);
+        if let Some(unit) = self.network.unit_with(times) {
+            // Strictly less is less by a part of a unit that all of them together do not add up to.
+            let whole = |number: &Delta| {
+                let (infinitesimal, _) = number.infinitesimal.as_small()?;
+                let real = unit.whole(&number.real)?;
+                Some(i128::from(real) * PARTS + i128::from(infinitesimal))
+            };
+            if let Some(is_lost) = self.is_lost_in(now, happened, later, &whole) {
+                return is_lost;
+            }
+        }
+        let exact = |number: &Delta| Some(number.clone());
+        self.is_lost_in(now, happened, later, &exact)
+            .unwrap_or(true)
     }
 
-    /// The network with what has happened fixed and everything else not before now, or after now.
-    fn rest(
+    /// The same in other numbers; `None` if some number is none of them.
+    fn is_lost_in<W: Weight>(
         &self,
         now: &Rational,
         happened: &[Option<Rational>],
         later: &BTreeSet<LinkId>,
-    ) -> Option<UncertainNetwork<Delta>> {
+        number: &dyn Fn(&Delta) -> Option<W>,
+    ) -> Option<bool> {
+        match self.rest(now, happened, later, number)? {
+            Rest::Lost => Some(true),
+            Rest::Network(rest) => Some(!rest.is_dynamically_controllable()),
+        }
+    }
+
+    /// The network with what has happened fixed and everything else not before now, or after now.
+    /// `None` if some number cannot be had.
+    fn rest<W: Weight>(
+        &self,
+        now: &Rational,
+        happened: &[Option<Rational>],
+        later: &BTreeSet<LinkId>,
+        number: &dyn Fn(&Delta) -> Option<W>,
+    ) -> Option<Rest<W>> {
         let given = self.network.requirements();
+        let time = |node: NodeId| {
+            let is_origin = node == self.origin;
+            let zero = is_origin.then_some(Rational::ZERO);
+            zero.or_else(|| happened[node.index()].clone())
+        };
         let mut requirements = Network::with_nodes(given.node_count());
         for constraint in given.constraints() {
-            let bound = Delta::from(constraint.bound.clone());
+            if let (Some(from), Some(to)) = (time(constraint.from), time(constraint.to)) {
+                if to - from > constraint.bound {
+                    return Some(Rest::Lost);
+                }
+                continue;
+            }
+            let bound = number(&Delta::from(constraint.bound.clone()))?;
             requirements.add(Constraint::at_most(constraint.from, constraint.to, bound));
         }
         for node in given.nodes().filter(|&node| node != self.origin) {
             if let Some(time) = &happened[node.index()] {
-                let time = Delta::from(time.clone());
+                let time = number(&Delta::from(time.clone()))?;
                 requirements.add(Constraint::at_least(self.origin, node, time.clone()));
                 requirements.add(Constraint::at_most(self.origin, node, time));
             } else if !self.network.is_contingent(node) {
-                let now = Delta::from(now.clone());
+                let now = number(&Delta::from(now.clone()))?;
                 requirements.add(Constraint::at_least(self.origin, node, now));
             }
         }
@@ -135,17 +176,29 @@ impl Spoiler {
                 });
             }
             if upper.as_ref().is_some_and(|upper| lower > *upper) {
-                return None;
+                return Some(Rest::Lost);
             }
+            let upper = match &upper {
+                Some(upper) => Some(number(upper)?),
+                None => None,
+            };
             links.push(ContingentLink {
                 activation: link.activation,
                 end: link.end,
-                lower,
+                lower: number(&lower)?,
                 upper,
             });
         }
-        UncertainNetwork::new(requirements, links).ok()
+        let network = UncertainNetwork::new(requirements, links);
+        Some(network.map_or(Rest::Lost, Rest::Network))
     }
+}
+
+/// What is left of a network.
+enum Rest<W> {
+    /// Something has happened that cannot be made good.
+    Lost,
+    Network(UncertainNetwork<W>),
 }
 
 /// When a link that is not over was activated.

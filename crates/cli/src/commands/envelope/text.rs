@@ -5,8 +5,8 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind,
-    Range, Room, Stop,
+    Conditions, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans,
+    QuantityKind, Range, Room, Stop,
 };
 
 use elbowroom::num::Rational;
@@ -99,6 +99,7 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
         stop,
         checks,
         widenings,
+        conditions,
         foresight,
         seconds,
     } = &outcome.answer.finding
@@ -127,6 +128,9 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     if let Some(makespans) = makespans {
         push_paragraph(&mut text, &makespan(makespans), look.width);
     }
+    if let Some(met) = met(conditions) {
+        push_paragraph(&mut text, &met, look.width);
+    }
     let course = format!(
         "{}. {}, {}, {}.",
         ended(request, *stop),
@@ -139,6 +143,24 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     text.push_str(&styled(FAINT, how.trim_end()));
     text.push('\n');
     text
+}
+
+/// How conditions on numbers are met, and what the dispatcher keeps to beside the network.
+fn met(conditions: &Conditions) -> Option<String> {
+    let mut met = Vec::new();
+    if conditions.all_schedules > 0 {
+        let count = conditions.all_schedules;
+        met.push(format!(
+            "Conditions on numbers, met by every schedule within the windows: {count}."
+        ));
+    }
+    if conditions.enforced > 0 {
+        let count = conditions.enforced;
+        met.push(format!(
+            "Bounds added for the dispatcher to keep to (--enforce): {count}."
+        ));
+    }
+    (!met.is_empty()).then(|| met.join(" "))
 }
 
 /// What foresight would be worth, in one sentence.
@@ -164,7 +186,7 @@ fn worth(foresight: &Foresight) -> String {
         others => format!(" and {others} more"),
     };
     format!(
-        "Who knew {}{others} in advance would have {much} intervals in sum (--guarantee weak).",
+        "With {}{others} known in advance, the intervals would be {much} in sum (--guarantee weak).",
         named.join(", ")
     )
 }
@@ -215,9 +237,9 @@ fn makespan(makespans: &Makespans) -> String {
 /// How the search ended.
 fn ended(request: &EnvelopeRequest, stop: Stop) -> String {
     match stop {
-        Stop::Converged if request.search.sharpen => "Each end touches its limit".to_owned(),
+        Stop::Converged if request.search.sharpen => "Each end is at its limit".to_owned(),
         Stop::Converged => format!(
-            "Steps below {} were not tried (--sharpen moves each end onto its limit)",
+            "The search ended at steps of {} (--precision); --sharpen moves each end to its limit",
             number::nearest(&request.search.precision)
         ),
         Stop::CheckLimit | Stop::TimeLimit => {

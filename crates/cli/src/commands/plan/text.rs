@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
-use elbowroom::answers::plan::{PlanFinding, PlannerFailure};
-use elbowroom::planner::external::Outcome;
+use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanStop, PlannerFailure};
+use elbowroom::external::Outcome;
 
 use crate::exit::Failure;
-use crate::look::{HINT, styled};
+use crate::look::{FAINT, HINT, styled};
 use crate::number;
+use crate::output::counted;
 
 /// The plan as text, with a last line, a comment, that says what it is worth where that is not
 /// simply when it ends.
@@ -26,6 +27,28 @@ pub(super) fn plan(finding: &PlanFinding) -> Option<String> {
         let _ = writeln!(text, "; metric {}", number::nearest(metric));
     }
     Some(text)
+}
+
+/// What the plan is worth, for people: makespan, metric, and whether there may be better ones.
+pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
+    let PlanFinding::Plan {
+        makespan, metric, ..
+    } = &answer.finding
+    else {
+        return None;
+    };
+    let mut text = format!("makespan {}", number::nearest(makespan));
+    if let Some(metric) = metric.as_ref().filter(|metric| *metric != makespan) {
+        let _ = write!(text, ", metric {}", number::nearest(metric));
+    }
+    let plans = counted(answer.plans, "plan");
+    let better = match answer.stop {
+        PlanStop::Exhausted => "the search found no better one",
+        PlanStop::FirstPlan => "not proved optimal; --time-limit looks for better ones",
+        _ => "not proved optimal",
+    };
+    let _ = write!(text, "; {plans} found, {better}");
+    Some(styled(FAINT, &text))
 }
 
 /// The times are not the planner's own.

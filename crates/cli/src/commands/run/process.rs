@@ -10,7 +10,7 @@ use elbowroom::execution::{Command, Event, Observation, Passage, World, WorldErr
 use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
-use elbowroom::report::{Names, wire};
+use elbowroom::report::wire;
 use serde_json::{Value, json};
 
 use crate::clock::Clock;
@@ -55,9 +55,9 @@ pub(super) struct ProcessWorld {
     now: Rational,
     /// There is no use in telling it anything more.
     is_deaf: bool,
-    names: Names,
     task: Arc<Task>,
-    has_grown: bool,
+    /// The tickets below this one were given.
+    given: u64,
 }
 
 impl ProcessWorld {
@@ -105,9 +105,8 @@ impl ProcessWorld {
             is_asked: false,
             now: Rational::ZERO,
             is_deaf: false,
-            names: Names::of(task),
             task: Arc::clone(task),
-            has_grown: false,
+            given: 0,
         };
         let hello = json!({ "type": "hello", "protocol": "elbowroom-world", "version": 1 });
         match world.tell(&hello) {
@@ -239,11 +238,16 @@ impl ProcessWorld {
             let now = wire::field_number(&message, "now");
             return now.map(Said::Time).map_err(|error| error.message);
         }
-        self.has_grown |= wire::mention(&message, &mut self.names, &mut self.task);
-        let observation = wire::read_observation(&message, &self.names);
-        observation
-            .map(Said::Observation)
-            .map_err(|error| error.message)
+        let observation = wire::read_observation(&message, &self.task);
+        let observation = observation.map_err(|error| error.message)?;
+        match &observation.event {
+            Event::Started { ticket, .. } | Event::Ended { ticket, .. }
+                if ticket.0 >= self.given =>
+            {
+                Err(format!("ticket {} was never given", ticket.0))
+            }
+            _ => Ok(Said::Observation(observation)),
+        }
     }
 
     /// The program no longer listens, or has closed its output.
@@ -315,6 +319,9 @@ fn ended(child: &mut Child, patience: Duration) -> Option<std::process::ExitStat
 
 impl World for ProcessWorld {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        if let Command::Start { ticket, .. } = command {
+            self.given = self.given.max(ticket.0.saturating_add(1));
+        }
         let mut message = wire::command(command);
         message["now"] = wire::number(now);
         self.tell(&message)
@@ -342,14 +349,5 @@ impl World for ProcessWorld {
             "fluents": fluents.collect::<Vec<_>>(),
         });
         Ok(self.ask(&message)?.observations)
-    }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.names.learn(task);
-        self.task = Arc::clone(task);
-    }
-
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        std::mem::take(&mut self.has_grown).then(|| Arc::clone(&self.task))
     }
 }

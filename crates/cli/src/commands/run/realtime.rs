@@ -4,8 +4,7 @@
 //! no time in the world, but making plans does: as long as it takes on the wall clock, times the
 //! factor. What happens meanwhile is reported afterwards, with the times at which it happened.
 
-use std::cell::Cell;
-use std::sync::Arc;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use elbowroom::execution::run::PlanningTime;
@@ -24,7 +23,7 @@ pub(super) struct Pace {
     clock: Clock,
     factor: Rational,
     /// How long the world's clock was stopped, on the wall clock.
-    stopped: Cell<Duration>,
+    stopped: Mutex<Duration>,
 }
 
 impl Pace {
@@ -33,19 +32,23 @@ impl Pace {
         Self {
             clock: Clock::start(),
             factor: factor.clone(),
-            stopped: Cell::new(Duration::ZERO),
+            stopped: Mutex::new(Duration::ZERO),
         }
+    }
+
+    fn stopped(&self) -> Duration {
+        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// How long it is until the world's clock reads `time`.
     fn left(&self, time: &Rational) -> Duration {
-        let passed = self.clock.elapsed().saturating_sub(self.stopped.get());
+        let passed = self.clock.elapsed().saturating_sub(self.stopped());
         on_the_wall(time, &self.factor).saturating_sub(passed)
     }
 
     /// What the world's clock will read in so long a time, by the thousandth of a second.
     fn after(&self, while_on_the_wall: Duration) -> Rational {
-        let passed = self.clock.elapsed().saturating_sub(self.stopped.get());
+        let passed = self.clock.elapsed().saturating_sub(self.stopped());
         let millis = (passed + while_on_the_wall).as_millis();
         let seconds = Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000);
         seconds * &self.factor
@@ -55,7 +58,7 @@ impl Pace {
     /// what is longer, the world's clock was stopped.
     fn stop(&self, spent: Duration, allowed: &Rational) {
         let excess = spent.saturating_sub(on_the_wall(allowed, &self.factor));
-        self.stopped.set(self.stopped.get() + excess);
+        *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) += excess;
     }
 }
 
@@ -105,26 +108,18 @@ impl World for Realtime<'_> {
     ) -> Result<Vec<Observation>, WorldError> {
         self.inner.look(facts, fluents)
     }
-
-    fn know(&mut self, task: &Arc<Task>) {
-        self.inner.know(task);
-    }
-
-    fn grown(&mut self) -> Option<Arc<Task>> {
-        self.inner.grown()
-    }
 }
 
 /// A planner in such a world.
 pub(super) struct PacedPlanner<'a> {
-    pub(super) inner: &'a mut dyn Planner,
+    pub(super) inner: Box<dyn Planner + 'a>,
     pub(super) pace: &'a Pace,
     /// How long a plan takes in the world.
     pub(super) planning_time: &'a PlanningTime,
 }
 
 impl Planner for PacedPlanner<'_> {
-    fn plan(&mut self, task: &mut Task, situation: &Situation) -> PlannerAnswer {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
         let mut answer = self.inner.plan(task, situation);
         match self.planning_time {
@@ -158,8 +153,8 @@ mod tests {
         let pace = Pace::new(&Rational::from(10));
         // Two seconds of planning, of which the world sees three of its own, 0.3 on the wall.
         pace.stop(Duration::from_secs(2), &Rational::from(3));
-        assert_eq!(pace.stopped.get(), Duration::from_millis(1700));
+        assert_eq!(pace.stopped(), Duration::from_millis(1700));
         pace.stop(Duration::from_millis(100), &Rational::from(3));
-        assert_eq!(pace.stopped.get(), Duration::from_millis(1700));
+        assert_eq!(pace.stopped(), Duration::from_millis(1700));
     }
 }

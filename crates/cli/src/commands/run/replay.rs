@@ -1,21 +1,16 @@
 //! `elbowroom run --replay`: does a stored run come to the same decisions?
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use elbowroom::envelope::Guarantee;
-use elbowroom::execution::Odds;
-use elbowroom::execution::run::{PlanningTime, RunSettings, RunningRule};
-use elbowroom::model::Task;
-use elbowroom::num::Rational;
-use elbowroom::pddl::Source;
-use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored};
-use elbowroom::sim::WorldModel;
+use elbowroom::answers::run::run as execute;
+use elbowroom::answers::{Halt, RunRequest, Watcher};
+use elbowroom::execute::RunSpec;
+use elbowroom::report::trace::{Line, Replay, ReplayPlanner, ReplayWorld, Stored};
 use serde_json::{Value, json};
 
-use super::planner::odds;
-use super::{Choices, Planning, Texts, planning_time};
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::{BAD, GOOD, styled};
 use crate::{input, output};
@@ -25,39 +20,29 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     let text = input::source(path, "trace")?;
     let unreadable = |message: String| Failure::new(format!("{name}, {message}"), "");
     let stored = Stored::read(text.text()).map_err(|error| unreadable(error.to_string()))?;
-    let header = Header(&stored.header);
-    let texts = Texts {
-        domain: header
-            .source("domain")
-            .ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
-        problem: header
-            .source("problem")
-            .ok_or_else(|| unreadable(NO_PROBLEM.to_owned()))?,
-    };
-    let mut task = texts.task()?;
-    let first = if header.0.get("has_plan").and_then(Value::as_bool) == Some(true) {
-        let first = stored.first_plan(&mut task);
+    let spec: RunSpec = stored.header().map_err(|error| {
+        let hint = "the trace may be of another version of this program";
+        Failure::new(format!("{name}, {error}"), hint)
+    })?;
+    let task = super::task(&spec)?;
+    let first = if spec.has_plan {
+        let first = stored.first_plan(&task);
         first.map_err(|error| unreadable(error.to_string()))?
     } else {
         None
     };
-    let choices = match header.source("likelihoods") {
-        Some(text) => header.choices()?.with_likelihoods(&text, &task)?,
-        None => header.choices()?,
-    };
     let task = Arc::new(task);
-    let mut world = ReplayWorld::new(&stored, &task);
-    let mut planner = ReplayPlanner::new(&stored);
     let mut replay = Replay::new(&stored, Arc::clone(&task));
-    let odds = header.odds(&choices, &task).map_err(unreadable)?;
-    let planning = Planning {
-        planner: &mut planner,
-        odds,
-    };
-    let interruption = replay.interruption();
-    let is_to_end = || interruption.load(Ordering::SeqCst);
-    let (task, first) = (&task, first.as_ref());
-    choices.run_with(task, first, &mut world, planning, &mut replay, &is_to_end);
+    let request = RunRequest::new(&spec, &task)
+        .beginning_with(first)
+        .planned_by(ReplayPlanner::new(&stored));
+    let mut watch = AsStored(replay.interruption());
+    execute(
+        request.recorded_by(&mut replay),
+        &mut ReplayWorld::new(&stored, &task),
+        &mut watch,
+    )
+    .map_err(|error| unreadable(format!("line 1: {error}")))?;
     let (agreed, difference) = replay.outcome();
     if as_json {
         output::print_json(&json!({
@@ -66,11 +51,11 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
             "trace": name,
             "agrees": difference.is_none(),
             "entries": agreed,
-            "complete": !stored.is_cut_off && ends(&stored),
+            "complete": !stored.is_cut_off && stored.is_complete(),
             "difference": difference.as_ref().map(|it| json!({
                 "line": it.line,
-                "stored": it.stored,
-                "replayed": it.replayed,
+                "stored": json_of(&it.stored),
+                "replayed": json_of(&it.replayed),
             })),
         }))?;
     } else {
@@ -78,7 +63,7 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
             None => format!(
                 "{}: {name} comes to the same decisions ({agreed} entries{})\n",
                 styled(GOOD, "agrees"),
-                if ends(&stored) {
+                if stored.is_complete() {
                     ""
                 } else {
                     "; the run was cut short"
@@ -88,8 +73,8 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
                 "{}: {name} differs at line {}\n  stored    {}\n  replayed  {}\n",
                 styled(BAD, "differs"),
                 difference.line,
-                difference.stored,
-                difference.replayed
+                difference.stored.text(),
+                difference.replayed.text()
             ),
         })?;
     }
@@ -99,78 +84,19 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     })
 }
 
-const NO_PROBLEM: &str = "line 1: domain or problem is missing";
-
-fn ends(stored: &Stored) -> bool {
-    let last = stored.entries.last();
-    last.and_then(|entry| entry.get("event"))
-        .and_then(Value::as_str)
-        == Some("over")
+fn json_of(line: &Line) -> Value {
+    serde_json::from_str(&line.text()).unwrap_or(Value::Null)
 }
 
-/// The first line of a trace.
-struct Header<'a>(&'a Value);
+/// Ends the run where the stored one was asked to end.
+struct AsStored(Arc<AtomicBool>);
 
-impl Header<'_> {
-    fn text(&self, name: &str) -> &str {
-        self.0.get(name).and_then(Value::as_str).unwrap_or_default()
-    }
-
-    fn source(&self, name: &str) -> Option<Source> {
-        let source = self.0.get(name)?;
-        let text = source.get("text")?.as_str()?;
-        Some(Source::new(source.get("name")?.as_str()?, text))
-    }
-
-    fn number(&self, name: &str, otherwise: Rational) -> Rational {
-        self.text(name).parse().unwrap_or(otherwise)
-    }
-
-    /// What was taken for likely, if the executor asked for that.
-    fn odds(&self, choices: &Choices, task: &Task) -> Result<Option<Box<dyn Odds>>, String> {
-        if !choices.executor.asks_odds() {
-            return Ok(None);
+impl Watcher for AsStored {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.0.load(Ordering::SeqCst) {
+            ControlFlow::Break(Halt::Cancelled)
+        } else {
+            ControlFlow::Continue(())
         }
-        let model = WorldModel::read(self.text("world"), task.problem());
-        let model = model.map_err(|error| format!("line 1: the world: {error}"))?;
-        let count = |name: &str| self.0.get(name).and_then(Value::as_u64).unwrap_or_default();
-        let states = (count("planner_states"), count("improve_states"));
-        Ok(Some(odds(&model, states, choices)))
-    }
-
-    fn choices(&self) -> Result<Choices, Failure> {
-        let plain = RunSettings::default();
-        let vary = self.0.get("vary").and_then(Value::as_array);
-        let vary: Vec<String> = vary
-            .into_iter()
-            .flatten()
-            .filter_map(|spec| spec.as_str().map(str::to_owned))
-            .collect();
-        // Traces from before there were guarantees do not say which.
-        let named = Guarantee::ALL
-            .into_iter()
-            .find(|it| it.name() == self.text("guarantee"));
-        let guarantee = named.unwrap_or_default();
-        let replans = self.0.get("max_replans").and_then(Value::as_u64);
-        let running = RunningRule::NAMES
-            .iter()
-            .find(|(_, name)| *name == self.text("running"));
-        Choices::new(
-            self.text("executor"),
-            &vary,
-            guarantee,
-            &self.number("precision", Rational::ONE),
-            RunSettings {
-                epsilon: self.number("epsilon", plain.epsilon.clone()),
-                running: running.map_or(plain.running, |(rule, _)| *rule),
-                planning_time: planning_time(self.text("planning_time"))
-                    .unwrap_or(PlanningTime::Measured),
-                most_replans: replans
-                    .and_then(|count| usize::try_from(count).ok())
-                    .unwrap_or(plain.most_replans),
-                time_limit: self.number("time_limit", plain.time_limit.clone()),
-                ..plain
-            },
-        )
     }
 }

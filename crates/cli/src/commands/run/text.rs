@@ -4,20 +4,11 @@ use std::fmt::Write as _;
 
 use elbowroom::execution::Ending;
 use elbowroom::execution::run::{Report, Verdict};
-use elbowroom::report::trace;
-use serde_json::Value;
 
 use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::number::nearest;
 use crate::output::{counted, tame};
 use crate::wrap::wrapped;
-
-pub(super) fn document(report: &Report) -> Value {
-    let mut document = trace::report(report);
-    document["format"] = "elbowroom-run".into();
-    document["version"] = 1.into();
-    document
-}
 
 pub(super) fn human(report: &Report) -> String {
     let replans = counted(report.replans, "new plan");
@@ -65,17 +56,20 @@ pub(super) fn human(report: &Report) -> String {
         ("Why no plan reaches the goal", &report.dead_end),
         ("Why the plan was given up", &report.reasons),
     ] {
-        if reasons.is_empty() {
-            continue;
-        }
-        let _ = writeln!(text, "\n{}", styled(STRONG, heading));
-        for reason in reasons {
-            // What worlds and other programs say is in there.
-            let reason = tame(&reason.to_string());
-            let _ = writeln!(text, "{}", wrapped(&reason, width, 2));
+        // What worlds and other programs say is in there. Nothing is said twice.
+        let reasons = reasons.iter().map(|reason| tame(&reason.to_string()));
+        let reasons: Vec<String> = reasons
+            .map(|reason| wrapped(&reason, width, 2))
+            .filter(|reason| !text.contains(reason))
+            .collect();
+        if !reasons.is_empty() {
+            let heading = styled(STRONG, heading);
+            let _ = writeln!(text, "\n{heading}\n{}", reasons.join("\n"));
         }
     }
-    let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));
+    if !report.executed.is_empty() {
+        let _ = writeln!(text, "\n{}", styled(STRONG, "What was done"));
+    }
     for executed in &report.executed {
         let step = &executed.step;
         let _ = write!(text, "  {:>10}: {}", nearest(&step.start), step.action.name);

@@ -8,7 +8,7 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{EnvelopeRequest, Foresight, Subject};
+use super::{Conditions, EnvelopeRequest, Foresight, Subject};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -77,6 +77,9 @@ pub enum EnvelopeFinding {
         seconds: f64,
         /// Each box found to be inside, in order.
         widenings: Vec<Widened>,
+        /// How the conditions that the plan has to meet are met.
+        #[serde(default)]
+        conditions: Conditions,
         /// What it would be worth to know values in advance, if anything.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
@@ -301,7 +304,7 @@ impl EnvelopeAnswer {
                 guarantee: request.guarantee,
                 growth: search.growth,
                 precision: search.precision.clone(),
-                epsilon: request.epsilon.clone(),
+                epsilon: request.task.epsilon().clone(),
                 sharpen: search.sharpen,
             },
             finding,

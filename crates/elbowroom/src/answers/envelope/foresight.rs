@@ -48,12 +48,7 @@ pub(super) fn foresight(
     if unknown.is_empty() || flow(watcher).is_break() {
         return Ok(None);
     }
-    let weak = Oracle::new(
-        &request.task,
-        subject.plan,
-        &request.epsilon,
-        Guarantee::Weak,
-    );
+    let weak = Oracle::new(&request.task, subject.plan, Guarantee::Weak);
     let mut weak = weak.map_err(FlowError::Refused)?;
     let settings = elbowroom_envelope::Settings {
         precision: request.search.precision.clone(),

@@ -7,6 +7,7 @@ use elbowroom_envelope::{Oracle, StopReason, Widening, irr, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
+use super::conditions::Conditions;
 use super::foresight::foresight;
 use super::limits::what_limits;
 use super::{EnvelopeOutcome, Subject};
@@ -65,6 +66,7 @@ pub(super) fn search(
     }
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
+    let conditions = Conditions::new(oracle.conditions(), subject.enforced);
     let limits = what_limits(subject, &mut oracle, &envelope, watcher);
     let foresight = match stop {
         Stop::Converged => foresight(subject, &mut oracle, &envelope, watcher)?,
@@ -76,6 +78,7 @@ pub(super) fn search(
         checks,
         seconds,
         widenings,
+        conditions,
         foresight,
         makespans: Makespans::of(subject.plan, &envelope),
     });

@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom_model::Situation;
-use elbowroom_pddl::Source;
-use elbowroom_planner::external::{
+use elbowroom_external::{
     Ending, Event, Outcome, Planner, Report, Request, Settings, Statistics, plan,
 };
+use elbowroom_model::Situation;
+use elbowroom_pddl::Source;
 
 use super::{
     Course, Halt, PlanAnswer, PlanFinding, PlanFormat, PlanOutcome, PlanRequest, PlanStatistics,
@@ -41,12 +41,10 @@ pub fn plan_with(
     let situation = Situation::initial(request.task);
     let settings = Settings {
         work_limit: None,
-        epsilon: request.epsilon.clone(),
         time_limit,
         memory_limit: request.most_memory,
         scratch: None,
     };
-    let epsilon = request.epsilon.clone();
     let first_plan_only = request.first_plan_only;
     let mut course = Course {
         begun: watcher.elapsed(),
@@ -58,13 +56,13 @@ pub fn plan_with(
     let report = plan(
         planner,
         &mut Request {
-            task: &mut *request.task,
+            task: request.task,
             situation: &situation,
             domain,
             problem,
         },
         &settings,
-        &mut |task, plan| flow::repaired(task, plan, &epsilon),
+        &mut flow::repaired,
         &mut |event| course.hear(event, first_plan_only),
     );
     let halt = course.halt;

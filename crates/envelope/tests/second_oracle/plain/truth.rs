@@ -66,7 +66,8 @@ impl Search<'_> {
                 let task = self.task;
                 // Conditions of the action and of the rules from here on.
                 let mut wanted: Vec<Wanted<'_>> = wanted;
-                let rules = task.rules().iter().filter(|rule| rule.head == *fact);
+                let rules = task.rules();
+                let rules = rules.iter().filter(|rule| rule.head == *fact);
                 let bodies: Vec<_> = rules.map(|rule| (&rule.body, want)).collect();
                 if is_positive {
                     for body in bodies {

@@ -16,7 +16,7 @@ use crate::dispatch::replan;
 use crate::event::Ending;
 use crate::executor::{Decided, Decision, Mission, Moment, News, Order, Planned, StepId};
 use crate::progression::Progression;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 /// A search looks at so many happenings at most, sequences times the plan's length; then the best
 /// order so far is taken. Plans of some twenty happenings are searched to the end.
@@ -185,7 +185,7 @@ impl Rest {
 
     /// What has happened so lately that what interferes with it has to wait.
     fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
-        let epsilon = &self.mission.epsilon;
+        let epsilon = self.mission.task.epsilon();
         self.recent.retain(|(_, time)| time + epsilon > *now);
         let model = self.chooser.search().model();
         let nodes = model.plan().nodes.iter().enumerate();
@@ -205,10 +205,10 @@ impl Rest {
     /// What to do now.
     pub(super) fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if !self.let_go.is_empty() {
-            return wait(None, "what was told to stop has stopped");
+            return wait(None, About::EndOfCancelled);
         }
         if self.under_way.values().any(|(_, start)| start.is_none()) {
-            return wait(None, "what was told to start has started");
+            return wait(None, About::StartOfOrdered);
         }
         let now = moment.now - &self.mission.origin;
         let mut circumstances = Circumstances::observed(now.clone(), &moment.belief.state());
@@ -232,7 +232,9 @@ impl Rest {
             }
         };
         match self.chooser.choose(&circumstances, &mut most) {
-            Err(coupled) => replan(Reason::new(Cause::NoOrder).about(coupled.to_string())),
+            Err(coupled) => {
+                replan(Reason::new(Cause::NoOrder).about(About::Said(coupled.to_string())))
+            }
             Ok(Choice::GoalReached) => Decided {
                 decision: Decision::GoalReached,
                 reason: Reason::new(Cause::GoalReached),
@@ -242,7 +244,7 @@ impl Rest {
                 // What is under way is ended before a plan is given up: a robot that is let go
                 // between two places is at neither. And it may change what can be done.
                 let until = self.first_overdue().map(|time| self.world(&time));
-                wait(until, "what is under way has ended")
+                wait(until, About::EndOfRunning)
             }
             Ok(Choice::Abandon(instance)) => self.let_go(instance, &now),
             Ok(Choice::Replan) => {
@@ -260,7 +262,7 @@ impl Rest {
         if *times >= MOST_LET_GO {
             let overdue = self.first_overdue().filter(|time| time > now);
             let until = overdue.map(|time| self.world(&time));
-            return wait(until, "what is under way has ended");
+            return wait(until, About::EndOfRunning);
         }
         *times += 1;
         let is_it = |(step, (under_way, _)): (&StepId, &(InstanceId, Option<Rational>))| {
@@ -273,7 +275,7 @@ impl Rest {
             decision: Decision::Cancel(steps),
             reason: Reason::new(Cause::Likelier)
                 .of(name)
-                .about(format!("one that does not wait for the end of {name}")),
+                .about(About::WithoutEndOf(name.clone())),
         }
     }
 
@@ -288,7 +290,7 @@ impl Rest {
         let plan = self.chooser.search().model().plan();
         let ends = self.under_way.values().filter_map(|(instance, start)| {
             let latest = plan.duration(*instance).1?;
-            Some(start.as_ref()? + latest + &self.mission.epsilon)
+            Some(start.as_ref()? + latest + self.mission.task.epsilon())
         });
         ends.min()
     }
@@ -309,15 +311,12 @@ impl Rest {
                 .slot
                 .latest
                 .as_ref()
-                .map(|latest| latest + &self.mission.epsilon);
+                .map(|latest| latest + self.mission.task.epsilon());
             let until = late.filter(|late| late > now);
-            return wait(
-                until.map(|until| world(&until)),
-                "what is next in the order has happened",
-            );
+            return wait(until.map(|until| world(&until)), About::NextHappening);
         };
         if next.slot.earliest > *now {
-            return wait(Some(world(&next.slot.earliest)), "the order's next start");
+            return wait(Some(world(&next.slot.earliest)), About::NextStart);
         }
         let step = StepId(self.next_step);
         self.next_step = self.next_step.saturating_add(1);
@@ -332,7 +331,7 @@ impl Rest {
             },
         };
         let name = &planned.action.name;
-        let about = self.chooser.words(next);
+        let about = self.chooser.about(next);
         let reason = Reason::new(Cause::Due).of(name).about(about);
         self.under_way.insert(step, (instance, None));
         Decided {
@@ -354,11 +353,14 @@ fn failed(
     if (1.0 - success).powi(failures) >= TOO_UNLIKELY && failures < MOST_FAILURES {
         return None;
     }
-    let why = match ending {
-        Ending::Failed { why } => why.as_str(),
-        Ending::Succeeded | Ending::Cancelled => "it was cancelled",
+    let about = About::FailedInARow {
+        why: match ending {
+            Ending::Failed { why } => Some(why.clone()),
+            Ending::Succeeded | Ending::Cancelled => None,
+        },
+        failures,
+        success,
     };
-    let about = format!("{why}; {failures} in a row, and it starts with probability {success}");
     Some(Reason::new(Cause::Failed).of(&action.name).about(about))
 }
 
@@ -376,7 +378,7 @@ fn lacks_something(step: &Step, has_started: bool, belief: &Progression) -> bool
     held.any(|holds| holds == Ok(false))
 }
 
-fn wait(until: Option<Rational>, why: &str) -> Decided {
+fn wait(until: Option<Rational>, why: About) -> Decided {
     Decided {
         decision: Decision::Wait { until },
         reason: Reason::new(Cause::NothingDue).about(why),

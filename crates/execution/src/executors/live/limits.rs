@@ -7,7 +7,7 @@ use super::{Rest, range};
 use crate::executor::{Decided, Decision};
 use crate::preparation::Region;
 use crate::quantities::duration_parameters;
-use crate::reason::{Cause, Reason};
+use crate::reason::{About, Cause, Reason};
 
 impl Rest {
     /// Finds out how long each action under way may take, as far as numbers depend on it.
@@ -30,7 +30,7 @@ impl Rest {
             };
             let least = &values[parameter.index()];
             let (_, most) = range(&self.mission.plan, parameter);
-            let limit = greatest(least, most.as_ref(), &self.mission.epsilon, &mut does);
+            let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
             if let Some(limit) = limit {
                 self.limits.insert(instance, limit);
             }
@@ -55,8 +55,9 @@ impl Rest {
                 return None;
             }
             let action = &self.dispatch.action(*instance).name;
-            let about = "after more than that, what the rest of the plan does to numbers fails";
-            let mut reason = Reason::new(Cause::Outlived).of(action).about(about);
+            let mut reason = Reason::new(Cause::Outlived)
+                .of(action)
+                .about(About::LaterNumbers);
             reason.observed = Some(&local - &time + limit);
             reason.allowed = Some(Interval::closed(Rational::ZERO, limit.clone()));
             reason.by = Some(&local - &time);
@@ -72,7 +73,7 @@ impl Rest {
         let limits = self.limits.iter();
         let times = limits.filter_map(|(instance, limit)| {
             let time = self.limit_of(*instance, limit)?;
-            Some(self.dispatch.world(&time) + &self.mission.epsilon)
+            Some(self.dispatch.world(&time) + self.mission.task.epsilon())
         });
         let until = times.chain(until.clone()).min();
         Decided {

@@ -29,14 +29,14 @@ struct Possible {
 }
 
 pub(super) fn ground(problem: &Problem) -> Expected {
-    let mut task = Task::new(problem.clone());
+    let task = Task::new(problem.clone());
     for rule in &problem.rules {
         for arguments in bindings(problem, &rule.parameters) {
-            task.fact(rule.predicate, &arguments);
+            task.grounding(|grounder| grounder.fact(rule.predicate, &arguments));
         }
     }
     let mut candidates: Vec<Action> = (0..problem.schemas.len())
-        .flat_map(|schema| instances(&mut task, SchemaId::from(schema)))
+        .flat_map(|schema| instances(&task, SchemaId::from(schema)))
         .collect();
     loop {
         let (possible, started, ended) = sweep(&task, &candidates);
@@ -65,7 +65,7 @@ pub(super) fn ground(problem: &Problem) -> Expected {
     }
 }
 
-fn instances(task: &mut Task, schema: SchemaId) -> Vec<Action> {
+fn instances(task: &Task, schema: SchemaId) -> Vec<Action> {
     let problem = task.problem().clone();
     let parameters = &problem.schemas[schema.index()].parameters;
     bindings(&problem, parameters)
@@ -110,7 +110,7 @@ fn sweep(task: &Task, candidates: &[Action]) -> (Possible, BTreeSet<usize>, BTre
                 }
             }
         }
-        for rule in task.rules() {
+        for rule in task.rules().iter() {
             if possible.holds(task, &rule.body, true) {
                 possible.ever_true.insert(rule.head);
             }

@@ -74,7 +74,7 @@ fn a_timed_initial_interferes_with_actions_and_not_with_other_timed_initials() {
 #[test]
 fn without_epsilon_interfering_happenings_only_must_not_coincide() {
     let world = handover().settings(Settings {
-        epsilon: None,
+        needs_separation: false,
         ..Settings::default()
     });
     assert_eq!(world.judge("1: give\n1.0000001: take"), "valid");
@@ -82,7 +82,7 @@ fn without_epsilon_interfering_happenings_only_must_not_coincide() {
         .instant("use", "(p)", "")
         .instant("spoil", "", "(not (p))")
         .settings(Settings {
-            epsilon: None,
+            needs_separation: false,
             ..Settings::default()
         });
     assert!(

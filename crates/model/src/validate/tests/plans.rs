@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use super::world::World;
 use crate::plan::TimeTriggeredPlan;
 use crate::situation::{RunningAction, Situation};
-use crate::task::{State, Task};
+use crate::state::State;
+use crate::task::Task;
 use crate::validate::{Verdict, validate, validate_from};
 
 /// Facts `p` and `q` hold, and `x` is 5, at the beginning; `q` ends at 9/2 and returns at 11/2.

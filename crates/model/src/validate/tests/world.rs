@@ -139,7 +139,7 @@ impl World {
 
     /// Lines `time: name` or `time: name [duration]`.
     pub(super) fn task_and_plan(&self, plan: &str) -> (Task, TimeTriggeredPlan) {
-        let mut task = Task::new(self.problem.clone());
+        let task = Task::new(self.problem.clone());
         let mut steps = Vec::new();
         for line in plan.lines().map(str::trim).filter(|line| !line.is_empty()) {
             let (time, rest) = line.split_once(':').expect("time: name");

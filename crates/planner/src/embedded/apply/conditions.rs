@@ -3,10 +3,11 @@
 use elbowroom_num::Rational;
 
 use super::super::compile::Action;
+use super::super::expressions::Moment;
 use super::super::formula::Formula;
 use super::super::network::SETTLED;
 use super::super::state::{Open, State};
-use super::super::symbolic::{self, Moment};
+use super::super::symbolic;
 use super::{Stepper, duration_form};
 
 impl Stepper<'_> {

@@ -4,8 +4,9 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;
 
 use super::super::compile::Action;
+use super::super::expressions::Moment;
 use super::super::state::State;
-use super::super::symbolic::{self, Moment};
+use super::super::symbolic;
 use super::super::time::{NEVER, Ticks};
 use super::Stepper;
 

@@ -4,9 +4,10 @@ use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
 use super::super::compile::{Change, Snap, Update};
+use super::super::expressions::Moment;
 use super::super::formula::{Numeric, set};
 use super::super::state::State;
-use super::super::symbolic::{self, Moment};
+use super::super::symbolic;
 use super::Stepper;
 
 impl Stepper<'_> {

@@ -4,6 +4,7 @@ use super::super::compile::Snap;
 use super::super::network::{NodeId, SETTLED};
 use super::super::state::{Open, State};
 use super::super::time::{NEVER, Ticks};
+use super::super::tuning::Technique;
 use super::Stepper;
 
 /// When a happening may be.
@@ -21,11 +22,16 @@ impl Stepper<'_> {
             latest: self.horizon,
             after: Vec::new(),
         };
-        for &(stamp, distance) in &snap.after {
-            place.earliest = place.earliest.max(state.stamps[stamp as usize] + distance);
+        for &(annotation, distance) in &snap.after {
+            place.earliest = place
+                .earliest
+                .max(state.annotations[annotation as usize] + distance);
         }
-        for &(stamp, node) in &state.network.marks {
-            if let Ok(found) = snap.after.binary_search_by_key(&stamp, |after| after.0) {
+        for &(annotation, node) in &state.network.marks {
+            if let Ok(found) = snap
+                .after
+                .binary_search_by_key(&annotation, |after| after.0)
+            {
                 place.after.push((node, snap.after[found].1));
             }
         }
@@ -69,6 +75,9 @@ impl Stepper<'_> {
     /// Puts the new one among those under way: where the end of one breaks the over-all condition
     /// of another, that one must be over by then.
     pub(super) fn nest(&self, state: &mut State, new: &Open) -> Option<()> {
+        if !self.compiled.tuning.uses(Technique::Nesting) {
+            return Some(());
+        }
         let State { network, open, .. } = state;
         for other in open.iter() {
             for (inner, outer) in [(new, other), (other, new)] {
@@ -123,9 +132,9 @@ pub(super) fn insert(
         if place.earliest > place.latest {
             return None;
         }
-        for &stamp in &snap.marks {
-            let stamp = &mut state.stamps[stamp as usize];
-            *stamp = (*stamp).max(place.earliest);
+        for &annotation in &snap.marks {
+            let annotation = &mut state.annotations[annotation as usize];
+            *annotation = (*annotation).max(place.earliest);
         }
         state.settled_end = state.settled_end.max(place.earliest);
         return Some(SETTLED);
@@ -134,8 +143,8 @@ pub(super) fn insert(
         .network
         .add_node(place.earliest, place.latest, &place.after)
         .ok()?;
-    for &stamp in &snap.marks {
-        state.network.mark(stamp, node);
+    for &annotation in &snap.marks {
+        state.network.mark(annotation, node);
     }
     Some(node)
 }
@@ -152,8 +161,8 @@ pub(super) fn reach_foreseen_end(
     }
     state.network.delay(end, place.earliest).ok()?;
     state.network.hurry(end, place.latest).ok()?;
-    for &stamp in &snap.marks {
-        state.network.mark(stamp, end);
+    for &annotation in &snap.marks {
+        state.network.mark(annotation, end);
     }
     Some(())
 }
@@ -198,10 +207,10 @@ fn settle_all(state: &mut State) {
     state.settled_end = state.settled_end.max(state.network.earliest_end());
     state.last.floor = state.last.earliest(&state.network);
     state.last.node = SETTLED;
-    let stamps = &mut state.stamps;
-    state.network.settle_all(&mut |stamp, time| {
-        let stamp = &mut stamps[stamp as usize];
-        *stamp = (*stamp).max(time);
+    let annotations = &mut state.annotations;
+    state.network.settle_all(&mut |annotation, time| {
+        let annotation = &mut annotations[annotation as usize];
+        *annotation = (*annotation).max(time);
     });
 }
 
@@ -213,10 +222,10 @@ pub(super) fn settle(state: &mut State) {
     let open = &state.open;
     let mut nodes = open.iter().map(|open| open.node).filter(|&n| n != SETTLED);
     let end = state.network.earliest_end();
-    let stamps = &mut state.stamps;
-    let names = state.network.settle(&mut nodes, &mut |stamp, time| {
-        let stamp = &mut stamps[stamp as usize];
-        *stamp = (*stamp).max(time);
+    let annotations = &mut state.annotations;
+    let names = state.network.settle(&mut nodes, &mut |annotation, time| {
+        let annotation = &mut annotations[annotation as usize];
+        *annotation = (*annotation).max(time);
     });
     for open in &mut state.open {
         if open.node != SETTLED {

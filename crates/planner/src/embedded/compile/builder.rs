@@ -11,18 +11,19 @@ use elbowroom_num::Rational;
 
 pub(super) use durations::reads_duration;
 
+use super::compressibility::excludes_itself;
 use super::directions::Shifts;
-use super::eagerness::excludes_itself;
-use super::interference::{Links, Wishes};
+use super::interference::{Links, Separations};
 use super::metric::Draft;
 use super::reads::{read_action, visit_changes};
 use super::shortened::full_actions;
 use super::symbols::Symbols;
 use super::times::has_fixed_numbers;
 use super::unsupported::{Unsupported, check};
-use super::{Action, Compiled, Duration, Eagerness, Flow, NONE, Snap};
+use super::{Action, Compiled, Compressibility, Duration, Flow, NONE, Snap};
 use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
+use crate::embedded::tuning::Tuning;
 
 /// How many actions are compiled between two questions whether to go on.
 const ACTIONS_PER_QUESTION: usize = 256;
@@ -40,22 +41,20 @@ pub(crate) enum Failure {
 pub(crate) struct Wanted<'a> {
     /// Where plans begin.
     pub(crate) situation: &'a Situation,
-    pub(crate) epsilon: &'a Rational,
     /// Whether the problem's metric matters.
     pub(crate) metric: bool,
+    pub(crate) tuning: &'a Tuning,
 }
 
 /// Compiles `grounding`, which is what `task` can reach from the situation, as long as `goes_on`
 /// says so.
 pub(crate) fn compile(
-    task: &mut Task,
+    task: &Task,
     grounding: &Grounding,
     wanted: Wanted<'_>,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Result<Compiled, Failure> {
-    let Wanted {
-        situation, epsilon, ..
-    } = wanted;
+    let Wanted { situation, .. } = wanted;
     let mut full = full_actions(task, grounding, goes_on).ok_or(Failure::Stopped)?;
     if !goes_on() {
         return Err(Failure::Stopped);
@@ -78,8 +77,8 @@ pub(crate) fn compile(
             return Err(Failure::Stopped);
         }
     }
-    let scale = scale_of(task, grounding, situation, epsilon);
-    builder.epsilon = scale.ceil(epsilon).0.max(1);
+    let scale = scale_of(task, grounding, situation);
+    builder.epsilon = scale.ceil(task.epsilon()).0.max(1);
     for running in &situation.running {
         builder.running(&running.action);
     }
@@ -91,7 +90,7 @@ pub(crate) fn compile(
         }
     }
     builder
-        .finish(grounding, situation, scale, goes_on)
+        .finish(grounding, wanted, scale, goes_on)
         .ok_or(Failure::Stopped)
 }
 
@@ -101,20 +100,15 @@ struct Builder<'a> {
     links: Links,
     epsilon: Ticks,
     snaps: Vec<Snap>,
-    wishes: Vec<Wishes>,
+    separations: Vec<Separations>,
     actions: Vec<Action>,
     over_all: Vec<Condition>,
     metric: Option<Draft>,
 }
 
 /// The grid for all times and constant durations.
-fn scale_of(
-    task: &Task,
-    grounding: &Grounding,
-    situation: &Situation,
-    epsilon: &Rational,
-) -> Scale {
-    let mut numbers: Vec<&Rational> = vec![epsilon, &situation.time];
+fn scale_of(task: &Task, grounding: &Grounding, situation: &Situation) -> Scale {
+    let mut numbers: Vec<&Rational> = vec![task.epsilon(), &situation.time];
     numbers.extend(task.timed().iter().map(|timed| &timed.time));
     for running in &situation.running {
         numbers.push(&running.start);
@@ -140,7 +134,7 @@ impl<'a> Builder<'a> {
             links: Links::default(),
             epsilon: 1,
             snaps: Vec::new(),
-            wishes: Vec::new(),
+            separations: Vec::new(),
             actions: Vec::new(),
             over_all: Vec::new(),
             metric: None,
@@ -195,9 +189,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn push_snap(&mut self, snap: Snap, wishes: Wishes) -> u32 {
+    fn push_snap(&mut self, snap: Snap, separations: Separations) -> u32 {
         self.snaps.push(snap);
-        self.wishes.push(wishes);
+        self.separations.push(separations);
         narrow(self.snaps.len() - 1)
     }
 
@@ -223,11 +217,11 @@ impl<'a> Builder<'a> {
             Body::Instantaneous(body) => Shifts::of(&body.effects),
             Body::Durative(body) => Shifts::of(&body.start.effects),
         };
-        let mut wishes = Wishes::of(&starts, &shifts, self.epsilon, &self.links);
+        let mut separations = Separations::of(&starts, &shifts, self.epsilon, &self.links);
         match &action.body {
             Body::Instantaneous(body) => {
                 let snap = self.snap(body, &mut Vec::new());
-                let start = self.push_snap(snap, wishes);
+                let start = self.push_snap(snap, separations);
                 self.actions.push(Action {
                     schema: action.schema,
                     arguments: action.arguments.clone(),
@@ -242,18 +236,18 @@ impl<'a> Builder<'a> {
                     },
                     flows: Vec::new(),
                     breaking_timed: Vec::new(),
-                    eagerness: Eagerness::Offers,
-                    only_adds_at_end: false,
+                    compressibility: Compressibility::Envelope,
+                    is_compression_safe: false,
                     excludes_itself: true,
                     uses_duration: false,
                 });
                 self.over_all.push(Condition::TRUE);
             }
             Body::Durative(body) => {
-                wishes.need_from_now_on(self.task, &body.over_all, &self.links);
+                separations.need_from_now_on(self.task, &body.over_all, &self.links);
                 let mut guards = Vec::new();
                 let snap = self.snap(&body.start, &mut guards);
-                let start = self.push_snap(snap, wishes);
+                let start = self.push_snap(snap, separations);
                 let shifts = full
                     .durative()
                     .map_or_else(Shifts::default, |body| Shifts::of(&body.end.effects));
@@ -282,10 +276,10 @@ impl<'a> Builder<'a> {
         shifts: &Shifts,
         guards: &mut Vec<Formula>,
     ) -> u32 {
-        let mut wishes = Wishes::of(footprint, shifts, self.epsilon, &self.links);
-        wishes.needed_until_now(self.task, &body.over_all, &self.links);
+        let mut separations = Separations::of(footprint, shifts, self.epsilon, &self.links);
+        separations.needed_until_now(self.task, &body.over_all, &self.links);
         let snap = self.snap(&body.end, guards);
-        self.push_snap(snap, wishes)
+        self.push_snap(snap, separations)
     }
 
     fn durative(
@@ -330,8 +324,8 @@ impl<'a> Builder<'a> {
             duration,
             flows,
             breaking_timed: Vec::new(),
-            eagerness: Eagerness::Offers,
-            only_adds_at_end: false,
+            compressibility: Compressibility::Envelope,
+            is_compression_safe: false,
             excludes_itself: start != NONE && excludes_itself(&self.snaps[start as usize]),
             uses_duration,
         }

@@ -1,4 +1,4 @@
-//! Which happenings must keep what distance: wishes first, then stamps for those that matter.
+//! Which happenings must keep what distance: separations first, then annotations for those that matter.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::Task;
@@ -37,7 +37,7 @@ use Access::{
 
 /// The distances a happening must keep, and the accesses it makes.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Wishes {
+pub(super) struct Separations {
     /// At least so long after the last access of that kind.
     pub(super) after: Vec<(Access, Ticks)>,
     pub(super) makes: Vec<Access>,
@@ -57,7 +57,7 @@ pub(super) struct Links {
     has_directions: bool,
 }
 
-impl Wishes {
+impl Separations {
     /// The distances and accesses of a happening that reads and writes this, and shifts fluents
     /// in these directions.
     pub(super) fn of(
@@ -66,50 +66,50 @@ impl Wishes {
         epsilon: Ticks,
         links: &Links,
     ) -> Self {
-        let mut wishes = Self::default();
+        let mut separations = Self::default();
         for &fact in &footprint.reads {
-            wishes.after([Added(fact), Deleted(fact)], epsilon);
-            wishes.makes.push(Read(fact));
+            separations.after([Added(fact), Deleted(fact)], epsilon);
+            separations.makes.push(Read(fact));
         }
         for &fact in &footprint.adds {
-            wishes.after([Deleted(fact), Read(fact)], epsilon);
-            wishes.after([NeededFalse(fact)], 0);
-            wishes.makes.push(Added(fact));
+            separations.after([Deleted(fact), Read(fact)], epsilon);
+            separations.after([NeededFalse(fact)], 0);
+            separations.makes.push(Added(fact));
         }
         for &fact in &footprint.deletes {
-            wishes.after([Added(fact), Read(fact)], epsilon);
-            wishes.after([NeededTrue(fact)], 0);
-            wishes.makes.push(Deleted(fact));
+            separations.after([Added(fact), Read(fact)], epsilon);
+            separations.after([NeededTrue(fact)], 0);
+            separations.makes.push(Deleted(fact));
         }
         for &fluent in &footprint.reads_fluents {
-            wishes.after([Raised(fluent), Lowered(fluent), Assigned(fluent)], epsilon);
-            wishes.makes.push(ReadValue(fluent));
+            separations.after([Raised(fluent), Lowered(fluent), Assigned(fluent)], epsilon);
+            separations.makes.push(ReadValue(fluent));
         }
         for &fluent in &footprint.shifts {
-            wishes.after([Assigned(fluent), ReadValue(fluent)], epsilon);
+            separations.after([Assigned(fluent), ReadValue(fluent)], epsilon);
             let direction = links.direction(shifts.of_fluent(fluent));
             if direction.up {
-                wishes.after([NeededLow(fluent)], 0);
-                wishes.makes.push(Raised(fluent));
+                separations.after([NeededLow(fluent)], 0);
+                separations.makes.push(Raised(fluent));
             }
             if direction.down {
-                wishes.after([NeededHigh(fluent)], 0);
-                wishes.makes.push(Lowered(fluent));
+                separations.after([NeededHigh(fluent)], 0);
+                separations.makes.push(Lowered(fluent));
             }
         }
         for &fluent in &footprint.assigns {
             let changes = [Assigned(fluent), Raised(fluent), Lowered(fluent)];
-            wishes.after(changes, epsilon);
-            wishes.after([ReadValue(fluent)], epsilon);
-            wishes.after([NeededHigh(fluent), NeededLow(fluent)], 0);
-            wishes.makes.push(Assigned(fluent));
+            separations.after(changes, epsilon);
+            separations.after([ReadValue(fluent)], epsilon);
+            separations.after([NeededHigh(fluent), NeededLow(fluent)], 0);
+            separations.makes.push(Assigned(fluent));
         }
-        for made in wishes.makes.clone() {
+        for made in separations.makes.clone() {
             if let Some(overtaken) = links.overtaken.get(&made) {
-                wishes.after(overtaken.iter().copied(), 0);
+                separations.after(overtaken.iter().copied(), 0);
             }
         }
-        wishes
+        separations
     }
 
     fn after(&mut self, accesses: impl IntoIterator<Item = Access>, distance: Ticks) {
@@ -229,22 +229,22 @@ impl Links {
 
 /// Numbers for the accesses that someone makes and someone waits for.
 #[derive(Debug)]
-pub(super) struct Stamps {
+pub(super) struct Annotations {
     numbers: Map<Access, u32>,
     count: usize,
 }
 
-impl Stamps {
-    pub(super) fn of<'a>(wishes: impl Iterator<Item = &'a Wishes> + Clone) -> Self {
+impl Annotations {
+    pub(super) fn of<'a>(separations: impl Iterator<Item = &'a Separations> + Clone) -> Self {
         let mut numbers: Map<Access, u32> = Map::default();
-        for wish in wishes.clone() {
-            for &access in &wish.makes {
+        for separation in separations.clone() {
+            for &access in &separation.makes {
                 numbers.insert(access, NONE);
             }
         }
         let mut count = 0;
-        for wish in wishes {
-            for (access, _) in &wish.after {
+        for separation in separations {
+            for (access, _) in &separation.after {
                 if let Some(number) = numbers.get_mut(access)
                     && *number == NONE
                 {
@@ -263,7 +263,7 @@ impl Stamps {
         self.count
     }
 
-    /// The stamps of the latest addition and deletion of a fact.
+    /// The annotations of the latest addition and deletion of a fact.
     pub(super) fn of_fact(&self, fact: FactId) -> [u32; 2] {
         [Added(fact), Deleted(fact)].map(|access| self.number(access).unwrap_or(NONE))
     }
@@ -278,21 +278,21 @@ impl Stamps {
         (number != NONE).then_some(number)
     }
 
-    /// The stamps to keep away from, each once with its largest distance.
-    pub(super) fn after(&self, wishes: &Wishes) -> Vec<(u32, Ticks)> {
-        let mut list: Vec<(u32, Ticks)> = wishes
+    /// The annotations to keep away from, each once with its largest distance.
+    pub(super) fn after(&self, separations: &Separations) -> Vec<(u32, Ticks)> {
+        let mut list: Vec<(u32, Ticks)> = separations
             .after
             .iter()
             .filter_map(|&(access, distance)| Some((self.number(access)?, distance)))
             .collect();
-        list.sort_unstable_by_key(|&(stamp, distance)| (stamp, -distance));
-        list.dedup_by_key(|&mut (stamp, _)| stamp);
+        list.sort_unstable_by_key(|&(annotation, distance)| (annotation, -distance));
+        list.dedup_by_key(|&mut (annotation, _)| annotation);
         list
     }
 
-    /// The stamps to set.
-    pub(super) fn marks(&self, wishes: &Wishes) -> Vec<u32> {
-        let mut list: Vec<u32> = wishes
+    /// The annotations to set.
+    pub(super) fn marks(&self, separations: &Separations) -> Vec<u32> {
+        let mut list: Vec<u32> = separations
             .makes
             .iter()
             .filter_map(|&access| self.number(access))
@@ -305,14 +305,14 @@ impl Stamps {
 
 /// For each access, the timed initials that must come some distance after it.
 #[derive(Debug, Default)]
-pub(super) struct TimedWishes(Map<Access, Vec<(u32, Ticks)>>);
+pub(super) struct TimedSeparations(Map<Access, Vec<(u32, Ticks)>>);
 
-impl TimedWishes {
-    pub(super) fn of(timed: &[Wishes]) -> Self {
+impl TimedSeparations {
+    pub(super) fn of(timed: &[Separations]) -> Self {
         let mut waiting: Map<Access, Vec<(u32, Ticks)>> = Map::default();
-        for (number, wishes) in timed.iter().enumerate() {
+        for (number, separations) in timed.iter().enumerate() {
             let number = u32::try_from(number).expect("fewer than 2^32 timed initials");
-            for &(access, distance) in &wishes.after {
+            for &(access, distance) in &separations.after {
                 waiting.entry(access).or_default().push((number, distance));
             }
         }

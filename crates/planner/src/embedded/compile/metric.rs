@@ -3,7 +3,7 @@
 //! Most metrics are sums of `total-time` and of fluents that nothing else reads, such as
 //! `total-cost`. These fluents are no part of what a state *is*: two states that differ in them
 //! only allow the same plans, and the cheaper one is the better one. So they are added up in
-//! [`State::cost`] and left out of [`State::values`]. Fluents that are read elsewhere, or not only
+//! `State::cost` and left out of `State::values`. Fluents that are read elsewhere, or not only
 //! added to, stay among the values.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,14 +15,13 @@ use elbowroom_model::{Situation, Task};
 use elbowroom_num::Rational;
 
 use super::symbols::Symbols;
-use super::{Change, Compiled, Update};
+use super::{Action, Change, Snap, Timed, Update};
 use crate::embedded::formula::{Linear, Numeric};
-use crate::embedded::state::State;
 
 /// What a plan shall have little of. What is to be maximized is negated here.
 #[derive(Clone, Debug)]
 pub(crate) struct Metric {
-    /// The part that is read off [`State::values`].
+    /// The part that is read off `State::values`.
     pub(crate) values: Numeric,
     /// The weight of `total-time`.
     pub(crate) time: Rational,
@@ -32,12 +31,6 @@ pub(crate) struct Metric {
 }
 
 impl Metric {
-    /// What has been spent in a state, without the time; `None` if that depends on times that are
-    /// not chosen yet.
-    pub(crate) fn spent(&self, state: &State) -> Option<Rational> {
-        Some(self.values.value(&state.values, None)? + &state.cost)
-    }
-
     /// The weight of a fluent among the values; zero if that is not constant.
     pub(crate) fn weight(&self, fluent: u32) -> Rational {
         let Numeric::Linear(linear) = &self.values else {
@@ -215,7 +208,12 @@ impl Draft {
 }
 
 /// Whether no step lowers the metric.
-pub(super) fn only_grows(metric: &Metric, compiled: &Compiled) -> bool {
+pub(super) fn only_grows(
+    metric: &Metric,
+    snaps: &[Snap],
+    actions: &[Action],
+    timed: &[Timed],
+) -> bool {
     let Numeric::Linear(values) = &metric.values else {
         return false;
     };
@@ -229,7 +227,7 @@ pub(super) fn only_grows(metric: &Metric, compiled: &Compiled) -> bool {
         !matters(update.fluent) || metric.amount_of(update).is_some_and(|a| is_growth(&a))
     };
     !metric.time.is_negative()
-        && compiled.snaps.iter().all(|snap| {
+        && snaps.iter().all(|snap| {
             snap.cost.iter().all(is_dear)
                 && snap.updates.iter().all(grows)
                 && snap.conditional.iter().all(|effect| match &effect.change {
@@ -238,12 +236,10 @@ pub(super) fn only_grows(metric: &Metric, compiled: &Compiled) -> bool {
                     Change::Add(_) | Change::Delete(_) => true,
                 })
         })
-        && compiled
-            .actions
+        && actions
             .iter()
             .all(|action| action.flows.iter().all(|flow| !matters(flow.fluent)))
-        && compiled
-            .timed
+        && timed
             .iter()
             .all(|timed| timed.assigns.iter().all(|(fluent, _)| !matters(*fluent)))
 }

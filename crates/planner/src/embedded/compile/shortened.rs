@@ -10,7 +10,7 @@ use elbowroom_model::{ground, problem};
 ///
 /// `None` if `goes_on` says that it shall end.
 pub(super) fn full_actions(
-    task: &mut Task,
+    task: &Task,
     grounding: &Grounding,
     goes_on: &mut dyn FnMut() -> bool,
 ) -> Option<Vec<Option<ground::Action>>> {

@@ -6,7 +6,7 @@ use elbowroom_model::reachability::Grounding;
 use elbowroom_model::{RunningAction, Situation};
 use elbowroom_num::{End, Rational};
 
-use super::Compiled;
+use super::Action;
 use super::builder::reads_duration;
 
 /// Whether it is plain that no number depends on when things happen: nothing changes continuously,
@@ -43,23 +43,19 @@ pub(super) fn known_duration(running: &RunningAction) -> Option<&Rational> {
 
 /// Whether some number depends on when things happen: on a duration that can be chosen, or on
 /// how far a continuous change has come.
-pub(super) fn is_symbolic(compiled: &Compiled, situation: &Situation) -> bool {
+pub(super) fn is_symbolic(actions: &[Action], situation: &Situation) -> bool {
     // Those under way come first.
     let under_way = situation.running.iter().map(Some);
     let running = under_way.chain(std::iter::repeat(None));
-    compiled
-        .actions
-        .iter()
-        .zip(running)
-        .any(|(action, running)| {
-            let is_chosen = || {
-                if let Some(running) = running {
-                    return known_duration(running).is_none();
-                }
-                let mut bounds = action.duration.bounds.iter();
-                !bounds.any(|b| b.comparison == Comparison::Equal)
-                    && action.duration.most.as_ref() != Some(&action.duration.least)
-            };
-            !action.flows.is_empty() || action.uses_duration && is_chosen()
-        })
+    actions.iter().zip(running).any(|(action, running)| {
+        let is_chosen = || {
+            if let Some(running) = running {
+                return known_duration(running).is_none();
+            }
+            let mut bounds = action.duration.bounds.iter();
+            !bounds.any(|b| b.comparison == Comparison::Equal)
+                && action.duration.most.as_ref() != Some(&action.duration.least)
+        };
+        !action.flows.is_empty() || action.uses_duration && is_chosen()
+    })
 }

@@ -5,12 +5,6 @@ use super::super::formula::{Formula, Literal};
 use super::super::relaxed::Graph;
 use super::super::time::Ticks;
 
-/// The most atoms: beyond, the table of pairs takes too much time for each state.
-const MOST_ATOMS: usize = 400;
-
-/// The most work of one round, in looked-up pairs.
-const MOST_WORK: usize = 2_000_000;
-
 /// What an operator stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -92,7 +86,7 @@ impl Model {
             least: Vec::new(),
         };
         model.number_atoms(compiled, graph);
-        if model.atom_count > MOST_ATOMS {
+        if model.atom_count > compiled.tuning.most_pair_atoms {
             return None;
         }
         model.least = compiled
@@ -132,7 +126,7 @@ impl Model {
         model.find_exclusions(compiled);
         model.find_orders(compiled);
         let work: usize = model.operators.iter().map(|o| 1 + o.needs.len()).sum();
-        (work * model.atom_count <= MOST_WORK).then_some(model)
+        (work * model.atom_count <= compiled.tuning.most_pair_lookups).then_some(model)
     }
 
     /// The action of the atom that it is under way.
@@ -338,7 +332,7 @@ impl Model {
     }
 
     /// Finds what keeps its order in time: an operator comes after an atom if each happening that
-    /// brings it about sets a stamp that the operator keeps away from.
+    /// brings it about sets an annotation that the operator keeps away from.
     fn find_orders(&mut self, compiled: &Compiled) {
         let marks: Vec<&[u32]> = self
             .operators
@@ -355,7 +349,7 @@ impl Model {
                 achievers[atom].push(number);
             }
         }
-        let mut is_kept_away = vec![false; compiled.stamp_count];
+        let mut is_kept_away = vec![false; compiled.annotation_count];
         let orders: Vec<Vec<bool>> = self
             .operators
             .iter()
@@ -365,17 +359,19 @@ impl Model {
                     Kind::End(action) => &compiled.snap(compiled.action(action).end).after,
                     Kind::Timed(_) => return vec![false; achievers.len()],
                 };
-                for &(stamp, _) in after {
-                    is_kept_away[stamp as usize] = true;
+                for &(annotation, _) in after {
+                    is_kept_away[annotation as usize] = true;
                 }
                 let comes_after = achievers.iter().map(|achievers| {
-                    achievers
-                        .iter()
-                        .all(|&by| marks[by].iter().any(|&stamp| is_kept_away[stamp as usize]))
+                    achievers.iter().all(|&by| {
+                        marks[by]
+                            .iter()
+                            .any(|&annotation| is_kept_away[annotation as usize])
+                    })
                 });
                 let comes_after = comes_after.collect();
-                for &(stamp, _) in after {
-                    is_kept_away[stamp as usize] = false;
+                for &(annotation, _) in after {
+                    is_kept_away[annotation as usize] = false;
                 }
                 comes_after
             })

@@ -1,16 +1,16 @@
-//! No state that a plan goes through is hopeless, not even if the plan must end as early as it can.
+//! No state that a plan goes through is a dead end, not even if the plan must end as early as it can.
 
 use std::fmt::Write;
 
 use elbowroom_model::reachability::{self, Answer};
 use elbowroom_model::{Situation, Task};
-use elbowroom_num::Rational;
 use elbowroom_pddl::{Source, read_problem};
 use proptest::prelude::*;
 
 use super::Pairs;
 use crate::embedded::apply::{Step, Stepper};
 use crate::embedded::compile::{Compiled, Wanted, compile};
+use crate::embedded::root::root;
 use crate::embedded::state::State;
 use crate::embedded::time::{NEVER, Ticks};
 
@@ -142,7 +142,7 @@ impl Draft {
 }
 
 /// The earliest end of all plans that go on from a state, by trying all choices; on the way back,
-/// no state on the way to a plan may be hopeless. Returns [`NEVER`] if there is no plan so short.
+/// no state on the way to a plan may be one. Returns [`NEVER`] if there is no plan so short.
 fn earliest_end(
     compiled: &Compiled,
     pairs: &mut Pairs<'_>,
@@ -174,7 +174,7 @@ fn earliest_end(
     if best < NEVER {
         pairs.horizon = best;
         assert!(
-            !pairs.is_hopeless(state),
+            !pairs.is_dead_end(state),
             "a plan that ends at {best}: {state:?}"
         );
     }
@@ -185,18 +185,18 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_state_on_the_way_to_a_plan_is_hopeless(draft in drafts()) {
-        let mut task = draft.task();
+    fn no_state_on_the_way_to_a_plan_is_a_dead_end(draft in drafts()) {
+        let task = draft.task();
         let situation = Situation::initial(&task);
         let limits = reachability::Settings::default();
-        let Answer::Complete(grounding) = reachability::ground(&mut task, &limits) else {
+        let Answer::Complete(grounding) = reachability::ground(&task, &limits) else {
             panic!("a small task");
         };
-        let epsilon = Rational::new(1, 1000);
-        let wanted = Wanted { situation: &situation, epsilon: &epsilon, metric: false };
-        let compiled = compile(&mut task, &grounding, wanted, &mut || true).expect("plain");
+        let tuning = crate::embedded::Tuning::default();
+        let wanted = Wanted { situation: &situation, metric: false, tuning: &tuning };
+        let compiled = compile(&task, &grounding, wanted, &mut || true).expect("plain");
         let mut pairs = Pairs::of(&compiled).expect("small");
         let mut budget = 3_000;
-        earliest_end(&compiled, &mut pairs, &compiled.initial, MOST, &mut budget);
+        earliest_end(&compiled, &mut pairs, &root(&compiled), MOST, &mut budget);
     }
 }

@@ -87,14 +87,14 @@ impl Deadlines {
         spans: Option<&Spans>,
     ) {
         let now = spans.map_or(compiled.now, |spans| spans.now);
-        for (fact, stamps) in compiled.fact_stamps.iter().enumerate() {
+        for (fact, annotations) in compiled.fact_annotations.iter().enumerate() {
             let is_true = state.facts[fact / 64] >> (fact % 64) & 1 == 1;
-            let stamp = stamps[usize::from(!is_true)];
+            let annotation = annotations[usize::from(!is_true)];
             let mut time = now;
-            if stamp != NONE && spans.is_none() {
-                time = time.max(state.stamps[stamp as usize]);
+            if annotation != NONE && spans.is_none() {
+                time = time.max(state.annotations[annotation as usize]);
                 for &(marked, node) in &state.network.marks {
-                    if marked == stamp {
+                    if marked == annotation {
                         time = time.max(state.network.earliest(node));
                     }
                 }

@@ -7,10 +7,11 @@ mod timetables;
 
 use std::ops::Range;
 
-use super::super::compile::{Compiled, Eagerness, NONE};
+use super::super::compile::{Compiled, Compressibility, NONE};
 use super::super::formula::Formula;
-use super::super::guide::Guide;
+use super::super::step_costs::StepCosts;
 use super::super::time::Ticks;
+use super::super::tuning::Technique;
 pub(crate) use super::numbers::Gain;
 use envelopes::{Stay, Stays};
 pub(crate) use timetables::Window;
@@ -19,7 +20,7 @@ pub(crate) use timetables::Window;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Start(u32),
-    Whole(u32),
+    Compressed(u32),
     /// The end of some instance of the action.
     End(u32),
     Timed(u32),
@@ -82,7 +83,7 @@ pub(crate) struct Graph {
 }
 
 impl Graph {
-    pub(crate) fn of(compiled: &Compiled, haste: Option<Eagerness>) -> Self {
+    pub(crate) fn of(compiled: &Compiled, compresses: Option<Compressibility>) -> Self {
         let first_test = narrow(2 * compiled.facts.len());
         let first_running = first_test + narrow(compiled.tests.len());
         let mut tests_of_fluent = vec![Vec::new(); compiled.fluents.len()];
@@ -104,10 +105,14 @@ impl Graph {
             ..Self::default()
         };
         graph.add_timetables(compiled);
-        let stays = Stays::of(compiled, narrow(graph.proposition_count));
+        let stays = if compiled.tuning.uses(Technique::Envelopes) {
+            Stays::of(compiled, narrow(graph.proposition_count))
+        } else {
+            Stays::default()
+        };
         graph.proposition_count += stays.list.len();
         for number in 0..compiled.actions.len() {
-            graph.add_action(compiled, &stays, narrow(number), haste);
+            graph.add_action(compiled, &stays, narrow(number), compresses);
         }
         graph.add_rules(compiled);
         graph.add_timed(compiled);
@@ -115,17 +120,21 @@ impl Graph {
         graph.follow_up_assignments(compiled.tests.len());
         graph.stays = stays.list;
         graph.index();
-        graph.kept_out = graph.find_kept_out(compiled);
+        graph.kept_out = if compiled.tuning.uses(Technique::Exclusions) {
+            graph.find_kept_out(compiled)
+        } else {
+            vec![Vec::new(); compiled.actions.len()]
+        };
         graph
     }
 
     /// Lets each step count for what it costs.
-    pub(crate) fn weigh(&mut self, guide: &Guide) {
+    pub(crate) fn weigh(&mut self, step_costs: &StepCosts) {
         for operator in &mut self.operators {
             operator.cost = match operator.kind {
-                Kind::Start(action) => guide.start(action),
-                Kind::End(action) => guide.end(action),
-                Kind::Whole(action) => guide.start(action) + guide.end(action),
+                Kind::Start(action) => step_costs.start(action),
+                Kind::End(action) => step_costs.end(action),
+                Kind::Compressed(action) => step_costs.start(action) + step_costs.end(action),
                 Kind::Timed(_) | Kind::Axiom => operator.cost,
             };
         }

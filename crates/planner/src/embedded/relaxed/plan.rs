@@ -22,11 +22,11 @@ impl Relaxed<'_> {
             let needs = self.graph.operators[end as usize].preconditions.clone();
             wanted.extend_from_slice(&self.graph.preconditions[needs]);
         }
-        if !self.stocks.is_empty() {
-            self.stocks.begin(state);
+        if !self.consumables.is_empty() {
+            self.consumables.begin(state);
         }
         self.collect(&mut wanted, &mut used, &mut touched, estimate);
-        if !self.stocks.is_empty() && self.stocks.are_overdrawn() {
+        if !self.consumables.is_empty() && self.consumables.are_overdrawn() {
             estimate.steps += OVERDRAWN;
         }
         if !self.resources.is_empty() {
@@ -40,6 +40,11 @@ impl Relaxed<'_> {
             if is_next || matches!(data.kind, Kind::Timed(_)) {
                 push_steps(data.kind, state, &mut estimate.preferred);
             }
+        }
+        if self.lists_subgoals {
+            let literals = 2 * self.compiled.facts.len();
+            let subgoals = touched.iter().filter(|&&index| (index as usize) < literals);
+            estimate.subgoals = subgoals.map(|&index| Literal(index)).collect();
         }
         for proposition in touched {
             self.is_wanted[proposition as usize] = false;
@@ -62,7 +67,7 @@ impl Relaxed<'_> {
                 continue;
             }
             touched.push(proposition);
-            if self.stocks.is_empty() || !self.add_up(proposition, wanted, used, estimate) {
+            if self.consumables.is_empty() || !self.add_up(proposition, wanted, used, estimate) {
                 let operator = self.achiever[index];
                 self.use_with_needs(operator, wanted, used);
                 let more = self.repetitions[index] - 1;
@@ -81,7 +86,7 @@ impl Relaxed<'_> {
         if !Self::use_operator(&mut self.is_used, used, operator) {
             return false;
         }
-        self.stocks.draw(operator, 1);
+        self.consumables.draw(operator, 1);
         let data = &self.graph.operators[operator as usize];
         wanted.extend_from_slice(&self.graph.preconditions[data.preconditions.clone()]);
         if let Kind::Start(action) = data.kind {
@@ -94,7 +99,7 @@ impl Relaxed<'_> {
         true
     }
 
-    /// Closes the gap of a test by steps that add to its difference, each as often as the stocks
+    /// Closes the gap of a test by steps that add to its difference, each as often as the consumables
     /// allow, beginning with the cheapest. Whether it is such a test.
     fn add_up(
         &mut self,
@@ -107,7 +112,7 @@ impl Relaxed<'_> {
         let Some(test) = self.graph.test_of(proposition) else {
             return false;
         };
-        let adders = self.stocks.adders(test);
+        let adders = self.consumables.adders(test);
         let Some(&(_, sign)) = adders.iter().find(|adder| adder.0 == achiever) else {
             return false;
         };
@@ -135,10 +140,10 @@ impl Relaxed<'_> {
             let needed = (gap / gain).ceil().clamp(1.0, 1000.0) as u32;
             // One is in the plan already.
             let had = u32::from(self.is_used[step as usize]);
-            let times = self.stocks.times(step, needed - had);
+            let times = self.consumables.times(step, needed - had);
             if times > 0 {
                 let more = times - u32::from(self.use_with_needs(step, wanted, used));
-                self.stocks.draw(step, more);
+                self.consumables.draw(step, more);
                 estimate.steps += more * self.graph.cost_of_repetition(step);
             }
             gap -= gain * f64::from(had + times);
@@ -237,7 +242,7 @@ impl Relaxed<'_> {
 fn push_steps(kind: Kind, state: &State, steps: &mut Vec<Step>) {
     match kind {
         Kind::Start(action) => steps.push(Step::Start(action)),
-        Kind::Whole(action) => steps.push(Step::Whole(action)),
+        Kind::Compressed(action) => steps.push(Step::Compressed(action)),
         Kind::End(action) => {
             for (place, open) in (0..).zip(&state.open) {
                 if open.action == action {

@@ -138,7 +138,7 @@ pub(super) fn snaps_of(compiled: &Compiled, kind: Kind) -> Vec<&Snap> {
     let numbers = match kind {
         Kind::Start(action) => vec![compiled.action(action).start],
         Kind::End(action) => vec![compiled.action(action).end],
-        Kind::Whole(action) => {
+        Kind::Compressed(action) => {
             let action = compiled.action(action);
             vec![action.start, action.end]
         }

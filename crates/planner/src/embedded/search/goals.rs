@@ -48,7 +48,7 @@ impl Search<'_> {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
             return true;
         };
-        let spent = metric.spent(&self.nodes[number as usize].state);
+        let spent = self.nodes[number as usize].state.spent(metric);
         !metric.time.is_zero() || spent.is_none_or(|spent| spent <= limit.value)
     }
 }

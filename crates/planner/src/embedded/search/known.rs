@@ -1,11 +1,16 @@
 //! What has been looked at before.
 
-use super::super::state::{Outlook, State};
+use super::super::state::{Projection, State};
 use super::Search;
 
 impl Search<'_> {
     /// Whether a state that is at least as good has been looked at.
-    pub(super) fn is_known(&mut self, hash: u64, state: &State, outlook: Option<&Outlook>) -> bool {
+    pub(super) fn is_known(
+        &mut self,
+        hash: u64,
+        state: &State,
+        projection: Option<&Projection>,
+    ) -> bool {
         let Some(similar) = self.known.get(&hash) else {
             return false;
         };
@@ -14,12 +19,13 @@ impl Search<'_> {
             let node = &self.nodes[number as usize];
             let other = &node.state;
             if other.is_discretely(state) {
-                let mut is_no_later = self.is_timeless || other.has_no_later_stamps_than(state);
-                is_no_later &= self.guide.is_none() || other.cost <= state.cost;
-                if self.style.haste.is_some() {
+                let mut is_no_later =
+                    self.is_timeless || other.has_no_later_annotations_than(state);
+                is_no_later &= self.step_costs.is_none() || other.cost <= state.cost;
+                if self.strategy.compresses.is_some() {
                     self.has_lost |= is_no_later && !state.network.is_empty();
                 }
-                if let (Some(mine), Some(theirs)) = (&node.outlook, outlook) {
+                if let (Some(mine), Some(theirs)) = (&node.projection, projection) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
                 }
                 // A goal that waits for a timed initial needs a happening so late.
@@ -31,7 +37,7 @@ impl Search<'_> {
                 variants += 1;
             }
         }
-        if variants >= self.style.variants {
+        if variants >= self.strategy.variants {
             self.has_lost = true;
             return true;
         }

@@ -1,20 +1,18 @@
 //! How new a state is.
 //!
 //! A state is the newer, the smaller the sets of facts are that no state had before of the same
-//! worth: single facts, or pairs. What is new comes first, whatever the estimate says: so a search
-//! leaves plateaus on which an estimate is blind (best-first width search; Lipovetzky & Geffner,
-//! AAAI 2017).
+//! worth: single facts, or pairs. What is new comes first, whatever an estimate says: so a search
+//! leaves plateaus on which an estimate is blind.
+//!
+//! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂) the
+//! worth of a state is how many goals it lacks, and its estimate. In BFWS(f₅) it is how many goals it
+//! lacks, and how much of a relaxed plan has been brought about on the way to it since that number
+//! last fell; that needs no estimate, but for a relaxed plan where the number falls.
 
 use super::super::compile::Compiled;
-use super::super::formula::Formula;
+use super::super::formula::{Formula, Literal};
 use super::super::hash::Map;
 use super::super::state::State;
-
-/// Beyond this many facts, pairs are not looked at.
-const MOST_FACTS_FOR_PAIRS: usize = 1024;
-
-/// No more worths than that are told apart.
-const MOST_WORTHS: usize = 4096;
 
 /// The facts seen so far, by the worth of states.
 #[derive(Debug)]
@@ -23,15 +21,90 @@ pub(super) struct Novelty {
     /// For each worth, a bit for each fact, then one for each pair.
     seen: Map<(u32, u32), Vec<u64>>,
     holding: Vec<usize>,
+    /// What relaxed plans bring about, of states in which a goal was reached.
+    relaxed_plans: Vec<Vec<Literal>>,
+}
+
+/// How far the way to a state has come.
+#[derive(Clone, Debug)]
+pub(super) struct Progress {
+    goals_left: u32,
+    /// The relaxed plan of the last state in which a goal was reached.
+    relaxed_plan: u32,
+    /// Which of its literals were true since, a bit for each.
+    reached: Vec<u64>,
+}
+
+impl Progress {
+    /// Whether a successor has one more goal.
+    pub(super) fn has_new_goal(&self, compiled: &Compiled, next: &State) -> bool {
+        goals_left(compiled, next) < self.goals_left
+    }
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(super) fn size(&self) -> usize {
+        size_of::<Self>() + 8 * self.reached.len()
+    }
 }
 
 impl Novelty {
     pub(super) fn new(compiled: &Compiled) -> Self {
         Self {
-            looks_at_pairs: compiled.facts.len() <= MOST_FACTS_FOR_PAIRS,
+            looks_at_pairs: compiled.facts.len() <= compiled.tuning.most_facts_for_novel_pairs,
             seen: Map::default(),
             holding: Vec::new(),
+            relaxed_plans: Vec::new(),
         }
+    }
+
+    /// How far the way to a state has come, whose relaxed plan brings these literals about.
+    pub(super) fn progress(
+        &mut self,
+        compiled: &Compiled,
+        state: &State,
+        before: Option<&Progress>,
+        subgoals: &[Literal],
+    ) -> Progress {
+        let goals_left = goals_left(compiled, state);
+        if let Some(before) = before.filter(|before| goals_left >= before.goals_left) {
+            let mut progress = before.clone();
+            progress.goals_left = goals_left;
+            for (number, literal) in self.relaxed_plan(before).iter().enumerate() {
+                if literal.holds(&state.facts) {
+                    progress.reached[number / 64] |= 1 << (number % 64);
+                }
+            }
+            return progress;
+        }
+        self.relaxed_plans.push(subgoals.to_vec());
+        Progress {
+            goals_left,
+            relaxed_plan: u32::try_from(self.relaxed_plans.len() - 1).unwrap_or(u32::MAX),
+            reached: vec![0; subgoals.len().div_ceil(64)],
+        }
+    }
+
+    fn relaxed_plan(&self, progress: &Progress) -> &[Literal] {
+        &self.relaxed_plans[progress.relaxed_plan as usize]
+    }
+
+    /// The worth of a successor: how many goals it lacks, and how much of the relaxed plan has been
+    /// reached.
+    pub(super) fn worth(
+        &self,
+        compiled: &Compiled,
+        state: &State,
+        before: &Progress,
+    ) -> (u32, u32) {
+        let left = goals_left(compiled, state);
+        if left < before.goals_left {
+            return (left, 0);
+        }
+        let literals = self.relaxed_plan(before).iter().enumerate();
+        let reached = literals.filter(|(number, literal)| {
+            before.reached[number / 64] >> (number % 64) & 1 == 1 || literal.holds(&state.facts)
+        });
+        (left, u32::try_from(reached.count()).unwrap_or(u32::MAX))
     }
 
     /// 1 if the state has a fact that no state of that worth had before, 2 if it has such a pair,
@@ -49,7 +122,7 @@ impl Novelty {
                 self.holding.push(fact);
             }
         }
-        if self.seen.len() >= MOST_WORTHS && !self.seen.contains_key(&worth) {
+        if self.seen.len() >= compiled.tuning.most_worths && !self.seen.contains_key(&worth) {
             return (3, 0);
         }
         let pairs = if self.looks_at_pairs {

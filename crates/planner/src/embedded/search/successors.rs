@@ -5,15 +5,19 @@ use super::super::compile::NONE;
 use super::super::relaxed::Estimate;
 use super::super::state::State;
 use super::novelty::goals_left;
-use super::{Aim, BOOST, Search};
+use super::{Aim, NoveltyOf, Search};
 
 impl Search<'_> {
     /// Lets the successors wait for their turn.
     pub(super) fn expand(&mut self, number: u32, estimate: &Estimate) {
         self.expanded += 1;
+        if self.strategy.novelty == Some(NoveltyOf::Successors) {
+            self.expand_by_width(number, estimate);
+            return;
+        }
         if estimate.steps < self.best_steps {
             self.best_steps = estimate.steps;
-            self.turns[0] -= BOOST;
+            self.turns[0] -= self.compiled.tuning.boost;
         }
         if number == 0 {
             self.first_estimate = estimate.steps;
@@ -27,21 +31,64 @@ impl Search<'_> {
             self.generated += 1;
             self.all.push(rank, number, step);
         }
-        if self.style.is_complete() {
+        if self.strategy.is_complete() {
             let steps = estimate.applicable.iter();
             self.oldest.extend(steps.map(|&step| (number, step)));
             self.memory += 12 * estimate.applicable.len();
         }
     }
 
+    /// Lets the successors wait for their turn, each by how new it is itself, and then by how much
+    /// of the goal it has. They are made for that, and made again when their turn comes.
+    fn expand_by_width(&mut self, number: u32, estimate: &Estimate) {
+        let Some(mut novelty) = self.novelty.take() else {
+            return;
+        };
+        let node = &self.nodes[number as usize];
+        let before = self.nodes.get(node.parent as usize);
+        let before = before.and_then(|parent| parent.progress.as_deref());
+        let progress = novelty.progress(self.compiled, &node.state, before, &estimate.subgoals);
+        self.memory += progress.size();
+        for &step in &estimate.applicable {
+            let Some((_, next)) = self.make(number, step) else {
+                continue;
+            };
+            let worth = novelty.worth(self.compiled, &next, &progress);
+            let (new, memory) = novelty.of(self.compiled, &next, worth);
+            self.memory += memory;
+            let rank = new << 48 | i64::from(worth.0) << 24;
+            self.generated += 1;
+            if estimate.preferred.binary_search(&step).is_ok() {
+                self.preferred.push(rank, number, step);
+            }
+            self.all.push(rank, number, step);
+        }
+        self.nodes[number as usize].progress = Some(Box::new(progress));
+        self.novelty = Some(novelty);
+    }
+
+    /// Whether a state needs an estimate: where the novelty of successors counts, only if one more
+    /// goal has been reached, or in the beginning.
+    pub(super) fn needs_estimate(&self, parent: u32, state: &State) -> bool {
+        if self.strategy.novelty != Some(NoveltyOf::Successors) {
+            return true;
+        }
+        let parent = self.nodes.get(parent as usize);
+        let progress = parent.and_then(|parent| parent.progress.as_deref());
+        progress.is_none_or(|before| before.has_new_goal(self.compiled, state))
+    }
+
     /// What a state has used up of what is not filled up, all of it counting as much as the way to
     /// the goal was long in the beginning.
     fn penalty(&self, number: u32) -> i64 {
-        if self.stocks.is_empty() {
+        if self.consumables.is_empty() {
             return 0;
         }
         let state = &self.nodes[number as usize].state;
-        let used = self.stocks.iter().map(|stock| stock.used(state));
+        let used = self
+            .consumables
+            .iter()
+            .map(|consumable| consumable.used(state));
         let most = used.fold(0.0, f64::max);
         #[allow(clippy::cast_possible_truncation, reason = "the cast saturates")]
         let penalty = (most * f64::from(self.first_estimate)).round() as i64;
@@ -53,21 +100,22 @@ impl Search<'_> {
         if let Some(novelty) = &mut self.novelty {
             let state = &self.nodes[number as usize].state;
             let left = goals_left(self.compiled, state);
-            let (novelty, memory) = novelty.of(self.compiled, state, (left, estimate));
+            let (new, memory) = novelty.of(self.compiled, state, (left, estimate));
             self.memory += memory;
-            return novelty << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
+            return new << 48 | i64::from(left) << 24 | i64::from(estimate.min(1 << 23));
         }
         let estimate = i64::from(estimate) + self.penalty(number);
-        let (Aim::CheapWhole(factor), Some(guide)) = (self.style.aim, &self.guide) else {
+        let (Aim::WeightedAStar(factor), Some(step_costs)) = (self.strategy.aim, &self.step_costs)
+        else {
             return estimate;
         };
-        guide.spent(self.compiled, &self.nodes[number as usize].state) + factor * estimate
+        step_costs.spent(self.compiled, &self.nodes[number as usize].state) + factor * estimate
     }
 
-    /// The successor; in haste, one in which what has started is over, if possible.
+    /// The successor; in a compressing search, one in which what has started is over, if possible.
     pub(super) fn make(&mut self, parent: u32, step: Step) -> Option<(Step, State)> {
         let state = &self.nodes[parent as usize].state;
-        if let Step::Start(action) | Step::Whole(action) = step {
+        if let Step::Start(action) | Step::Compressed(action) = step {
             let data = self.compiled.action(action);
             let runs_already = || {
                 state
@@ -76,19 +124,19 @@ impl Search<'_> {
                     .filter(|open| open.action == action)
                     .count()
             };
-            if data.end != NONE && !(data.excludes_itself && self.style.is_complete()) {
-                let most = usize::from(self.style.is_complete());
+            if data.end != NONE && !(data.excludes_itself && self.strategy.is_complete()) {
+                let most = usize::from(self.strategy.is_complete());
                 if runs_already() > most {
                     self.has_lost = true;
                     return None;
                 }
             }
-            let is_whole = self
-                .style
-                .haste
-                .is_some_and(|haste| data.eagerness >= haste);
-            if is_whole && data.end != NONE {
-                let whole = Step::Whole(action);
+            let is_compressed = self
+                .strategy
+                .compresses
+                .is_some_and(|compresses| data.compressibility >= compresses);
+            if is_compressed && data.end != NONE {
+                let whole = Step::Compressed(action);
                 if let Some(next) = self.stepper.apply(state, whole) {
                     self.has_lost = true;
                     return Some((whole, next));
@@ -96,18 +144,18 @@ impl Search<'_> {
             }
         }
         let step = match step {
-            Step::Whole(action) => Step::Start(action),
+            Step::Compressed(action) => Step::Start(action),
             other => other,
         };
         let next = self.stepper.apply(state, step)?;
         if let Step::Start(action) = step
-            && !self.style.is_chronological
-            && self.compiled.action(action).only_adds_at_end
+            && !self.strategy.is_chronological
+            && self.compiled.action(action).is_compression_safe
             && state.symbolic.is_none()
             && self.relaxed.is_end_the_only_way(&next, action)
         {
-            // No plan is lost: see `compile::eager`.
-            let whole = Step::Whole(action);
+            // No plan is lost: see `compile::compression`.
+            let whole = Step::Compressed(action);
             return Some((whole, self.stepper.apply(state, whole)?));
         }
         Some((step, next))

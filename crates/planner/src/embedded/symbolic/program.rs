@@ -4,17 +4,21 @@ use elbowroom_model::problem::Comparison;
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 
+use super::super::bound::MetricBound;
 use super::super::compile::Metric;
+use super::super::expressions::Form;
 use super::super::formula::Numeric;
 use super::super::network::{Network, NodeId};
-use super::super::search::Limit;
 use super::super::state::State;
 use super::super::time::{NEVER, Scale};
-use super::Form;
 
 /// Whether there are times that meet all demands and the network, and leave what has been spent
 /// within the limit.
-pub(crate) fn is_possible(state: &State, scale: Scale, limit: Option<(&Metric, &Limit)>) -> bool {
+pub(crate) fn is_possible(
+    state: &State,
+    scale: Scale,
+    limit: Option<(&Metric, &MetricBound)>,
+) -> bool {
     let Some(symbolic) = &state.symbolic else {
         return true;
     };

@@ -218,7 +218,7 @@ impl Draft {
 }
 
 impl Draft {
-    pub(crate) fn ground(&self, task: &mut Task) -> Vec<Action> {
+    pub(crate) fn ground(&self, task: &Task) -> Vec<Action> {
         let numbers = 0..self.actions.len();
         let ground = |number: usize| {
             let schema = task.problem().schema(&format!("a{number}"));

@@ -13,17 +13,19 @@ use crate::number;
 /// The reason, and by how much.
 pub(super) fn what(explanation: &Explanation) -> String {
     let reason = &explanation.reason;
+    // Where a schedule is shown, how much is short is said there, of that schedule.
+    let is_said = explanation.verdict.is_some();
     match &explanation.shortfall {
-        Some(Shortfall::Time(late)) => {
-            format!("{reason}: too late by {}", number::nearest(late))
-        }
-        Some(Shortfall::Amount(short)) => {
-            format!("{reason}: short by {}", number::nearest(short))
-        }
         Some(Shortfall::Boundless) => {
             format!("{reason}, but nothing in the plan sees to it")
         }
-        None => reason.clone(),
+        Some(Shortfall::Time(late)) if !is_said => {
+            format!("{reason}: too late by {}", number::nearest(late))
+        }
+        Some(Shortfall::Amount(short)) if !is_said => {
+            format!("{reason}: short by {}", number::nearest(short))
+        }
+        _ => reason.clone(),
     }
 }
 

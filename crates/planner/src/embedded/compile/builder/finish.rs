@@ -1,223 +1,282 @@
-//! The compiled problem, once all actions are numbered: stamps, timed initials, and what follows
+//! The compiled problem, once all actions are numbered: annotations, timed initials, and what follows
 //! from looking at all actions together.
 
 use elbowroom_model::ground::{self, Change as ModelChange, Condition};
 use elbowroom_model::reachability::Grounding;
-use elbowroom_model::{Footprint, Situation};
+use elbowroom_model::{Footprint, Situation, TimedHappening};
 use elbowroom_num::Rational;
 
+use super::super::beginning::{Beginning, has_values_to_change, running};
+use super::super::compressibility::{compressibility, readers};
 use super::super::directions::Shifts;
-use super::super::eagerness::{eagerness, readers};
-use super::super::initial::initial;
-use super::super::interference::{Access, Stamps, TimedWishes, Wishes};
-use super::super::metric::only_grows;
+use super::super::interference::{Access, Annotations, Separations, TimedSeparations};
+use super::super::metric::{Metric, only_grows};
 use super::super::rules::stratified;
 use super::super::times::is_symbolic;
-use super::super::{Compiled, NONE, Rule, Snap, Timed, eager, gaps};
-use super::{Builder, narrow};
+use super::super::{Compiled, NONE, Rule, Snap, Timed, completeness, compression};
+use super::{Builder, Wanted, narrow};
 use crate::embedded::formula::Literal;
-use crate::embedded::state::State;
 use crate::embedded::time::{Scale, Ticks};
 
-/// How many happenings get their stamps between two questions whether to go on.
+/// How many happenings get their annotations between two questions whether to go on.
 const SNAPS_PER_QUESTION: usize = 1024;
 
-/// The longest distance that some snap keeps from some stamp.
+/// The timed initials to come, each with the distances that it keeps.
+struct Coming<'a> {
+    happenings: Vec<&'a TimedHappening>,
+    separations: Vec<Separations>,
+}
+
+/// The longest distance that some snap keeps from some annotation.
 fn longest_distance(snaps: &[Snap]) -> Ticks {
     let distances = snaps.iter().flat_map(|snap| &snap.after);
     distances.map(|&(_, distance)| distance).max().unwrap_or(0)
 }
 
-impl Builder<'_> {
-    #[allow(
-        clippy::too_many_lines,
-        reason = "one part of the compiled problem after the other"
-    )]
+impl<'a> Builder<'a> {
+    /// All that is compiled, put together; `None` if it was told to stop.
     pub(super) fn finish(
         mut self,
         grounding: &Grounding,
-        situation: &Situation,
+        wanted: Wanted<'_>,
         scale: Scale,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> Option<Compiled> {
+        let situation = wanted.situation;
         let goal = self.symbols.formula(&grounding.goal);
-        let mut rules: Vec<Rule> = Vec::new();
-        for rule in &grounding.rules {
-            let body = self.symbols.formula(&rule.body);
-            let head = self.symbols.fact(rule.head);
-            rules.push(Rule { head, body });
-        }
-        let (strata, derived) = stratified(rules, self.task, &self.symbols);
-        let coming: Vec<_> = self
-            .task
-            .timed()
-            .iter()
-            .filter(|timed| timed.time > situation.time)
-            .collect();
-        let timed_wishes: Vec<Wishes> = coming
-            .iter()
-            .map(|timed| {
-                let footprint = Footprint::of_timed(timed);
-                Wishes::of(&footprint, &Shifts::default(), self.epsilon, &self.links)
-            })
-            .collect();
-        let stamps = Stamps::of(self.wishes.iter().chain(&timed_wishes));
-        let waiting = TimedWishes::of(&timed_wishes);
-        for (number, (snap, wishes)) in self.snaps.iter_mut().zip(&self.wishes).enumerate() {
-            if number % SNAPS_PER_QUESTION == 0 && !goes_on() {
-                return None;
-            }
-            snap.after = stamps.after(wishes);
-            snap.marks = stamps.marks(wishes);
-            snap.before_timed = waiting.before(&wishes.makes);
-        }
-        if !coming.is_empty() {
-            for (action, over_all) in self.actions.iter_mut().zip(&self.over_all) {
-                let mut needs = Wishes::default();
-                for conjunct in over_all.conjuncts() {
-                    if matches!(conjunct, Condition::Fact(_) | Condition::Not(_)) {
-                        needs.needed_until_now(self.task, conjunct, &self.links);
-                    }
-                }
-                let breaking = waiting.before(&needs.makes);
-                action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
-            }
-        }
-        let mut is_exact = scale.exactly(&Rational::ONE).is_some();
-        let timed: Vec<Timed> = coming
-            .iter()
-            .zip(&timed_wishes)
-            .map(|(happening, wishes)| {
-                let (time, exact) = scale.floor(&happening.time);
-                is_exact &= exact;
-                let mut timed = Timed {
-                    time,
-                    adds: Vec::new(),
-                    deletes: Vec::new(),
-                    assigns: Vec::new(),
-                    marks: stamps.marks(wishes),
-                };
-                for change in &happening.changes {
-                    match change {
-                        ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
-                        ModelChange::Delete(fact) => {
-                            timed.deletes.extend(self.symbols.known_fact(*fact));
-                        }
-                        ModelChange::Update { fluent, value, .. } => {
-                            if let (Some(fluent), ground::Expression::Constant(value)) =
-                                (self.symbols.known_fluent(*fluent), value)
-                            {
-                                timed.assigns.push((fluent, value.clone()));
-                            }
-                        }
-                    }
-                }
-                timed
-            })
-            .collect();
+        let (strata, derived) = self.rules(grounding);
+        let coming = self.coming(situation);
+        let annotations = Annotations::of(self.separations.iter().chain(&coming.separations));
+        self.annotate(&annotations, &coming, goes_on)?;
+        let (timed, timed_is_exact) = self.timed(&coming, &annotations, scale);
         if !goes_on() {
             return None;
         }
-        let ends = eager::Ends::of(&self.actions, &self.snaps, &timed, self.symbols.facts.len());
-        for number in 0..self.actions.len() {
-            let action = &self.actions[number];
-            if action.end == NONE || !strata.is_empty() {
-                continue;
-            }
-            let makes = &self.wishes[action.end as usize].makes;
-            let is_plain = makes.iter().all(|&access| match access {
-                Access::Added(fact) => {
-                    self.symbols.known_fact(fact).is_some() || !stamps.has(access)
-                }
-                Access::NeededTrue(_) | Access::NeededFalse(_) => true,
-                _ => !stamps.has(access),
-            });
-            let only_adds = is_plain && ends.only_add(action, &self.snaps);
-            self.actions[number].only_adds_at_end = only_adds;
+        self.note_compression_safe(&annotations, &timed, !strata.is_empty());
+        self.note_compressibility();
+        let goal_timed = self.timed_for_goal(grounding, &coming);
+        let (metric, cost) = self.metric(situation, &timed);
+        if !goes_on() {
+            return None;
         }
-        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
-        for number in 0..self.actions.len() {
-            let action = &self.actions[number];
-            if action.start != NONE && action.end != NONE {
-                let (start, end) = (
-                    &self.snaps[action.start as usize],
-                    &self.snaps[action.end as usize],
-                );
-                let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
-                // What changes continuously is there to be read meanwhile.
-                if action.flows.is_empty() {
-                    self.actions[number].eagerness = eagerness(start, end, &offers);
-                }
-            }
-        }
-        let mut goal_wishes = Wishes::default();
-        goal_wishes.need_from_now_on(self.task, &grounding.goal, &self.links);
-        let goal_accesses: Vec<_> = goal_wishes
-            .after
+        let facts = self.symbols.facts;
+        let fact_annotations = facts
             .iter()
-            .map(|(access, _)| *access)
+            .map(|&fact| annotations.of_fact(fact))
             .collect();
-        let goal_timed = (0..coming.len())
-            .filter(|&number| {
-                let makes = &timed_wishes[number].makes;
-                makes.iter().any(|access| goal_accesses.contains(access))
-            })
-            .map(narrow)
-            .collect();
-        let now = scale.floor(&situation.time);
-        let epsilon = scale.ceil(&Rational::ZERO).0.max(self.epsilon);
-        is_exact &= now.1;
-        let metric = self.metric.take();
-        let initial_cost = metric
-            .as_ref()
-            .map_or(Rational::ZERO, |metric| metric.initial_cost(situation));
-        let metric = metric.map(|metric| metric.finish(&mut self.symbols));
-        let mut compiled = Compiled {
-            scale,
-            epsilon,
-            longest_distance: longest_distance(&self.snaps),
-            now: now.0,
-            fact_stamps: self
-                .symbols
-                .facts
+        let state = &situation.state;
+        let values = |fluent| state.values.get(fluent).cloned();
+        let (running, running_is_exact) = running(situation, scale);
+        let beginning = Beginning {
+            time: situation.time.clone(),
+            facts: facts
                 .iter()
-                .map(|&fact| stamps.of_fact(fact))
+                .map(|fact| state.facts.contains(fact))
                 .collect(),
-            facts: self.symbols.facts,
+            values: self.symbols.fluents.iter().map(values).collect(),
+            cost,
+            running,
+        };
+        let (now, now_is_exact) = scale.floor(&situation.time);
+        let is_symbolic = is_symbolic(&self.actions, situation);
+        let relaxation_incomplete_because =
+            completeness::obstacle_among_facts(&self.actions, &self.snaps, facts.len());
+        let incomplete_because = if is_symbolic {
+            Some("values that depend on when things happen")
+        } else {
+            let numbers =
+                completeness::obstacle_among_numbers(&self.actions, &self.snaps, facts.len());
+            numbers.or(relaxation_incomplete_because)
+        };
+        let changes_have_values =
+            has_values_to_change(&self.actions, beginning.running.len(), &beginning.values);
+        Some(Compiled {
+            scale,
+            tuning: wanted.tuning.clone(),
+            epsilon: scale.ceil(&Rational::ZERO).0.max(self.epsilon),
+            longest_distance: longest_distance(&self.snaps),
+            now,
+            fact_annotations,
+            facts,
             fluents: self.symbols.fluents,
             tests: self.symbols.tests,
             snaps: self.snaps,
             actions: self.actions,
-            stamp_count: stamps.count(),
+            annotation_count: annotations.count(),
             timed,
             goal,
             metric,
             goal_timed,
             strata,
             derived,
-            initial: State::default(),
-            is_exact,
-            gap: None,
-            relaxed_gap: None,
-            is_symbolic: false,
+            beginning,
+            is_exact: scale.exactly(&Rational::ONE).is_some()
+                && timed_is_exact
+                && now_is_exact
+                && running_is_exact
+                && (!is_symbolic || changes_have_values),
+            incomplete_because,
+            relaxation_incomplete_because,
+            is_symbolic,
+        })
+    }
+
+    /// The rules of derived facts by stratum, and their heads.
+    fn rules(&mut self, grounding: &Grounding) -> (Vec<Vec<Rule>>, Vec<Vec<u32>>) {
+        let symbols = &mut self.symbols;
+        let rules = grounding.rules.iter().map(|rule| {
+            let body = symbols.formula(&rule.body);
+            let head = symbols.fact(rule.head);
+            Rule { head, body }
+        });
+        let rules = rules.collect();
+        stratified(rules, self.task, &self.symbols)
+    }
+
+    fn coming(&self, situation: &Situation) -> Coming<'a> {
+        let timed = self.task.timed().iter();
+        let happenings: Vec<_> = timed.filter(|timed| timed.time > situation.time).collect();
+        let separations = happenings.iter().map(|timed| {
+            let footprint = Footprint::of_timed(timed);
+            Separations::of(&footprint, &Shifts::default(), self.epsilon, &self.links)
+        });
+        Coming {
+            separations: separations.collect(),
+            happenings,
+        }
+    }
+
+    /// Gives the happenings their annotations, and notes which timed initials must come after them, or
+    /// would break an over-all condition.
+    fn annotate(
+        &mut self,
+        annotations: &Annotations,
+        coming: &Coming<'_>,
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Option<()> {
+        let waiting = TimedSeparations::of(&coming.separations);
+        for (number, (snap, separations)) in
+            self.snaps.iter_mut().zip(&self.separations).enumerate()
+        {
+            if number % SNAPS_PER_QUESTION == 0 && !goes_on() {
+                return None;
+            }
+            snap.after = annotations.after(separations);
+            snap.marks = annotations.marks(separations);
+            snap.before_timed = waiting.before(&separations.makes);
+        }
+        if coming.happenings.is_empty() {
+            return Some(());
+        }
+        for (action, over_all) in self.actions.iter_mut().zip(&self.over_all) {
+            let mut needs = Separations::default();
+            for conjunct in over_all.conjuncts() {
+                if matches!(conjunct, Condition::Fact(_) | Condition::Not(_)) {
+                    needs.needed_until_now(self.task, conjunct, &self.links);
+                }
+            }
+            let breaking = waiting.before(&needs.makes);
+            action.breaking_timed = breaking.into_iter().map(|(number, _)| number).collect();
+        }
+        Some(())
+    }
+
+    /// The timed initials to come, and whether all their times lie on the grid.
+    fn timed(
+        &self,
+        coming: &Coming<'_>,
+        annotations: &Annotations,
+        scale: Scale,
+    ) -> (Vec<Timed>, bool) {
+        let mut are_exact = true;
+        let coming = coming.happenings.iter().zip(&coming.separations);
+        let timed = coming.map(|(happening, separations)| {
+            let (time, is_exact) = scale.floor(&happening.time);
+            are_exact &= is_exact;
+            let mut timed = Timed {
+                time,
+                adds: Vec::new(),
+                deletes: Vec::new(),
+                assigns: Vec::new(),
+                marks: annotations.marks(separations),
+            };
+            for change in &happening.changes {
+                match change {
+                    ModelChange::Add(fact) => timed.adds.extend(self.symbols.known_fact(*fact)),
+                    ModelChange::Delete(fact) => {
+                        timed.deletes.extend(self.symbols.known_fact(*fact));
+                    }
+                    ModelChange::Update { fluent, value, .. } => {
+                        if let (Some(fluent), ground::Expression::Constant(value)) =
+                            (self.symbols.known_fluent(*fluent), value)
+                        {
+                            timed.assigns.push((fluent, value.clone()));
+                        }
+                    }
+                }
+            }
+            timed
+        });
+        (timed.collect(), are_exact)
+    }
+
+    /// Which actions do nothing at their end but add facts that matter only where they are true;
+    /// see `compression`.
+    fn note_compression_safe(
+        &mut self,
+        annotations: &Annotations,
+        timed: &[Timed],
+        has_rules: bool,
+    ) {
+        if has_rules {
+            return;
+        }
+        let ends =
+            compression::Ends::of(&self.actions, &self.snaps, timed, self.symbols.facts.len());
+        for action in self.actions.iter_mut().filter(|action| action.end != NONE) {
+            let makes = &self.separations[action.end as usize].makes;
+            let is_plain = makes.iter().all(|&access| match access {
+                Access::Added(fact) => {
+                    self.symbols.known_fact(fact).is_some() || !annotations.has(access)
+                }
+                Access::NeededTrue(_) | Access::NeededFalse(_) => true,
+                _ => !annotations.has(access),
+            });
+            action.is_compression_safe = is_plain && ends.only_add(action, &self.snaps);
+        }
+    }
+
+    fn note_compressibility(&mut self) {
+        let readers = readers(&self.actions, &self.snaps, self.symbols.facts.len());
+        for (number, action) in self.actions.iter_mut().enumerate() {
+            // What changes continuously is there to be read meanwhile.
+            if action.start == NONE || action.end == NONE || !action.flows.is_empty() {
+                continue;
+            }
+            let snaps = [action.start, action.end].map(|snap| &self.snaps[snap as usize]);
+            let offers = |l: Literal| readers[l.index()].has_other_than(narrow(number));
+            action.compressibility = compressibility(snaps[0], snaps[1], &offers);
+        }
+    }
+
+    /// The timed initials that write something the goal reads.
+    fn timed_for_goal(&self, grounding: &Grounding, coming: &Coming<'_>) -> Vec<u32> {
+        let mut goal = Separations::default();
+        goal.need_from_now_on(self.task, &grounding.goal, &self.links);
+        let is_read = |access: &Access| goal.after.iter().any(|(read, _)| read == access);
+        let timed = coming.separations.iter().enumerate();
+        let timed = timed.filter(|(_, separations)| separations.makes.iter().any(is_read));
+        timed.map(|(number, _)| narrow(number)).collect()
+    }
+
+    /// The metric, and what has been spent of it in the situation.
+    fn metric(&mut self, situation: &Situation, timed: &[Timed]) -> (Option<Metric>, Rational) {
+        let Some(draft) = self.metric.take() else {
+            return (None, Rational::ZERO);
         };
-        if !goes_on() {
-            return None;
-        }
-        compiled.is_symbolic = is_symbolic(&compiled, situation);
-        let fact_count = compiled.facts.len();
-        compiled.relaxed_gap = gaps::among_facts(&compiled.actions, &compiled.snaps, fact_count);
-        compiled.gap = gaps::among_numbers(&compiled.actions, &compiled.snaps, fact_count)
-            .or(compiled.relaxed_gap);
-        if compiled.is_symbolic {
-            compiled.gap = Some("values that depend on when things happen");
-        }
-        if let Some(mut metric) = compiled.metric.take() {
-            metric.only_grows = only_grows(&metric, &compiled);
-            compiled.metric = Some(metric);
-        }
-        compiled.initial = initial(&mut compiled, situation);
-        compiled.initial.cost = initial_cost;
-        Some(compiled)
+        let cost = draft.initial_cost(situation);
+        let mut metric = draft.finish(&mut self.symbols);
+        metric.only_grows = only_grows(&metric, &self.snaps, &self.actions, timed);
+        (Some(metric), cost)
     }
 }

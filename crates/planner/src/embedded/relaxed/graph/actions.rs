@@ -1,6 +1,6 @@
 //! From actions to operators.
 
-use super::super::super::compile::{Action, Change, Compiled, Eagerness, NONE, Snap, Update};
+use super::super::super::compile::{Action, Change, Compiled, Compressibility, NONE, Snap, Update};
 use super::super::super::time::{NEVER, Ticks};
 use super::super::numbers;
 use super::{Gain, Graph, Kind, Stays};
@@ -23,7 +23,7 @@ impl Graph {
         compiled: &Compiled,
         stays: &Stays,
         number: u32,
-        haste: Option<Eagerness>,
+        compresses: Option<Compressibility>,
     ) {
         let action = compiled.action(number);
         if action.end == NONE {
@@ -60,12 +60,13 @@ impl Graph {
                     .filter(|need| !gained.contains(need) && !tests.contains(need)),
             );
             needs.extend(stays.needs(compiled, action));
-            let is_whole = haste.is_some_and(|haste| action.eagerness >= haste)
+            let is_compressed = compresses
+                .is_some_and(|compresses| action.compressibility >= compresses)
                 && end_needs
                     .iter()
                     .all(|need| over_all.contains(need) || gained.contains(need));
-            let (snaps, kind) = if is_whole {
-                (vec![start, end], Kind::Whole(number))
+            let (snaps, kind) = if is_compressed {
+                (vec![start, end], Kind::Compressed(number))
             } else {
                 (vec![start], Kind::Start(number))
             };
@@ -74,7 +75,7 @@ impl Graph {
                 &Draft {
                     kind,
                     needs,
-                    is_running: (!is_whole).then_some(running),
+                    is_running: (!is_compressed).then_some(running),
                     offers: stays.offers(compiled, number).collect(),
                     action,
                     snaps: &snaps,

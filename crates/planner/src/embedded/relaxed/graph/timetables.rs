@@ -68,7 +68,8 @@ impl Graph {
             }
             for literal in [Literal::new(fact, true), Literal::new(fact, false)] {
                 let mut spans = Vec::new();
-                let mut since = literal.holds(&compiled.initial.facts).then_some(-NEVER);
+                let holds = compiled.beginning.facts[fact as usize] == literal.truth();
+                let mut since = holds.then_some(-NEVER);
                 for timed in compiled.timed.iter().filter(touches) {
                     let is_true = timed.adds.contains(&fact);
                     match (since, is_true == literal.truth()) {

@@ -1,0 +1,119 @@
+//! What can be said to `elbowroom envelope`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use elbowroom::num::Rational;
+
+use super::ProblemArgs;
+use super::number::positive;
+
+#[derive(Args, Debug)]
+#[command(after_long_help = VARY_HELP)]
+pub(crate) struct EnvelopeArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
+    #[arg(value_name = "PLAN|FILE.stn")]
+    pub(crate) plan: PathBuf,
+    /// A quantity that may deviate; may be repeated. By default all durations, or the parameters of
+    /// the STN plan file or of the domain (`:synth-parameters`)
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) vary: Vec<String>,
+    /// The algorithm
+    #[arg(long, value_enum, default_value_t = Method::Irr)]
+    pub(crate) method: Method,
+    /// Step size at which the search ends: each bound is closer to its limit than this
+    #[arg(long, value_name = "B", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) precision: Rational,
+    /// Whether the step size doubles after a success or stays constant
+    #[arg(long, value_enum, default_value_t = Growth::Doubling)]
+    pub(crate) growth: Growth,
+    /// Finally move each bound exactly to its limit
+    #[arg(long)]
+    pub(crate) sharpen: bool,
+    /// The guarantee that holds inside the envelope
+    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
+    pub(crate) guarantee: Guarantee,
+    /// Add the plan's conditions to the network where they bound the difference of two times: the
+    /// dispatcher then enforces them, and the envelope may be wider
+    #[arg(long)]
+    pub(crate) enforce: bool,
+    /// An action whose duration the executor chooses, so that it does not vary: a name, a label or
+    /// `(name argument …)`, where `_` matches any argument; may be repeated
+    #[arg(long, value_name = "ACTION")]
+    pub(crate) controllable: Vec<String>,
+    /// Minimum time between interfering happenings (epsilon)
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) epsilon: Rational,
+    /// Time limit in seconds; the best envelope so far is printed
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) time_limit: Option<Rational>,
+    /// Test whether this box is inside the envelope: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`;
+    /// parameters that are not named keep their nominal value
+    #[arg(long, value_name = "BOX")]
+    pub(crate) contains: Option<String>,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const VARY_HELP: &str = "\
+What --vary can name:
+  durations                              all durations (the default)
+  duration ACTIONS                       the durations of these
+  constant ACTIONS FUNCTION [VALUE]      a number in their effects on the function
+  condition ACTIONS FUNCTION [VALUE]     a number in their conditions on the function
+  initial (FUNCTION object ...)          a value at time 0
+  deadline (PREDICATE object ...)        the time of timed initials that make the fact false
+  timed (NAME object ...)                the time of timed initials that change it in any way
+  ?s=VALUE, n0.?r=VALUE                  a :synth-parameters number, nominally VALUE
+
+ACTIONS is an action's name, a label (n0), or (NAME object _ ...), where _ matches any object. Each
+may be followed by `weight W`, its weight in the search, and `in [LB, UB]`, the range of its values;
+a constant or condition also by `shared`: one parameter for all instances.";
+
+/// How to search for an envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Method {
+    /// Incremental rectangular robustification: widen one bound at a time
+    Irr,
+}
+
+/// How the step size changes after a success.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Growth {
+    /// It doubles
+    Doubling,
+    /// It stays
+    Constant,
+}
+
+/// What is guaranteed inside an envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Guarantee {
+    /// Weak controllability: a schedule exists for all values, if they are known in advance
+    Weak,
+    /// Dynamic controllability: an executor that observes each value only when it occurs succeeds
+    Dynamic,
+    /// Strong controllability: one fixed schedule works for all values
+    Strong,
+}
+
+impl From<Guarantee> for elbowroom::envelope::Guarantee {
+    fn from(guarantee: Guarantee) -> Self {
+        match guarantee {
+            Guarantee::Weak => Self::Weak,
+            Guarantee::Dynamic => Self::Dynamic,
+            Guarantee::Strong => Self::Strong,
+        }
+    }
+}
+
+/// What says that the executor chooses the durations of these actions.
+pub(crate) fn controllable(actions: &[String]) -> Vec<String> {
+    actions
+        .iter()
+        .map(|action| format!("controllable {action}"))
+        .collect()
+}

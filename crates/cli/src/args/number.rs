@@ -1,0 +1,34 @@
+//! Numbers on the command line.
+
+use elbowroom::num::Rational;
+
+fn number(text: &str) -> Result<Rational, String> {
+    text.parse::<Rational>().map_err(|error| error.to_string())
+}
+
+pub(super) fn positive(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    if value.is_positive() {
+        Ok(value)
+    } else {
+        Err("it must be greater than 0".to_owned())
+    }
+}
+
+pub(super) fn factor(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    // Beyond that, a world stands still for years, or there is no clock to speak of.
+    if value < Rational::new(1, 1_000_000) || value > Rational::from(1_000_000_000) {
+        return Err("it must lie between 0.000001 and 1000000000".to_owned());
+    }
+    Ok(value)
+}
+
+pub(super) fn positive_or_zero(text: &str) -> Result<Rational, String> {
+    let value = number(text)?;
+    if value.is_negative() {
+        Err("it must not be negative".to_owned())
+    } else {
+        Ok(value)
+    }
+}

@@ -1,0 +1,58 @@
+//! What can be said to `elbowroom plan`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use elbowroom::num::Rational;
+
+use super::ProblemArgs;
+use super::number::positive;
+
+#[derive(Args, Debug)]
+#[command(after_long_help = PLANNER_HELP)]
+pub(crate) struct PlanArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The planner: `embedded`, a planner known by name, `up:ENGINE`, or a command line that contains
+    /// `{domain}` and `{problem}`
+    #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
+    pub(crate) planner: String,
+    /// Time limit in seconds for the search for better plans, by the problem's metric or else by
+    /// makespan; without it, the first plan is returned
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) time_limit: Option<Rational>,
+    /// Return the first plan, even with a time limit
+    #[arg(long)]
+    pub(crate) first: bool,
+    /// Memory limit in MB
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    pub(crate) memory: Option<u64>,
+    /// Write the plan to this file instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Minimum time between interfering happenings (epsilon)
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The planner that is always there.
+pub(crate) const EMBEDDED: &str = elbowroom::answers::plan::EMBEDDED;
+
+const PLANNER_HELP: &str = "\
+Planners:
+  embedded          the planner that is part of this program
+  popf              POPF; found in PATH or through ELBOWROOM_POPF
+  optic             OPTIC; ELBOWROOM_OPTIC
+  tfd               Temporal Fast Downward; ELBOWROOM_TFD
+  lpg-td            LPG-td; ELBOWROOM_LPG
+  up:ENGINE         an engine of unified-planning, such as up:aries; ELBOWROOM_PYTHON names the
+                    Python that has it
+  \"CMD …\"           any program that prints a plan or writes it to {plan}. {domain} and {problem}
+                    are its files, {time} and {memory} the limits in seconds and MB
+
+Every plan is validated before it is printed, whichever planner made it. At the time limit and on
+Ctrl-C the best plan so far is printed. docs/planners.md says how to install each planner and what
+each outcome means.";

@@ -1,0 +1,179 @@
+//! What can be said to `elbowroom run`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use elbowroom::num::Rational;
+
+use super::envelope::{Guarantee, controllable};
+use super::number::{factor, positive};
+use super::plan::EMBEDDED;
+
+#[derive(Args, Debug)]
+#[command(after_long_help = executors_help())]
+pub(crate) struct RunArgs {
+    /// The domain, in PDDL
+    #[arg(value_name = "DOMAIN", required_unless_present = "replay")]
+    pub(crate) domain: Option<PathBuf>,
+    /// The problem, in PDDL
+    #[arg(value_name = "PROBLEM", required_unless_present = "replay")]
+    pub(crate) problem: Option<PathBuf>,
+    /// The plan to begin with; without it, the planner makes one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) plan: Option<PathBuf>,
+    /// The planner: `embedded`, another one as in `elbowroom plan`, or `none`: the run ends when the
+    /// plan no longer works
+    #[arg(long, value_name = "NAME|CMD", default_value = EMBEDDED)]
+    pub(crate) planner: String,
+    /// Planning time in seconds for another planner than the embedded one; without it, its first plan
+    /// is taken, within a minute
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) planner_time: Option<Rational>,
+    /// Number of states that the embedded planner may evaluate for a plan
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    pub(crate) planner_states: u64,
+    /// Number of states after the first plan, in search of a better one
+    #[arg(long, value_name = "N", default_value_t = 2_000)]
+    pub(crate) improve_states: u64,
+    /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each action
+    /// when that is worst; without it, everything goes as planned
+    #[arg(long, value_name = "WORLD.toml|spoiler")]
+    pub(crate) world: Option<PathBuf>,
+    /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default the
+    /// plan's envelope
+    #[arg(long, value_name = "BOX", requires = "world")]
+    pub(crate) spoil: Option<String>,
+    /// A program that is the world and speaks JSON Lines (docs/formats/world-protocol.md)
+    #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
+    pub(crate) world_process: Option<String>,
+    /// Time limit in seconds for each answer of that program
+    #[arg(long, value_name = "S", default_value = "3600", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(requires = "world_process")]
+    pub(crate) answer_within: Rational,
+    /// End the run at the first message of that program that is malformed or names something that
+    /// the problem does not have; otherwise such messages are recorded and ignored
+    #[arg(long, requires = "world_process")]
+    pub(crate) strict_world: bool,
+    /// The executor
+    #[arg(long, value_name = "NAME", default_value = "guarded")]
+    pub(crate) executor: String,
+    /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md), for the
+    /// executors that use them; without it, everything is certain
+    #[arg(long, value_name = "FILE")]
+    pub(crate) likelihoods: Option<PathBuf>,
+    /// Seed of the world's random numbers
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        conflicts_with = "world_process"
+    )]
+    pub(crate) seed: u64,
+    /// A quantity that may deviate, see `elbowroom help envelope`; by default all durations
+    #[arg(long, value_name = "SPEC")]
+    pub(crate) vary: Vec<String>,
+    /// An action whose duration the executor chooses, see `elbowroom help envelope`
+    #[arg(long, value_name = "ACTION")]
+    pub(crate) controllable: Vec<String>,
+    /// The guarantee that holds inside the envelopes
+    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
+    pub(crate) guarantee: Guarantee,
+    /// Step size at which the search for an envelope ends
+    #[arg(long, value_name = "B", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) precision: Rational,
+    /// What happens to running actions when a new plan is made
+    #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
+    pub(crate) running: RunningChoice,
+    /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0, with
+    /// --realtime `measured`
+    #[arg(long, value_name = "measured|S")]
+    pub(crate) planning_time: Option<String>,
+    /// Number of new plans that may be made
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(crate) max_replans: usize,
+    /// Time limit of the run, in seconds of the world
+    #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) time_limit: Rational,
+    /// Run on a wall clock, FACTOR times as fast (0.000001 to 1000000000); measured planning times
+    /// are multiplied by FACTOR. A world process has a clock of its own
+    #[arg(long, value_name = "FACTOR", value_parser = factor, allow_negative_numbers = true, conflicts_with = "world_process")]
+    pub(crate) realtime: Option<Rational>,
+    /// Write a trace of the run to this file (docs/formats/trace.md)
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub(crate) trace: Option<PathBuf>,
+    /// Replay a stored trace and say whether the decisions are the same; all other options are taken
+    /// from the trace
+    #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
+    pub(crate) replay: Option<PathBuf>,
+    /// Minimum time between interfering happenings (epsilon)
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl RunArgs {
+    /// Whether the world is the spoiler.
+    pub(crate) fn is_spoiled(&self) -> bool {
+        self.world.as_deref() == Some(std::path::Path::new("spoiler"))
+    }
+
+    /// What to leave open, and what not.
+    pub(crate) fn specifications(&self) -> Vec<String> {
+        let controllable = controllable(&self.controllable);
+        self.vary.iter().cloned().chain(controllable).collect()
+    }
+}
+
+/// What a stored trace says, and the command line cannot change.
+const IN_THE_TRACE: &[&str] = &[
+    "domain",
+    "problem",
+    "plan",
+    "planner",
+    "planner_time",
+    "planner_states",
+    "improve_states",
+    "world",
+    "spoil",
+    "world_process",
+    "answer_within",
+    "strict_world",
+    "executor",
+    "likelihoods",
+    "seed",
+    "vary",
+    "controllable",
+    "guarantee",
+    "precision",
+    "running",
+    "planning_time",
+    "max_replans",
+    "time_limit",
+    "realtime",
+    "trace",
+    "epsilon",
+];
+
+/// What happens to running actions when a new plan is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RunningChoice {
+    /// Cancel them
+    Cancel,
+    /// Wait until they end
+    Await,
+    /// Let them run, as part of the new plan
+    Keep,
+}
+
+fn executors_help() -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from("Executors:\n");
+    for executor in elbowroom::execution::executors::EXECUTORS {
+        let _ = writeln!(text, "  {}", executor.usage());
+        let _ = writeln!(text, "      {}", executor.summary);
+        let _ = writeln!(text, "      ({})", executor.paper);
+    }
+    text
+}

@@ -1,0 +1,84 @@
+//! The line that shows how a run is getting on.
+
+use std::collections::BTreeMap;
+
+use elbowroom::execution::Entry;
+use elbowroom::execution::{Command, Event, Recorder};
+use elbowroom::num::Rational;
+
+use crate::clock::Clock;
+use crate::number;
+use crate::output::{counted, tame};
+use crate::progress::Progress;
+
+/// Of what is under way, only so many actions are named.
+const MOST_NAMED: usize = 3;
+
+/// Keeps a record and, on a terminal, shows the time, what is under way, and when a plan is made.
+pub(super) struct Live<'a> {
+    inner: &'a mut dyn Recorder,
+    line: Progress,
+    clock: Clock,
+    /// What was started and has not ended, by ticket.
+    running: BTreeMap<u64, String>,
+    replans: usize,
+}
+
+impl<'a> Live<'a> {
+    /// Shows what goes into this record.
+    pub(super) fn new(inner: &'a mut dyn Recorder) -> Self {
+        Self {
+            inner,
+            line: Progress::new(),
+            clock: Clock::start(),
+            running: BTreeMap::new(),
+            replans: 0,
+        }
+    }
+
+    fn show(&mut self, now: &Rational, is_planning: bool) {
+        let (running, replans) = (&self.running, self.replans);
+        self.line.show(self.clock.elapsed(), || {
+            let mut names: Vec<String> = running.values().take(MOST_NAMED).cloned().collect();
+            if running.len() > MOST_NAMED {
+                names.push(format!("and {} more", running.len() - MOST_NAMED));
+            }
+            let what = match (is_planning, names.is_empty()) {
+                (true, _) => "planning".to_owned(),
+                (false, true) => "nothing is under way".to_owned(),
+                (false, false) => names.join(", "),
+            };
+            let time = number::nearest(now);
+            format!("at {time}: {what}; {}", counted(replans, "new plan"))
+        });
+    }
+}
+
+impl Recorder for Live<'_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        match entry {
+            Entry::Command { now, command, .. } => {
+                if let Command::Start { ticket, action, .. } = command {
+                    self.running.insert(ticket.0, tame(&action.name));
+                }
+                self.show(now, false);
+            }
+            Entry::Taken {
+                now, observation, ..
+            } => {
+                if let Event::Ended { ticket, .. } = &observation.event {
+                    self.running.remove(&ticket.0);
+                }
+                self.show(now, false);
+            }
+            Entry::Planning { now, .. } => self.show(now, true),
+            Entry::Planned { now, plan, .. } => {
+                self.replans += usize::from(plan.is_some());
+                self.show(now, false);
+            }
+            Entry::Passed { now, .. } => self.show(now, false),
+            _ => {}
+        }
+    }
+}

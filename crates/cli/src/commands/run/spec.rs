@@ -1,0 +1,135 @@
+//! From the command line to what a run is.
+
+use std::path::Path;
+
+use elbowroom::execute::{NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
+use elbowroom::execution::run::{PlanningTime, RunningRule};
+use elbowroom::num::Rational;
+use elbowroom::plan::parametrize::ParametrizeError;
+use elbowroom::text::Source;
+
+use crate::args::{RunArgs, RunningChoice};
+use crate::exit::Failure;
+use crate::input;
+
+/// What the arguments ask for. Files are read here; what is wrong with the arguments themselves is
+/// told before that. The world file comes with its name, for what is to be said about it.
+pub(super) fn of(
+    arguments: &RunArgs,
+    domain: &Path,
+    problem: &Path,
+) -> Result<(RunSpec, Option<Source>), Failure> {
+    let empty = || NamedText {
+        name: String::new(),
+        text: String::new(),
+    };
+    let mut spec = RunSpec {
+        planner: arguments.planner.clone(),
+        planner_time: arguments.planner_time.clone(),
+        world_process: arguments.world_process.clone(),
+        has_plan: arguments.plan.is_some(),
+        seed: arguments.seed,
+        planner_states: arguments.planner_states,
+        improve_states: arguments.improve_states,
+        guarantee: arguments.guarantee.into(),
+        precision: arguments.precision.clone(),
+        running: match arguments.running {
+            RunningChoice::Cancel => RunningRule::Cancel,
+            RunningChoice::Await => RunningRule::Await,
+            RunningChoice::Keep => RunningRule::Keep,
+        },
+        realtime: arguments.realtime.clone(),
+        max_replans: arguments.max_replans,
+        time_limit: arguments.time_limit.clone(),
+        epsilon: arguments.epsilon.clone(),
+        ..RunSpec::new(empty(), empty())
+    };
+    // A misspelt planner is told before files are read.
+    spec.check_planner().map_err(contradiction)?;
+    spec.domain = (&input::source(domain, "domain")?).into();
+    spec.problem = (&input::source(problem, "problem")?).into();
+    spec.executor = arguments
+        .executor
+        .parse()
+        .map_err(|error| Failure::new(error, "`elbowroom run --help` describes them all"))?;
+    let vary = arguments.specifications();
+    let vary = vary.iter().map(|spec| spec.parse());
+    spec.vary = vary
+        .collect::<Result<_, _>>()
+        .map_err(|error: ParametrizeError| Failure::new(error, ""))?;
+    spec.planning_time = planning_time(arguments)?;
+    if let Some(path) = &arguments.likelihoods {
+        spec.likelihoods = Some((&input::source(path, "likelihoods")?).into());
+    }
+    let mut world = None;
+    if arguments.is_spoiled() {
+        if spec.realtime.is_some() && spec.has_plan {
+            let what = "--world spoiler has no wall clock";
+            return Err(Failure::new(what, "leave out --realtime"));
+        }
+        let inside = arguments.spoil.clone();
+        spec.spoiler = Some(Spoiler { inside });
+    } else if let Some(path) = &arguments.world {
+        let source = input::source(path, "world")?;
+        spec.world = Some(source.text().to_owned());
+        world = Some(source);
+    }
+    Ok((spec, world))
+}
+
+/// On a wall clock, making plans takes time unless somebody says otherwise.
+fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
+    match (&arguments.planning_time, &arguments.realtime) {
+        (Some(text), _) => text.parse().map_err(|_| {
+            Failure::new(
+                format!("`--planning-time {text}` is neither `measured` nor a number of seconds"),
+                "write, for example, --planning-time 2.5",
+            )
+        }),
+        (None, Some(_)) => Ok(PlanningTime::Measured),
+        (None, None) => Ok(PlanningTime::Seconds(Rational::ZERO)),
+    }
+}
+
+/// What to do about arguments, or files, that do not go together.
+pub(super) fn contradiction(error: SpecError) -> Failure {
+    let hint = match &error {
+        SpecError::World(wrong) => {
+            return Failure::from(wrong.clone())
+                .advised("docs/formats/world.md describes world files");
+        }
+        SpecError::Likelihoods(wrong) => {
+            return Failure::from(wrong.clone())
+                .advised("docs/formats/likelihoods.md describes likelihood files");
+        }
+        SpecError::Planner(_) => {
+            "`elbowroom plan --help` says more; `embedded` is always there, and `none` plans \
+             nothing"
+        }
+        SpecError::NeedsWorld(_) => "give it a world file with --world, or leave out the number",
+        SpecError::NeedsEmbedded(_) => "leave out --planner, or the number",
+        SpecError::NoTimeLimit(name) => {
+            return Failure::new(
+                format!("--planner-time says nothing to `--planner {name}`"),
+                "leave it out, or name another planner; the embedded one is limited by \
+                 --planner-states and --improve-states",
+            );
+        }
+        SpecError::Spoiler(error) => return nothing_to_spoil(error),
+        _ => "",
+    };
+    Failure::new(error, hint)
+}
+
+fn nothing_to_spoil(error: &SpoilerError) -> Failure {
+    match error {
+        SpoilerError::NoPlan => Failure::new(
+            "there is no plan for --world spoiler to spoil",
+            "give one with --plan",
+        ),
+        SpoilerError::Box(message) => Failure::new(format!("--spoil: {message}"), ""),
+        SpoilerError::NoEnvelope => Failure::new(error, "give a box with --spoil"),
+        SpoilerError::Empty => Failure::new(error, "give a smaller box with --spoil"),
+        _ => Failure::new(error, ""),
+    }
+}

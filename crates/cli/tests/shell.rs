@@ -1,0 +1,95 @@
+//! What belongs to a command at home in a shell: completions, manual pages, colours.
+
+mod command;
+
+use std::fs;
+
+use command::elbowroom;
+
+fn said(arguments: &[&str]) -> (String, String) {
+    let output = elbowroom(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {output:?}");
+    let text = |bytes| String::from_utf8(bytes).expect("text");
+    (text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn each_shell_gets_its_completions() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let (script, _) = said(&["completions", shell]);
+        for word in ["envelope", "--precision", "--world-process"] {
+            let word = word.trim_start_matches('-');
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn there_is_a_page_for_each_command() {
+    let (page, _) = said(&["man"]);
+    assert!(page.contains(".TH elbowroom 1"), "{page}");
+    let folder = std::env::temp_dir().join(format!("elbowroom-man-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a temporary folder");
+    said(&["man", &folder.display().to_string()]);
+    for command in [
+        "check", "plan", "stn", "envelope", "run", "compare", "network",
+    ] {
+        let page = folder.join(format!("elbowroom-{command}.1"));
+        assert!(page.is_file(), "{}", page.display());
+    }
+    fs::remove_dir_all(folder).expect("it was there");
+}
+
+#[test]
+fn colours_can_be_had_in_a_pipe_and_refused() {
+    let check = [
+        "check",
+        "cases/delivery/domain.pddl",
+        "cases/delivery/problem.pddl",
+        "cases/delivery/plan.plan",
+    ];
+    for (when, expected) in [("always", true), ("never", false), ("auto", false)] {
+        let (text, _) = said(&[&check[..], &["--color", when]].concat());
+        assert_eq!(text.contains('\u{1b}'), expected, "{when}: {text}");
+    }
+}
+
+/// What the metric says of a plan is part of the judgement.
+#[test]
+fn the_metric_is_told() {
+    let folder = std::env::temp_dir().join(format!("elbowroom-metric-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a temporary folder");
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).expect("a file can be written");
+        path.display().to_string()
+    };
+    let domain = file(
+        "domain.pddl",
+        "(define (domain shop) (:requirements :durative-actions :fluents)
+          (:predicates (done)) (:functions (cost))
+          (:durative-action work :parameters () :duration (= ?duration 4)
+            :condition () :effect (and (at end (done)) (at end (increase (cost) 3)))))",
+    );
+    let problem = file(
+        "problem.pddl",
+        "(define (problem p) (:domain shop) (:init (= (cost) 0)) (:goal (done))
+          (:metric minimize (+ (* 2 (cost)) (total-time))))",
+    );
+    let plan = file("a.plan", "1: (work) [4]\n");
+    let (text, _) = said(&["check", &domain, &problem, &plan]);
+    assert!(text.contains("metric: 11"), "{text}");
+    let (json, _) = said(&["check", &domain, &problem, &plan, "--json"]);
+    let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(document["metric"]["exact"], "11", "{document}");
+    // A warning is in the document, too.
+    let lenient = file("lenient.plan", "1: (work) [4 min]\n");
+    let (json, said) = said(&["check", &domain, &problem, &lenient, "--json"]);
+    let document: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert!(said.contains("`min` is ignored"), "{said}");
+    assert_eq!(
+        document["diagnostics"][0]["severity"], "warning",
+        "{document}"
+    );
+    fs::remove_dir_all(folder).expect("it was there");
+}

@@ -1,0 +1,212 @@
+//! What comes of executing a plan?
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom_execution::run::{Report, Verdict};
+use elbowroom_execution::{Entry, NoRecord, Planner, Recorder, World};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_report::trace::line::ReportLine;
+use serde::{Deserialize, Serialize};
+
+use super::{Event, Version, Watcher};
+use crate::execute::{RunSpec, SpecError};
+
+/// Asks for a run.
+pub struct RunRequest<'a> {
+    /// What to run.
+    pub spec: &'a RunSpec,
+    /// The problem, with the ε of the specification.
+    pub task: &'a Arc<Task>,
+    /// The plan to begin with; without one, one is made.
+    pub plan: Option<TimeTriggeredPlan>,
+    /// Who makes plans, if it is not whom the specification names: a replay, or a planner on another
+    /// clock than the watcher's.
+    pub planner: Option<Box<dyn Planner + 'a>>,
+    /// Who keeps a record.
+    pub recorder: Box<dyn Recorder + 'a>,
+}
+
+/// The answer, and the report that it was made of.
+#[derive(Clone, Debug)]
+pub struct RunOutcome {
+    /// The answer as a document.
+    pub answer: RunAnswer,
+    /// What came of the run.
+    pub report: Report,
+}
+
+/// What came of a run: `docs/formats/run-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunAnswer {
+    /// The answer itself, as the last line of a trace has it.
+    #[serde(flatten)]
+    pub report: ReportLine,
+    /// Always the same.
+    pub format: RunFormat,
+    /// Always the same.
+    pub version: Version,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RunFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-run")]
+    Run,
+}
+
+/// How far a run has come.
+#[derive(Clone, Copy, Debug)]
+pub struct RunProgress<'a> {
+    /// What has just been recorded: a decision, a command, an observation, a plan, …
+    pub entry: &'a Entry<'a>,
+    /// How many plans have been taken up.
+    pub plans: usize,
+}
+
+impl<'a> RunRequest<'a> {
+    /// A run of the specification, without a plan and without a record.
+    pub fn new(spec: &'a RunSpec, task: &'a Arc<Task>) -> Self {
+        Self {
+            spec,
+            task,
+            plan: None,
+            planner: None,
+            recorder: Box::new(NoRecord),
+        }
+    }
+
+    /// Begins with this plan.
+    #[must_use]
+    pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
+        let plan = plan.into();
+        Self { plan, ..self }
+    }
+
+    /// Has somebody else make plans than whom the specification names.
+    #[must_use]
+    pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
+        let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
+        Self { planner, ..self }
+    }
+
+    /// Keeps a record.
+    #[must_use]
+    pub fn recorded_by(self, recorder: impl Recorder + 'a) -> Self {
+        let recorder = Box::new(recorder);
+        Self { recorder, ..self }
+    }
+}
+
+/// Executes a plan in a world of one's own. [`simulate`] is for those that a specification
+/// describes.
+///
+/// When the watcher wants no more, the run ends in order: what is running is cancelled, and what
+/// came of it until then is the answer. By the watcher's clock, making plans takes time
+/// ([`PlanningTime::Measured`](elbowroom_execution::run::PlanningTime::Measured)).
+///
+/// # Errors
+/// When the specification contradicts itself. However the run ends is an answer.
+pub fn run(
+    request: RunRequest<'_>,
+    world: &mut dyn World,
+    watcher: &mut (dyn Watcher + Send),
+) -> Result<RunOutcome, SpecError> {
+    let spec = request.spec;
+    let execution = spec.execution(request.task)?;
+    let model = spec.model(request.task.problem());
+    let model = model.map_err(SpecError::World)?;
+    let shared = Watched(Mutex::new(watcher));
+    let clock = || {
+        let millis = shared.get().elapsed().as_millis();
+        Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000)
+    };
+    let goes_on = || shared.get().flow().is_continue();
+    let planner = match request.planner {
+        Some(planner) => planner,
+        None => spec.planner_for(model.as_ref(), &clock, &goes_on)?,
+    };
+    let recorder = Heard {
+        inner: request.recorder,
+        watched: &shared,
+        plans: 0,
+    };
+    let report = execution
+        .beginning_with(request.plan)
+        .planned_by(planner)
+        .recorded_by(recorder)
+        .ending_when(|| matches!(shared.get().flow(), ControlFlow::Break(_)))
+        .explaining()
+        .run_in(world);
+    Ok(RunOutcome {
+        answer: RunAnswer::of(&report),
+        report,
+    })
+}
+
+/// Executes a plan in the world that the specification describes.
+///
+/// # Errors
+/// When there is no such world: the specification names a process or contradicts itself, or its
+/// world file cannot be read.
+pub fn simulate(
+    request: RunRequest<'_>,
+    watcher: &mut (dyn Watcher + Send),
+) -> Result<RunOutcome, SpecError> {
+    let spec = request.spec;
+    let model = spec.model(request.task.problem());
+    let model = model.map_err(SpecError::World)?;
+    let Some(model) = model else {
+        return Err(SpecError::Process);
+    };
+    let mut world = spec.world(&model, request.task, request.plan.as_ref())?;
+    run(request, world.as_mut(), watcher)
+}
+
+impl RunAnswer {
+    /// The document about a run.
+    pub fn of(report: &Report) -> Self {
+        Self {
+            report: ReportLine::of(report),
+            format: RunFormat::Run,
+            version: Version,
+        }
+    }
+}
+
+impl RunOutcome {
+    /// How the run ended.
+    pub fn verdict(&self) -> &Verdict {
+        &self.report.verdict
+    }
+}
+
+/// A watcher that is asked from several sides, one after the other.
+struct Watched<'w>(Mutex<&'w mut (dyn Watcher + Send)>);
+
+impl<'w> Watched<'w> {
+    fn get(&self) -> MutexGuard<'_, &'w mut (dyn Watcher + Send)> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A record that the watcher hears of.
+struct Heard<'a, 'w> {
+    inner: Box<dyn Recorder + 'a>,
+    watched: &'a Watched<'w>,
+    plans: usize,
+}
+
+impl Recorder for Heard<'_, '_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        self.plans += usize::from(matches!(entry, Entry::Mission(_)));
+        let plans = self.plans;
+        self.watched
+            .get()
+            .notice(&Event::Run(RunProgress { entry, plans }));
+    }
+}

@@ -1,0 +1,241 @@
+//! Everything that executing a plan takes, put together: [`Execution`].
+
+use std::sync::Arc;
+
+use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
+use elbowroom_execution::run::{Ports, Report, Run, RunSettings};
+use elbowroom_execution::{Executor, NoRecord, Odds, Planner, Preparer, Recorder, World};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_probability::Likelihoods;
+
+use super::{Analyst, Embedded, WholeRegion};
+use crate::flow;
+
+/// Executes a plan in a world, with one of the
+/// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for when the
+/// plan no longer works. [`Execution`] has everything else that can be chosen.
+///
+/// # Errors
+/// When there is no executor of that name. Whatever happens in the world, there is a report.
+pub fn execute(
+    task: &Arc<Task>,
+    plan: &TimeTriggeredPlan,
+    executor: &str,
+    world: &mut dyn World,
+) -> Result<Report, UnknownExecutor> {
+    let execution = Execution::of(task).by(executor.parse()?);
+    Ok(execution.beginning_with(plan.clone()).run_in(world))
+}
+
+/// An execution: who decides, who plans, and how; whatever is not said is as the command
+/// `elbowroom run` has it by default.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use elbowroom::execute::Execution;
+/// use elbowroom::execution::run::{Next, Verdict};
+/// use elbowroom::execution::{Command, Event, Ending, Observation, Passage};
+/// use elbowroom::model::Task;
+/// use elbowroom::num::Rational;
+/// use elbowroom::pddl::{self, Source};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let domain = Source::new("domain", "
+///     (define (domain post) (:requirements :durative-actions)
+///       (:predicates (delivered))
+///       (:durative-action deliver :parameters () :duration (= ?duration 10)
+///         :effect (at end (delivered))))");
+/// let problem = Source::new("problem", "
+///     (define (problem letter) (:domain post) (:init) (:goal (delivered)))");
+/// let (problem, _warnings) = pddl::read_problem(&domain, &problem)?;
+///
+/// // Without a plan, one is made.
+/// let mut run = Execution::of(&Arc::new(Task::new(problem))).by("stn".parse()?).run();
+/// // The world of this event loop: each action starts at once, and takes as long as planned.
+/// let mut coming: Vec<Observation> = Vec::new();
+/// let report = loop {
+///     match run.next() {
+///         Next::Command(Command::Start { ticket, duration, .. }) => {
+///             let now = run.now().clone();
+///             let event = Event::Started { ticket, measured: Vec::new() };
+///             coming.push(Observation { time: now.clone(), event });
+///             let (ending, measured) = (Ending::Succeeded, Vec::new());
+///             let event = Event::Ended { ticket, ending, measured };
+///             coming.push(Observation { time: now + duration.unwrap_or_default(), event });
+///         }
+///         Next::Command(Command::Cancel { .. }) => coming.clear(),
+///         Next::Wait { until } => {
+///             let now = coming.iter().map(|it| it.time.clone()).chain([until]).min().unwrap();
+///             let observations = coming.extract_if(.., |it| it.time <= now).collect();
+///             run.observe(Passage { now, observations })?;
+///         }
+///         Next::Look { .. } => run.see(Vec::new())?,
+///         Next::Over(report) => break report,
+///     }
+/// };
+/// assert_eq!(report.verdict, Verdict::GoalReached);
+/// assert_eq!(report.time, Rational::from(10));
+/// # Ok(())
+/// # }
+/// ```
+#[must_use = "it does nothing until it is run"]
+pub struct Execution<'a> {
+    task: Arc<Task>,
+    plan: Option<TimeTriggeredPlan>,
+    executor: Decider<'a>,
+    settings: RunSettings,
+    flow: flow::Settings,
+    likelihoods: Arc<Likelihoods>,
+    foresight: Foresight,
+    odds: Option<Box<dyn Odds>>,
+    planner: Option<Box<dyn Planner + 'a>>,
+    preparer: Option<Box<dyn Preparer + 'a>>,
+    recorder: Box<dyn Recorder + 'a>,
+    is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
+    is_explaining: bool,
+}
+
+/// Who decides.
+enum Decider<'a> {
+    Registered(ExecutorSpec),
+    Another(Box<dyn Executor + 'a>),
+}
+
+impl<'a> Execution<'a> {
+    /// An execution of a task, without a plan to begin with.
+    pub fn of(task: &Arc<Task>) -> Self {
+        Self {
+            task: Arc::clone(task),
+            plan: None,
+            executor: Decider::Registered(ExecutorSpec::default()),
+            settings: RunSettings::default(),
+            flow: flow::Settings::default(),
+            likelihoods: Arc::new(Likelihoods::certain()),
+            foresight: Foresight::default(),
+            odds: None,
+            planner: None,
+            preparer: None,
+            recorder: Box::new(NoRecord),
+            is_to_end: Box::new(|| false),
+            is_explaining: false,
+        }
+    }
+
+    /// Begins with this plan. Without one, one is made.
+    pub fn beginning_with(self, plan: impl Into<Option<TimeTriggeredPlan>>) -> Self {
+        let plan = plan.into();
+        Self { plan, ..self }
+    }
+
+    /// Has this executor decide.
+    pub fn by(self, executor: ExecutorSpec) -> Self {
+        let executor = Decider::Registered(executor);
+        Self { executor, ..self }
+    }
+
+    /// Has an executor of your own decide.
+    pub fn decided_by(self, executor: impl Executor + 'a) -> Self {
+        let executor = Decider::Another(Box::new(executor));
+        Self { executor, ..self }
+    }
+
+    /// Runs like that.
+    pub fn with_settings(self, settings: RunSettings) -> Self {
+        Self { settings, ..self }
+    }
+
+    /// Leaves that open in each plan, guarantees that, and searches for envelopes like that.
+    pub fn with_envelopes(self, flow: flow::Settings) -> Self {
+        Self { flow, ..self }
+    }
+
+    /// Takes this to be likely, in executors that go by that.
+    pub fn with_likelihoods(self, likelihoods: Arc<Likelihoods>) -> Self {
+        Self {
+            likelihoods,
+            ..self
+        }
+    }
+
+    /// Goes by what `lookahead` found out about the same problem and likelihoods in other runs.
+    pub fn with_foresight(self, foresight: Foresight) -> Self {
+        Self { foresight, ..self }
+    }
+
+    /// Goes by these odds, in executors that look for likelier plans
+    /// ([`ExecutorSpec::asks_odds`]).
+    pub fn with_odds(self, odds: Option<Box<dyn Odds>>) -> Self {
+        Self { odds, ..self }
+    }
+
+    /// Has this planner make plans, not the embedded one with its usual limits
+    /// ([`Embedded::default`]).
+    pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
+        let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
+        Self { planner, ..self }
+    }
+
+    /// Has plans made ready like that, not by an [`Analyst`].
+    pub fn prepared_by(self, preparer: impl Preparer + 'a) -> Self {
+        let preparer: Option<Box<dyn Preparer + 'a>> = Some(Box::new(preparer));
+        Self { preparer, ..self }
+    }
+
+    /// Keeps a record.
+    pub fn recorded_by(self, recorder: impl Recorder + 'a) -> Self {
+        let recorder = Box::new(recorder);
+        Self { recorder, ..self }
+    }
+
+    /// See [`Run::ending_when`].
+    pub fn ending_when(self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
+        let is_to_end = Box::new(is_to_end);
+        Self { is_to_end, ..self }
+    }
+
+    /// See [`Run::explaining`].
+    pub fn explaining(self) -> Self {
+        Self {
+            is_explaining: true,
+            ..self
+        }
+    }
+
+    /// The run, to be driven step by step: by an event loop.
+    #[must_use = "a run does nothing until it is asked what is next"]
+    pub fn run(self) -> Run<'a> {
+        let executor = match self.executor {
+            Decider::Another(executor) => executor,
+            Decider::Registered(executor) => executor.build(Means {
+                region: Box::new(WholeRegion),
+                likelihoods: self.likelihoods,
+                odds: self.odds,
+                foresight: self.foresight,
+            }),
+        };
+        let planner = self
+            .planner
+            .unwrap_or_else(|| Box::new(Embedded::default()));
+        let preparer = self
+            .preparer
+            .unwrap_or_else(|| Box::new(Analyst::new(self.flow)));
+        let ports = Ports {
+            planner,
+            preparer,
+            executor,
+            recorder: self.recorder,
+        };
+        let run = Run::new(self.task, self.plan, self.settings, ports).ending_when(self.is_to_end);
+        if self.is_explaining {
+            run.explaining()
+        } else {
+            run
+        }
+    }
+
+    /// The whole run, in this world.
+    pub fn run_in(self, world: &mut dyn World) -> Report {
+        self.run().go(world)
+    }
+}

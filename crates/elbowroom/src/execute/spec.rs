@@ -1,0 +1,217 @@
+//! What a run is, as data: [`RunSpec`].
+
+mod text_form;
+mod wiring;
+
+use std::sync::Arc;
+
+use elbowroom_envelope::Guarantee;
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom_model::{Problem, Task};
+use elbowroom_num::Rational;
+use elbowroom_plan::parametrize::VarySpec;
+use elbowroom_probability::{Likelihoods, likelihoods};
+use elbowroom_sim::WorldModel;
+use elbowroom_text::{Diagnostics, Source};
+use serde::{Deserialize, Serialize};
+
+use super::Embedded;
+use crate::answers::plan::EMBEDDED;
+use crate::flow;
+use text_form::{as_text, listed, positive, required};
+
+pub use wiring::{SpecError, SpoilerError};
+
+/// The name of the planner that plans nothing.
+pub const NOBODY: &str = "none";
+
+/// Everything that a run depends on, but for the plan that it begins with and what the world does.
+///
+/// It is what the arguments of `elbowroom run` become, the header of a trace
+/// (`docs/formats/trace.md`), and what a replay reads: one type, so that none of them can mean
+/// another run than the others. A member that is unknown or missing is a mistake; members that are
+/// only there where they say something are [so marked](RunSpec::planner_time).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSpec {
+    /// The domain, in PDDL.
+    pub domain: NamedText,
+    /// The problem, in PDDL.
+    pub problem: NamedText,
+    /// The world file (`docs/formats/world.md`) of a simulation; without one, everything goes as
+    /// planned.
+    #[serde(deserialize_with = "required")]
+    pub world: Option<String>,
+    /// The command line of the process that is the world.
+    #[serde(deserialize_with = "required")]
+    pub world_process: Option<String>,
+    /// A world that lets each action end when that is worst; left out where it is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spoiler: Option<Spoiler>,
+    /// Who makes plans: [`EMBEDDED`], [`NOBODY`], or the name or command line of another planner.
+    pub planner: String,
+    /// How many seconds another planner has for better plans than its first; left out where the
+    /// first is taken.
+    #[serde(default, with = "positive::option")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub planner_time: Option<Rational>,
+    /// A likelihood file (`docs/formats/likelihoods.md`); without one, everything is certain.
+    #[serde(deserialize_with = "required")]
+    pub likelihoods: Option<NamedText>,
+    /// Whether there is a plan to begin with; in a trace, it is the first entry.
+    pub has_plan: bool,
+    /// Who decides.
+    #[serde(with = "as_text")]
+    pub executor: ExecutorSpec,
+    /// Which of the possible trajectories of the world to take.
+    pub seed: u64,
+    /// How many states the embedded planner may look at for one plan.
+    pub planner_states: u64,
+    /// How many of them for a better plan than the first.
+    pub improve_states: u64,
+    /// What to leave open; all durations if empty.
+    #[serde(with = "listed")]
+    pub vary: Vec<VarySpec>,
+    /// What is guaranteed inside envelopes.
+    pub guarantee: Guarantee,
+    /// How close to its limit each end of an envelope should come.
+    #[serde(with = "positive")]
+    pub precision: Rational,
+    /// What becomes of running actions when a new plan is made.
+    #[serde(with = "as_text")]
+    pub running: RunningRule,
+    /// How long making a plan takes in the world.
+    #[serde(with = "as_text")]
+    pub planning_time: PlanningTime,
+    /// How many seconds of the world pass in one second on the wall clock; without one, there is no
+    /// wall clock.
+    #[serde(with = "positive::nullable")]
+    pub realtime: Option<Rational>,
+    /// How often a new plan may be made.
+    pub max_replans: usize,
+    /// When the run ends in any case, in the world's seconds.
+    #[serde(with = "positive")]
+    pub time_limit: Rational,
+    /// The least separation of interfering happenings (ε).
+    #[serde(with = "positive")]
+    pub epsilon: Rational,
+}
+
+/// A file: its name, for messages, and what stands in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NamedText {
+    /// The name.
+    pub name: String,
+    /// The text.
+    pub text: String,
+}
+
+/// A world that lets each action end when that is worst.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spoiler {
+    /// Inside which box: `dur_0=[8,14]`; without one, inside the plan's envelope.
+    #[serde(rename = "box", deserialize_with = "required")]
+    pub inside: Option<String>,
+}
+
+impl From<&Source> for NamedText {
+    fn from(source: &Source) -> Self {
+        Self {
+            name: source.name().to_owned(),
+            text: source.text().to_owned(),
+        }
+    }
+}
+
+impl NamedText {
+    /// As a source, for those who read it.
+    pub fn source(&self) -> Source {
+        Source::new(self.name.as_str(), self.text.as_str())
+    }
+}
+
+impl RunSpec {
+    /// A run of this problem with everything else as the command has it by default.
+    pub fn new(domain: NamedText, problem: NamedText) -> Self {
+        let settings = RunSettings::default();
+        let planner = Embedded::default();
+        let flow = flow::Settings::default();
+        Self {
+            domain,
+            problem,
+            world: None,
+            world_process: None,
+            spoiler: None,
+            planner: EMBEDDED.to_owned(),
+            planner_time: None,
+            likelihoods: None,
+            has_plan: false,
+            executor: ExecutorSpec::default(),
+            seed: 0,
+            planner_states: planner.most_states,
+            improve_states: planner.improve_states,
+            vary: flow.vary,
+            guarantee: flow.guarantee,
+            precision: flow.search.precision,
+            running: settings.running,
+            planning_time: PlanningTime::Seconds(Rational::ZERO),
+            realtime: None,
+            max_replans: settings.most_replans,
+            time_limit: settings.time_limit,
+            epsilon: Task::default_epsilon(),
+        }
+    }
+
+    /// How to run.
+    pub fn settings(&self) -> RunSettings {
+        RunSettings {
+            running: self.running,
+            planning_time: self.planning_time.clone(),
+            most_replans: self.max_replans,
+            time_limit: self.time_limit.clone(),
+            ..RunSettings::default()
+        }
+    }
+
+    /// What to leave open, and how to search for envelopes.
+    pub fn envelopes(&self) -> flow::Settings {
+        let mut flow = flow::Settings {
+            vary: self.vary.clone(),
+            guarantee: self.guarantee,
+            ..flow::Settings::default()
+        };
+        flow.search.precision = self.precision.clone();
+        flow
+    }
+
+    /// What is known of the world: what the world file says, or, without one, that everything goes
+    /// as planned. Of a process, nothing is known.
+    ///
+    /// # Errors
+    /// When the world file cannot be read.
+    pub fn model(&self, problem: &Problem) -> Result<Option<WorldModel>, Diagnostics> {
+        match &self.world {
+            _ if self.world_process.is_some() => Ok(None),
+            Some(text) => {
+                let source = Source::new("world", text.as_str());
+                WorldModel::read(&source, problem).map(Some)
+            }
+            None => Ok(Some(WorldModel::as_planned())),
+        }
+    }
+
+    /// How likely everything is.
+    ///
+    /// # Errors
+    /// When the likelihood file cannot be read.
+    pub fn likelihoods(&self, task: &Task) -> Result<Arc<Likelihoods>, SpecError> {
+        let Some(file) = &self.likelihoods else {
+            return Ok(Arc::new(Likelihoods::certain()));
+        };
+        let read = likelihoods::read(file.source(), task);
+        read.map(Arc::new).map_err(SpecError::Likelihoods)
+    }
+}

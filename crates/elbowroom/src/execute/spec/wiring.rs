@@ -1,0 +1,237 @@
+//! From what a run is to whoever makes it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::PlanningTime;
+use elbowroom_execution::{Need, NoPlanner, Odds, Planner, Preparer, World};
+use elbowroom_external::{self as external, PlannerError};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_sim::{Paced, SimWorld, WorldModel};
+use elbowroom_text::Diagnostics;
+
+use super::{NOBODY, RunSpec};
+use crate::answers::plan::EMBEDDED;
+use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
+use crate::parse_box;
+
+/// How long another planner has for its first plan.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A specification that cannot be run.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpecError {
+    /// The world file cannot be read.
+    #[error("{0}")]
+    World(Diagnostics),
+    /// Another planner is not known, or cannot be used like that.
+    #[error(transparent)]
+    Planner(#[from] PlannerError),
+    /// The likelihood file cannot be read.
+    #[error("{0}")]
+    Likelihoods(Diagnostics),
+    /// The executor compares plans in the world that a world file describes, and there is none.
+    #[error("`{0}` must know how the world behaves")]
+    NeedsWorld(ExecutorSpec),
+    /// The executor compares plans of the embedded planner, and there is another.
+    #[error("`{0}` chooses among plans of the embedded planner")]
+    NeedsEmbedded(ExecutorSpec),
+    /// A time limit was set for a planner that has none.
+    #[error("`{0}` has no time limit for better plans; the embedded planner is limited by states")]
+    NoTimeLimit(String),
+    /// A simulation was asked for.
+    #[error("the world is a process; it cannot be simulated")]
+    Process,
+    /// What a world that spoils plans needs, is not there.
+    #[error(transparent)]
+    Spoiler(#[from] SpoilerError),
+}
+
+/// There is no world that spoils the plan.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpoilerError {
+    /// There is none.
+    #[error("there is no plan to spoil")]
+    NoPlan,
+    /// The plan does not work.
+    #[error("{0}")]
+    Unprepared(String),
+    /// The box is not one of this plan.
+    #[error("{0}")]
+    Box(String),
+    /// The plan has no envelope, and no box was given.
+    #[error("the plan has no envelope to spoil it in")]
+    NoEnvelope,
+    /// Nothing satisfies the plan's constraints.
+    #[error("in this box nothing satisfies the plan's constraints")]
+    Empty,
+}
+
+impl RunSpec {
+    /// The world that the specification describes, unless that is a process: a simulation of
+    /// `model`, or a world that spoils `plan`.
+    ///
+    /// # Errors
+    /// When there is no plan to spoil, or it does not fit the box.
+    pub fn world<'m>(
+        &self,
+        model: &'m WorldModel,
+        task: &Arc<Task>,
+        plan: Option<&TimeTriggeredPlan>,
+    ) -> Result<Box<dyn World + 'm>, SpoilerError> {
+        let Some(spoiler) = &self.spoiler else {
+            return Ok(model.world(task, self.seed));
+        };
+        let plan = plan.ok_or(SpoilerError::NoPlan)?;
+        let mut analyst = Analyst::new(self.envelopes());
+        let prepared = analyst.prepare(task, plan, Need::OpenNetwork);
+        let prepared = prepared.map_err(SpoilerError::Unprepared)?;
+        let envelope = match (&spoiler.inside, prepared.envelope) {
+            (Some(text), _) => parse_box(text, &prepared.plan)
+                .map_err(|error| SpoilerError::Box(error.to_string()))?,
+            (None, Some(envelope)) => envelope,
+            (None, None) => return Err(SpoilerError::NoEnvelope),
+        };
+        let network = prepared.plan.uncertain_network(&envelope);
+        let network = network.map_err(|_| SpoilerError::Empty)?;
+        let spoiling = Spoiling::new(&prepared.plan.plan, &network, &prepared.nominal);
+        let sim = SimWorld::new(Arc::clone(task), model, self.seed);
+        Ok(Box::new(Paced::new(sim, spoiling)))
+    }
+
+    /// Whom [`Self::planner`] names, with the limits of the run; to be asked with `clock` and
+    /// `goes_on`, as in [`Embedded`]. For executors that look for likelier plans, it is the one that
+    /// makes the likeliest in the world of `model`.
+    ///
+    /// # Errors
+    /// When the planner is not known, or has been set a limit that it does not have.
+    pub fn planner_for<'a>(
+        &self,
+        model: Option<&WorldModel>,
+        clock: &'a (dyn Fn() -> Rational + Sync),
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Box<dyn Planner + 'a>, SpecError> {
+        let embedded = Embedded {
+            clock: Some(clock),
+            goes_on: Some(goes_on),
+            ..self.embedded()
+        };
+        Ok(match self.whom()? {
+            Whom::Nobody => Box::new(NoPlanner),
+            Whom::Embedded => match model.filter(|_| self.executor.asks_odds()) {
+                None => Box::new(embedded),
+                Some(model) => {
+                    let time = self.expected_planning_time();
+                    Box::new(Likeliest::new(model.clone(), embedded, time))
+                }
+            },
+            Whom::Another(planner) => {
+                let given = self.planner_time.as_ref();
+                let limit = given.map(|time| Duration::from_secs_f64(time.to_f64().min(1e9)));
+                Box::new(External {
+                    planner: *planner,
+                    domain: self.domain.source(),
+                    problem: self.problem.source(),
+                    settings: external::Settings {
+                        time_limit: Some(limit.unwrap_or(PATIENCE)),
+                        ..external::Settings::default()
+                    },
+                    takes_first: limit.is_none(),
+                    goes_on,
+                })
+            }
+        })
+    }
+
+    /// Whom [`Self::planner`] names.
+    fn whom(&self) -> Result<Whom, SpecError> {
+        let name = &self.planner;
+        let own = match name {
+            name if name.eq_ignore_ascii_case(EMBEDDED) => Whom::Embedded,
+            name if name.eq_ignore_ascii_case(NOBODY) => Whom::Nobody,
+            name => return Ok(Whom::Another(Box::new(external::Planner::named(name)?))),
+        };
+        match self.planner_time {
+            Some(_) => Err(SpecError::NoTimeLimit(name.clone())),
+            None => Ok(own),
+        }
+    }
+
+    /// Whether the planner is known, and has the limits that it is set.
+    ///
+    /// # Errors
+    /// When it is not, or has not.
+    pub fn check_planner(&self) -> Result<(), SpecError> {
+        self.whom().map(|_| ())
+    }
+
+    /// Whether the members go together, as far as that can be said before files are read: that the
+    /// planner is known, and that the executor can do with it and with what is known of the world.
+    ///
+    /// # Errors
+    /// When they do not.
+    pub fn check(&self) -> Result<(), SpecError> {
+        let whom = self.whom()?;
+        if !self.executor.asks_odds() {
+            return Ok(());
+        }
+        if self.world.is_none() && self.spoiler.is_none() {
+            return Err(SpecError::NeedsWorld(self.executor.clone()));
+        }
+        match whom {
+            Whom::Embedded => Ok(()),
+            _ => Err(SpecError::NeedsEmbedded(self.executor.clone())),
+        }
+    }
+
+    /// The embedded planner, with the limits of the run and without a clock.
+    pub fn embedded(&self) -> Embedded<'static> {
+        Embedded {
+            most_states: self.planner_states,
+            improve_states: self.improve_states,
+            ..Embedded::default()
+        }
+    }
+
+    /// How long planning is expected to take in the world; where that is measured, nobody knows
+    /// beforehand.
+    fn expected_planning_time(&self) -> Rational {
+        match &self.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        }
+    }
+
+    /// The execution that the specification is of; who plans, the plan to begin with, and the world
+    /// are still to be said. What executors take to be likely is found out within limits that do not
+    /// depend on the machine.
+    ///
+    /// # Errors
+    /// When its files cannot be read, or the members do not go together.
+    pub fn execution(&self, task: &Arc<Task>) -> Result<Execution<'static>, SpecError> {
+        self.check()?;
+        let model = self.model(task.problem()).map_err(SpecError::World)?;
+        let model = model.filter(|_| self.executor.asks_odds());
+        let odds = model.map(|model| {
+            let time = self.expected_planning_time();
+            Box::new(Likeliest::new(model, self.embedded(), time)) as Box<dyn Odds>
+        });
+        Ok(Execution::of(task)
+            .by(self.executor.clone())
+            .with_settings(self.settings())
+            .with_envelopes(self.envelopes())
+            .with_likelihoods(self.likelihoods(task)?)
+            .with_odds(odds))
+    }
+}
+
+/// Who plans.
+enum Whom {
+    Embedded,
+    Nobody,
+    Another(Box<external::Planner>),
+}

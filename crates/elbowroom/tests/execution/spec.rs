@@ -1,0 +1,230 @@
+//! What a run is, as data: written and read without a doubt about what is meant.
+
+use std::sync::Arc;
+
+use elbowroom::answers::run::simulate;
+use elbowroom::answers::{RunAnswer, RunRequest, Unwatched};
+use elbowroom::execute::{NamedText, RunSpec, SpecError, Spoiler};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::pddl::read_problem;
+use elbowroom::report::trace::{Line, Stored, TraceWriter};
+use serde_json::{Value, json};
+
+use crate::scene::{EXECUTORS, read};
+
+fn spec() -> RunSpec {
+    let file = |name: &str| NamedText {
+        name: name.to_owned(),
+        text: read(&format!("cases/delivery/{name}")),
+    };
+    RunSpec::new(file("domain.pddl"), file("problem.pddl"))
+}
+
+fn value(spec: &RunSpec) -> Value {
+    serde_json::to_value(spec).expect("texts and numbers")
+}
+
+fn read_back(value: Value) -> Result<RunSpec, String> {
+    serde_json::from_value(value).map_err(|error| error.to_string())
+}
+
+/// Everything otherwise than by default.
+fn unusual() -> RunSpec {
+    let text = |name: &str| NamedText {
+        name: name.to_owned(),
+        text: "…".to_owned(),
+    };
+    RunSpec {
+        world: Some("a world".to_owned()),
+        world_process: Some("./robot".to_owned()),
+        spoiler: Some(Spoiler {
+            inside: Some("dur_0=[8,14]".to_owned()),
+        }),
+        planner: "popf".to_owned(),
+        planner_time: Some(Rational::new(5, 2)),
+        likelihoods: Some(text("likely.toml")),
+        has_plan: true,
+        executor: "fixed:5/2".parse().expect("a correct test"),
+        seed: u64::MAX,
+        vary: vec![
+            "duration (drive _ _ _) weight 2"
+                .parse()
+                .expect("a correct test"),
+        ],
+        guarantee: elbowroom::envelope::Guarantee::Strong,
+        precision: Rational::new(1, 3),
+        running: "await".parse().expect("a correct test"),
+        planning_time: "measured".parse().expect("a correct test"),
+        realtime: Some(Rational::from(10)),
+        max_replans: 0,
+        time_limit: Rational::from(7),
+        epsilon: Rational::new(1, 100),
+        ..spec()
+    }
+}
+
+#[test]
+fn a_specification_is_read_as_it_was_written() {
+    for spec in [spec(), unusual()] {
+        assert_eq!(read_back(value(&spec)), Ok(spec));
+    }
+}
+
+#[test]
+fn a_member_that_is_missing_or_unknown_is_a_mistake() {
+    let whole = value(&unusual());
+    let members: Vec<String> = whole
+        .as_object()
+        .expect("an object")
+        .keys()
+        .cloned()
+        .collect();
+    assert_eq!(members.len(), 22);
+    for member in &members {
+        let mut less = whole.clone();
+        less.as_object_mut().expect("an object").remove(member);
+        let read = read_back(less);
+        if ["spoiler", "planner_time"].contains(&member.as_str()) {
+            assert!(read.is_ok(), "{member} is left out where it says nothing");
+        } else {
+            let wrong = read.expect_err(member);
+            assert!(
+                wrong.contains(&format!("missing field `{member}`")),
+                "{wrong}"
+            );
+        }
+        let mut renamed = whole.clone();
+        let moved = renamed.as_object_mut().expect("an object").remove(member);
+        renamed[format!("{member}_")] = moved.expect("it is there");
+        let wrong = read_back(renamed).expect_err(member);
+        assert!(wrong.contains("field `"), "{member}: {wrong}");
+    }
+    for part in ["domain", "likelihoods", "spoiler"] {
+        let mut more = whole.clone();
+        more[part]["more"] = json!(1);
+        assert!(read_back(more).is_err(), "{part}");
+    }
+}
+
+#[test]
+fn a_value_that_means_nothing_is_a_mistake() {
+    for (member, wrong) in [
+        ("executor", json!("gaurded")),
+        ("executor", json!(3)),
+        ("precision", json!("0")),
+        ("precision", json!("a third")),
+        ("precision", json!(1)),
+        ("epsilon", json!("-1/1000")),
+        ("time_limit", json!("0")),
+        ("planner_time", json!("-3")),
+        ("realtime", json!("0")),
+        ("realtime", json!("fast")),
+        ("running", json!("later")),
+        ("planning_time", json!("soon")),
+        ("planning_time", json!("-1")),
+        ("guarantee", json!("none")),
+        ("vary", json!(["deadlin (van)"])),
+        ("seed", json!(-1)),
+        ("max_replans", json!("ten")),
+    ] {
+        let mut changed = value(&unusual());
+        changed[member] = wrong.clone();
+        assert!(read_back(changed).is_err(), "{member}: {wrong}");
+    }
+}
+
+/// As versions wrote it that had no type for it.
+#[test]
+fn headers_of_older_traces_are_read() {
+    let header = r#"{"domain":{"name":"d","text":"(define)"},"problem":{"name":"p","text":"()"},
+        "world":null,"world_process":null,"planner":"embedded","likelihoods":null,"has_plan":true,
+        "executor":"guarded","seed":7,"planner_states":400,"improve_states":100,"vary":[],
+        "guarantee":"dynamic","precision":"1","running":"keep","planning_time":"0","realtime":null,
+        "max_replans":10,"time_limit":"1000000","epsilon":"1/1000","event":"header",
+        "format":"elbowroom-trace","version":1}"#;
+    let stored = Stored::read(&header.replace('\n', "")).expect("a trace");
+    let spec: RunSpec = stored.header().expect("a specification");
+    assert_eq!(spec.seed, 7);
+    let mut sink = String::new();
+    let mut write = |line: &str| sink.push_str(line);
+    let task = Arc::new(Task::new(elbowroom::model::Problem::default()));
+    let mut writer = TraceWriter::new(task, &mut write);
+    writer.header(&spec).expect("texts and numbers");
+    let words: String = header.split_whitespace().collect();
+    assert_eq!(sink.trim_end(), words);
+}
+
+#[test]
+fn what_does_not_go_together_is_said_before_the_run() {
+    let task = Arc::new(Task::new(elbowroom::model::Problem::default()));
+    let check = |change: &dyn Fn(&mut RunSpec)| {
+        let mut spec = spec();
+        change(&mut spec);
+        spec.execution(&task).err()
+    };
+    let live = || "live:5".parse().expect("a correct test");
+    assert!(check(&|_| {}).is_none());
+    let wrong = check(&|spec| spec.executor = live());
+    assert!(matches!(wrong, Some(SpecError::NeedsWorld(_))), "{wrong:?}");
+    let wrong = check(&|spec| {
+        spec.executor = live();
+        spec.world = Some(String::new());
+        spec.planner = "none".to_owned();
+    });
+    assert!(
+        matches!(wrong, Some(SpecError::NeedsEmbedded(_))),
+        "{wrong:?}"
+    );
+    let wrong = check(&|spec| spec.planner_time = Some(Rational::ONE));
+    assert!(
+        matches!(wrong, Some(SpecError::NoTimeLimit(_))),
+        "{wrong:?}"
+    );
+    let wrong = check(&|spec| spec.planner = "nobody-knows".to_owned());
+    assert!(matches!(wrong, Some(SpecError::Planner(_))), "{wrong:?}");
+}
+
+/// The answer is data, and the trace is lines of types: both are read as they were written, to the
+/// last byte.
+#[test]
+fn the_answer_and_each_line_of_the_trace_are_read_as_they_were_written() {
+    let world = "format = \"elbowroom-world\"\nversion = 1\n\
+        [[duration]]\naction = \"*\"\nnormal = { mean = 1.2, deviation = 0.4, minimum = 0.2 }\n\
+        relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.2\n\
+        [reports]\nlost = 0.1\nduplicated = 0.1\ncontradicted = 0.05\n";
+    for executor in EXECUTORS.iter() {
+        let spec = RunSpec {
+            executor: executor.parse().expect("a correct test"),
+            world: Some(world.to_owned()),
+            planner_states: 400,
+            improve_states: 100,
+            seed: 3,
+            ..spec()
+        };
+        let (domain, problem) = (spec.domain.source(), spec.problem.source());
+        let (problem, _) = read_problem(&domain, &problem).expect("a correct test");
+        let task = Arc::new(Task::new(problem));
+        let mut text = String::new();
+        let mut sink = |line: &str| text.push_str(line);
+        let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
+        writer.header(&spec).expect("texts and numbers");
+        let request = RunRequest::new(&spec, &task).recorded_by(&mut writer);
+        let answer = simulate(request, &mut Unwatched).expect("a world").answer;
+
+        let written = serde_json::to_string(&answer).expect("texts and numbers");
+        let read: RunAnswer = serde_json::from_str(&written).expect("what was written");
+        assert_eq!(read, answer, "{executor}");
+
+        let stored = Stored::read(&text).expect("a trace");
+        assert_eq!(stored.header::<RunSpec>().expect("a specification"), spec);
+        assert!(stored.is_complete(), "{executor}");
+        let again: Vec<String> = stored.lines.iter().map(Line::text).collect();
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(again, lines, "{executor}");
+        let Some(Line::Over(last)) = stored.lines.last() else {
+            panic!("{executor}: the trace ends with the report");
+        };
+        assert_eq!(*last, answer.report, "{executor}");
+    }
+}

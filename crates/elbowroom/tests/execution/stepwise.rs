@@ -1,0 +1,120 @@
+//! A run that is driven step by step comes to the same decisions as one that blocks.
+
+use std::sync::Arc;
+
+use elbowroom::execute::{
+    Analyst, Embedded, Execution, External, Likeliest, RememberingPlanner, RememberingPreparer,
+    SharedLikeliest, WholeRegion,
+};
+use elbowroom::execution::run::{Next, NotAsked, Report, Run, Verdict};
+use elbowroom::execution::{Executor, Passage, World, WorldError};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, TraceWriter};
+use elbowroom::sim::{SimWorld, Unreliable};
+
+use crate::scene::{EXECUTORS, Scene};
+
+/// What an event loop keeps from one step to the next, and may move to another thread.
+#[test]
+fn everything_that_is_assembled_can_be_sent_to_another_thread() {
+    fn is_send<T: Send + ?Sized>() {}
+    is_send::<Run<'static>>();
+    is_send::<Execution<'static>>();
+    is_send::<Box<dyn Executor>>();
+    is_send::<Box<dyn World>>();
+    is_send::<(Analyst, WholeRegion, Embedded<'static>, External<'static>)>();
+    is_send::<(Likeliest<'static>, SharedLikeliest)>();
+    is_send::<(
+        RememberingPlanner<Embedded<'static>>,
+        RememberingPreparer<Analyst>,
+    )>();
+    is_send::<(SimWorld<'static>, Unreliable<SimWorld<'static>>)>();
+    is_send::<(TraceWriter<'static>, Replay, ReplayWorld, ReplayPlanner)>();
+    is_send::<(elbowroom::envelope::Oracle, elbowroom::model::Task)>();
+}
+
+/// Drives a run as an event loop would, and asks each question twice.
+fn driven(mut run: Run<'_>, world: &mut dyn World) -> Report {
+    loop {
+        let next = run.next();
+        if !matches!(next, Next::Command(_)) {
+            assert_eq!(run.next(), next, "the question is still open");
+        }
+        let answer = match next {
+            Next::Command(command) => world.command(&run.now().clone(), &command),
+            Next::Wait { until } => world.wait(&until).map(|passage| {
+                assert!(run.see(Vec::new()).is_err(), "a wait is no look");
+                run.observe(passage).expect("it was asked for");
+            }),
+            Next::Look { facts, fluents } => world.look(&facts, &fluents).map(|seen| {
+                let (now, observations) = (run.now().clone(), Vec::new());
+                assert!(run.observe(Passage { now, observations }).is_err());
+                run.see(seen).expect("it was asked for");
+            }),
+            Next::Over(report) => return report,
+        };
+        if let Err(error) = answer {
+            run.fail(error);
+        }
+    }
+}
+
+#[test]
+fn an_event_loop_comes_to_the_same_decisions_as_a_world_that_blocks() {
+    let scene = Scene::case("delivery");
+    let mut model = scene.world(
+        "[[duration]]\naction = \"*\"\nnormal = { mean = 1.1, deviation = 0.4, minimum = 0.2 }\n\
+         relative = true\n[[failure]]\naction = \"*\"\nprobability = 0.2\n",
+    );
+    model.reports.late = 0.2;
+    model.reports.duplicated = 0.1;
+    for executor in EXECUTORS.iter() {
+        for seed in 0..4 {
+            let traced = |drive: &dyn Fn(Run<'_>, &mut dyn World) -> Report| {
+                let mut text = String::new();
+                let mut sink = |line: &str| text.push_str(line);
+                let mut writer = TraceWriter::new(Arc::clone(&scene.task), &mut sink);
+                let run = scene.execution(executor).recorded_by(&mut writer).run();
+                let report = drive(run, model.world(&scene.task, seed).as_mut());
+                (report, text)
+            };
+            let blocking = traced(&|run, world| run.go(world));
+            assert_eq!(traced(&driven), blocking, "{executor}, {seed}");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_is_over_stays_over() {
+    let scene = Scene::case("delivery");
+    let mut run = scene.execution("stn").run();
+    let Next::Command(_) = run.next() else {
+        panic!("the plan begins with a start");
+    };
+    run.fail(WorldError::new("the robot fell over"));
+    let Next::Over(report) = run.next() else {
+        panic!("nobody can be told anything any more");
+    };
+    let why = "the robot fell over".to_owned();
+    assert_eq!(report.verdict, Verdict::WorldFailed { why });
+    run.fail(WorldError::new("it fell over again"));
+    assert_eq!(run.next(), Next::Over(report));
+}
+
+#[test]
+fn what_was_not_asked_for_is_refused_and_changes_nothing() {
+    let scene = Scene::case("delivery");
+    let (mut run, mut world) = (scene.execution("stn").run(), Vec::new());
+    let early = Passage {
+        now: Rational::from(1_000_000),
+        observations: Vec::new(),
+    };
+    let refused: Result<(), NotAsked> = run.observe(early);
+    let words = refused.expect_err("nothing was asked").to_string();
+    assert!(words.contains("has not asked for time to pass"), "{words}");
+    while let Next::Command(command) = run.next() {
+        world.push(command);
+    }
+    assert_eq!(*run.now(), Rational::ZERO);
+    assert!(!world.is_empty());
+}

@@ -1,0 +1,343 @@
+//! Which modules of a crate use each other in a circle.
+//!
+//! Nothing in Rust forbids circles inside a crate. What stands in one cannot be read, tested or
+//! moved without the rest of it, so each circle among a crate's top-level modules is listed here with
+//! the reason why it stays; any other fails.
+//!
+//! Read from the sources: paths that begin with `crate::`, or with as many `super::` as lead to the
+//! root of the crate, outside tests, comments and texts. What the root re-exports counts as its
+//! module's.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Crate, modules, and why they stay together.
+const KNOWN: &[(&str, &[&str], &str)] = &[
+    (
+        "cli",
+        &["exit", "output"],
+        "printing may fail, and a failure is printed",
+    ),
+    (
+        "elbowroom",
+        &["answers", "execute", "flow"],
+        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps; \
+         an execution is an answer, and asks for envelopes on its way",
+    ),
+    (
+        "envelope",
+        &["guarantee", "oracle"],
+        "what each guarantee finds is an `Objection` of the oracle",
+    ),
+    (
+        "execution",
+        &["dispatch", "projection"],
+        "the projection plays the rest of a dispatch through, at the dispatch's request",
+    ),
+    (
+        "execution",
+        &["record", "run"],
+        "the last entry of a record is the run's report",
+    ),
+    (
+        "external",
+        &["processes", "supervise"],
+        "what processes have used is what their supervisor limits",
+    ),
+    (
+        "external",
+        &["run", "start"],
+        "the settings of a run say how it is started",
+    ),
+    (
+        "model",
+        &["expression", "ground", "problem"],
+        "lifted and ground expressions are one type with different leaves",
+    ),
+    (
+        "plan",
+        &["parameter", "stn_plan"],
+        "bounds mention parameters, and parameters are durations of instances",
+    ),
+    (
+        "report",
+        &["trace", "wire"],
+        "a line of a trace holds what goes over the wire",
+    ),
+    (
+        "stn",
+        &[
+            "consistency",
+            "consistent",
+            "lists",
+            "network",
+            "paths",
+            "schedule",
+        ],
+        "a schedule is of a network, which says whether it has one",
+    ),
+    (
+        "text",
+        &["diagnostic", "record", "render"],
+        "a mistake knows how it is shown and written down",
+    ),
+];
+
+#[test]
+fn modules_use_each_other_in_no_circle_that_is_not_listed() {
+    for folder in folders(&workspace().join("crates")) {
+        let name = folder.file_name().expect("a folder's name");
+        let name = name.to_str().expect("plain names");
+        for circle in circles(&uses(&sources(&folder.join("src")))) {
+            let is_known = KNOWN.iter().any(|(known, modules, _)| {
+                *known == name
+                    && circle
+                        .iter()
+                        .all(|module| modules.contains(&module.as_str()))
+            });
+            assert!(
+                is_known,
+                "in `{name}`, {circle:?} use each other in a circle: move what ties them, or list \
+                 them above with the reason"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_circle_is_found_however_the_path_is_written() {
+    let found = |sources: &[(&str, &str)]| {
+        let own = |&(path, text): &(&str, &str)| (path.to_owned(), text.to_owned());
+        circles(&uses(&sources.iter().map(own).collect()))
+    };
+    let root = (
+        "lib.rs",
+        "mod a; mod b; pub use b::{Other, Thing as Renamed};",
+    );
+    let circle = vec![BTreeSet::from(["a".to_owned(), "b".to_owned()])];
+    let to_b = ("a.rs", "use crate::{c::X, b::{Y, Z}};");
+    for to_a in [
+        "use crate::a::X;",
+        "fn f() -> crate::a::X {}",
+        "use super::a;",
+        "use crate::{\n    // why\n    a::{X, Y},\n};",
+    ] {
+        assert_eq!(found(&[root, to_b, ("b.rs", to_a)]), circle, "{to_a}");
+    }
+    let through_the_root = ("a/inner.rs", "use super::super::Other;");
+    assert_eq!(
+        found(&[root, through_the_root, ("b.rs", "use crate::a;")]),
+        circle
+    );
+    for to_none in [
+        "use crate::c::X; use super::b;",
+        "// use crate::a::X;",
+        "/* use crate::a::X; */",
+        "const TEXT: &str = \"use crate::a::X; \\\" use crate::a;\";",
+        "#[cfg(test)]\nmod tests { use crate::a::X; fn f() { {} } }",
+        "use super::super::a;",
+        "use other_crate::a;",
+    ] {
+        assert_eq!(found(&[root, to_b, ("b.rs", to_none)]), [], "{to_none}");
+    }
+    assert_eq!(found(&[root, to_b, ("b/tests.rs", "use crate::a::X;")]), []);
+}
+
+/// The files below a folder with their texts, by path from there.
+fn sources(folder: &Path) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(next) = open.pop() {
+        for entry in fs::read_dir(&next).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let name = path.strip_prefix(folder).expect("below it");
+                let name = name.to_str().expect("plain names").replace('\\', "/");
+                found.insert(name, fs::read_to_string(&path).expect("readable"));
+            }
+        }
+    }
+    found
+}
+
+/// Which top-level modules each of them uses.
+fn uses(sources: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
+    let is_root = |path: &str| matches!(path, "lib.rs" | "main.rs");
+    let top = |path: &str| {
+        let first = path.split('/').next().unwrap_or(path);
+        first.trim_end_matches(".rs").to_owned()
+    };
+    let modules: BTreeSet<String> = sources.keys().map(|path| top(path)).collect();
+    let mut home: BTreeMap<String, String> = BTreeMap::new();
+    for (_, text) in sources.iter().filter(|(path, _)| is_root(path)) {
+        let text = code(text);
+        for module in modules
+            .iter()
+            .filter(|module| !matches!(module.as_str(), "lib" | "main"))
+        {
+            home.insert(module.clone(), module.clone());
+            for (at, _) in text.match_indices(&format!("use {module}::")) {
+                let names = text[at..].split(';').next().unwrap_or_default();
+                let words = names.split(|c: char| !c.is_alphanumeric() && c != '_');
+                let words = words.filter(|word| !modules.contains(*word));
+                home.extend(words.map(|word| (word.to_owned(), module.clone())));
+            }
+        }
+    }
+    let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (path, text) in sources {
+        let is_test = path.ends_with("tests.rs") || path.contains("tests/");
+        if is_root(path) || is_test {
+            continue;
+        }
+        let text = code(text);
+        let depth = path.split('/').count();
+        let from = top(path);
+        let to = ["crate::".to_owned(), "super::".repeat(depth)];
+        let names = to.iter().flat_map(|prefix| heads(&text, prefix));
+        let others = names
+            .filter_map(|name| home.get(&name))
+            .filter(|to| **to != from);
+        let others: BTreeSet<String> = others.cloned().collect();
+        uses.entry(from).or_default().extend(others);
+    }
+    uses
+}
+
+/// The first names of all paths that begin with the prefix, and not with more of the kind.
+fn heads(text: &str, prefix: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices(prefix) {
+        let before = text[..at].trim_end();
+        let is_whole = !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        if !is_whole || before.ends_with("::") {
+            continue;
+        }
+        let rest = &text[at + prefix.len()..];
+        // In braces, what follows the first brace or a comma of that level.
+        let mut level = 0;
+        let mut is_head = true;
+        let mut name = String::new();
+        for c in rest.chars() {
+            if c.is_alphanumeric() || c == '_' {
+                name.push(c);
+                continue;
+            }
+            if is_head && !name.is_empty() {
+                found.push(std::mem::take(&mut name));
+                is_head = false;
+            }
+            name.clear();
+            match c {
+                '{' => level += 1,
+                '}' => level -= 1,
+                ',' if level == 1 => is_head = true,
+                _ => {}
+            }
+            if level == 0 && !is_head {
+                break;
+            }
+        }
+        if is_head && !name.is_empty() {
+            found.push(name);
+        }
+    }
+    found.retain(|name| name != "super");
+    found
+}
+
+/// The text without comments, the contents of texts, and modules of tests.
+fn code(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(next) = rest.chars().next() {
+        let end = if rest.starts_with("//") {
+            rest.find('\n').unwrap_or(rest.len())
+        } else if rest.starts_with("/*") {
+            rest.find("*/").map_or(rest.len(), |end| end + 2)
+        } else if next == '"' {
+            plain.push_str("\"\"");
+            end_of_text(rest)
+        } else if rest.starts_with("'\"'") {
+            3
+        } else {
+            plain.push(next);
+            next.len_utf8()
+        };
+        rest = &rest[end..];
+    }
+    while let Some(at) = plain.find("#[cfg(test)]") {
+        let module = plain[at..]
+            .find('{')
+            .filter(|open| !plain[at..at + open].contains(';'));
+        let mut level = 0;
+        let end = module.and_then(|open| {
+            plain[at + open..].char_indices().find_map(|(index, c)| {
+                level += i32::from(c == '{') - i32::from(c == '}');
+                (level == 0).then_some(at + open + index + 1)
+            })
+        });
+        let end = end.unwrap_or(at + "#[cfg(test)]".len());
+        plain.replace_range(at..end, "");
+    }
+    plain
+}
+
+/// Where a text in quotation marks, with which `rest` begins, ends.
+fn end_of_text(rest: &str) -> usize {
+    let mut is_escaped = false;
+    for (index, c) in rest.char_indices().skip(1) {
+        if c == '"' && !is_escaped {
+            return index + 1;
+        }
+        is_escaped = c == '\\' && !is_escaped;
+    }
+    rest.len()
+}
+
+/// The modules that reach each other: each circle as a whole.
+fn circles(uses: &BTreeMap<String, BTreeSet<String>>) -> Vec<BTreeSet<String>> {
+    let reached = |from: &String| {
+        let mut reached: BTreeSet<String> = BTreeSet::new();
+        let mut open = vec![from];
+        while let Some(next) = open.pop() {
+            for to in uses.get(next).into_iter().flatten() {
+                if reached.insert(to.clone()) {
+                    open.push(to);
+                }
+            }
+        }
+        reached
+    };
+    let reached: BTreeMap<&String, BTreeSet<String>> = uses
+        .keys()
+        .map(|module| (module, reached(module)))
+        .collect();
+    let mut circles: Vec<BTreeSet<String>> = Vec::new();
+    for (module, all) in &reached {
+        if !all.contains(*module) || circles.iter().any(|circle| circle.contains(*module)) {
+            continue;
+        }
+        let comes_back =
+            |other: &&String| reached.get(other).is_some_and(|it| it.contains(*module));
+        circles.push(all.iter().filter(comes_back).cloned().collect());
+    }
+    circles
+}
+
+fn folders(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder)
+        .expect("the folder of the crates")
+        .flatten();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    folders.retain(|path| path.join("src").is_dir());
+    folders.sort();
+    folders
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}

@@ -1,0 +1,233 @@
+//! A plan of 20 robots, one action after the other on each; every tenth waits for one of another
+//! robot; every hundredth has a deadline. Every action ends half a second later than planned, so that
+//! all windows behind it move.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::{
+    Decision, Ending, Executor, Forms, Mission, Moment, News, Progression, Region, StepId,
+};
+use elbowroom_model::ground::{Action, Body, Condition, DurativeBody, SnapAction};
+use elbowroom_model::problem::SchemaId;
+use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{
+    Bound, Constraint, DecoupledEnvelope, Instance, InstanceId, NodeId, Parameter, ParameterId,
+    ParameterKind, ParametrizedPlan, Reason, StnPlan,
+};
+
+/// An executor that goes by the plan.
+pub(crate) fn ready(spec: &str, mission: &Mission) -> Box<dyn Executor> {
+    let spec: ExecutorSpec = spec.parse().expect("a known executor");
+    let mut executor = spec.build(Box::new(Everywhere));
+    executor.adopt(mission).expect("a consistent plan");
+    executor
+}
+
+/// A world in which one action ends after the other.
+pub(crate) struct Events {
+    running: BTreeSet<(Rational, StepId)>,
+    now: Rational,
+    news: Vec<News>,
+    belief: Progression,
+}
+
+impl Events {
+    pub(crate) fn new(mission: &Mission) -> Self {
+        Self {
+            running: BTreeSet::new(),
+            now: Rational::ZERO,
+            news: Vec::new(),
+            belief: Progression::new(Arc::clone(&mission.task)),
+        }
+    }
+
+    /// Tells the executor what has happened, does what it says, and lets the next action end; whether
+    /// there was one.
+    pub(crate) fn next(&mut self, executor: &mut dyn Executor) -> bool {
+        loop {
+            let moment = Moment {
+                now: &self.now,
+                news: &std::mem::take(&mut self.news),
+                belief: &self.belief,
+            };
+            match executor.decide(&moment).decision {
+                Decision::Start(orders) => {
+                    for order in orders {
+                        let duration = order.duration.expect("all take time");
+                        let end = &self.now + duration + Rational::new(1, 2);
+                        self.running.insert((end, order.step));
+                        self.news.push(News::Started {
+                            step: order.step,
+                            time: self.now.clone(),
+                            measured: Vec::new(),
+                        });
+                    }
+                }
+                Decision::Wait { until } => {
+                    let next = self.running.first().map(|(time, _)| time.clone());
+                    let until = until.filter(|until| next.as_ref().is_none_or(|next| until < next));
+                    if let Some(until) = until {
+                        self.now = until;
+                        continue;
+                    }
+                    let Some((time, step)) = self.running.pop_first() else {
+                        return false;
+                    };
+                    self.now.clone_from(&time);
+                    self.news.push(News::Ended {
+                        step,
+                        time,
+                        ending: Ending::Succeeded,
+                        measured: Vec::new(),
+                    });
+                    return true;
+                }
+                Decision::GoalReached => return false,
+                other => panic!("the plan has room: {other:?}"),
+            }
+        }
+    }
+}
+
+struct Everywhere;
+
+impl Region for Everywhere {
+    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
+        None
+    }
+}
+
+/// A plan with so many actions. Open durations may be anything up to twice the planned one.
+pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
+    const ROBOTS: usize = 20;
+    let task = Arc::new(Task::new(Problem::default()));
+    let instances = (0..count).map(|index| Instance {
+        label: format!("n{index}"),
+        action: nothing(index),
+    });
+    let mut plan = StnPlan::unconstrained(&task, instances.collect());
+    let start = |index: usize| NodeId::from(1 + 2 * index);
+    let end = |index: usize| NodeId::from(2 + 2 * index);
+    let mut add = |from, to, lower: Option<Rational>, upper: Option<Rational>, reason| {
+        let bound = |value: Option<Rational>| value.map_or(Bound::Infinite, Bound::Finite);
+        plan.constraints.push(Constraint {
+            from,
+            to,
+            lower: bound(lower),
+            upper: bound(upper),
+            reason,
+        });
+    };
+    let epsilon = Rational::new(1, 1000);
+    let mut nominal = vec![Rational::ZERO; 1 + 2 * count];
+    for index in 0..count {
+        let duration = Rational::from(i64::try_from(5 + index % 7).expect("small"));
+        let mut begin = Rational::ZERO;
+        let after = |earlier: usize, begin: &mut Rational| {
+            let time = &nominal[end(earlier).index()] + &epsilon;
+            *begin = time.max(begin.clone());
+        };
+        if let Some(earlier) = index.checked_sub(ROBOTS) {
+            add(
+                end(earlier),
+                start(index),
+                Some(epsilon.clone()),
+                None,
+                Reason::Interference,
+            );
+            after(earlier, &mut begin);
+        }
+        if let Some(earlier) = index.checked_sub(ROBOTS + 7).filter(|_| index % 10 == 0) {
+            add(
+                end(earlier),
+                start(index),
+                Some(epsilon.clone()),
+                None,
+                Reason::Interference,
+            );
+            after(earlier, &mut begin);
+        }
+        let finish = &begin + &duration;
+        if index % 100 == 99 {
+            let deadline = &finish * Rational::from(3);
+            add(
+                NodeId::ZERO,
+                end(index),
+                None,
+                Some(deadline),
+                Reason::Given,
+            );
+        }
+        let id = Reason::Duration(InstanceId::from(index));
+        let longest = &duration * Rational::from(2);
+        add(start(index), end(index), Some(duration), Some(longest), id);
+        nominal[start(index).index()] = begin;
+        nominal[end(index).index()] = finish;
+    }
+    let mut plan = ParametrizedPlan::closed(&task, plan);
+    if is_open {
+        leave_durations_open(&mut plan);
+    }
+    let twice = |parameter: &Parameter| {
+        let nominal = &parameter.nominal;
+        Interval::closed(nominal.clone(), nominal * Rational::from(2))
+    };
+    let envelope = DecoupledEnvelope {
+        intervals: plan.parameters.iter().map(twice).collect(),
+    };
+    Mission {
+        origin: Rational::ZERO,
+        now: Rational::ZERO,
+        time_triggered: TimeTriggeredPlan::default(),
+        plan,
+        nominal,
+        envelope: Some(envelope),
+        forms: Forms::default(),
+        order: None,
+        running: BTreeMap::new(),
+        task,
+    }
+}
+
+/// Makes a parameter of each duration, its shortest one being nominal.
+fn leave_durations_open(plan: &mut ParametrizedPlan) {
+    for constraint in &mut plan.plan.constraints {
+        let (Reason::Duration(instance), Bound::Finite(nominal)) =
+            (constraint.reason.clone(), constraint.lower.clone())
+        else {
+            continue;
+        };
+        let kind = ParameterKind::Duration(instance);
+        let parameter = Bound::Parameter(ParameterId::from(plan.parameters.len()));
+        (constraint.lower, constraint.upper) = (parameter.clone(), parameter);
+        plan.parameters.push(Parameter {
+            name: format!("dur_{}", instance.index()),
+            kind,
+            range: kind.natural_range(&nominal),
+            nominal,
+            weight: Rational::ONE,
+        });
+    }
+}
+
+fn nothing(index: usize) -> Action {
+    let snap = || SnapAction {
+        condition: Condition::TRUE,
+        effects: Vec::new(),
+    };
+    Action {
+        schema: SchemaId(0),
+        arguments: Vec::new(),
+        name: format!("(work {index})"),
+        body: Body::Durative(DurativeBody {
+            duration: Vec::new(),
+            start: snap(),
+            over_all: Condition::TRUE,
+            end: snap(),
+            continuous: Vec::new(),
+        }),
+    }
+}

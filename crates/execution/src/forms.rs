@@ -1,0 +1,46 @@
+//! Dispatchable forms that have been computed before.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use elbowroom_num::Rational;
+use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
+
+use crate::horizon::{Behind, grounds};
+
+/// How many networks are remembered; an executor asks for one of a few.
+const MOST: usize = 8;
+
+/// The form of a network, or what stands against there being one.
+pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<Behind>>;
+
+/// The dispatchable forms of the networks of a plan, each computed once for all executions of it.
+///
+/// Copies share what they remember. Networks are compared in full, so that it makes no difference
+/// to any answer what is remembered.
+#[derive(Clone, Default)]
+pub struct Forms(Arc<Mutex<Vec<(UncertainNetwork, Form)>>>);
+
+impl Forms {
+    /// The form of a network.
+    pub(crate) fn of(&self, network: &UncertainNetwork) -> Form {
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = known().iter().find(|(known, _)| known == network).cloned();
+        if let Some((_, form)) = same {
+            return form;
+        }
+        let form = network.dispatchable().map(Arc::new);
+        let form = form.map_err(|conflict| grounds(&conflict.steps));
+        let mut known = known();
+        if known.len() < MOST {
+            known.push((network.clone(), form.clone()));
+        }
+        form
+    }
+}
+
+impl fmt::Debug for Forms {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Forms").finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,185 @@
+//! What a reason is about: [`About`], and its words.
+
+use std::fmt;
+
+use elbowroom_num::Rational;
+
+/// The quantity, condition, moment or state of affairs that a [`Reason`](super::Reason) is about.
+///
+/// Its [`Display`](fmt::Display) is the one place where it becomes words; what can be told apart is
+/// told apart by its data.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum About {
+    /// How long the action takes.
+    Duration,
+    /// How long what was left of the action took, when the plan went on with it.
+    RestOfDuration,
+    /// By how much the action changes this fluent.
+    Change(String),
+    /// A parameter of the plan, by its name.
+    Parameter(String),
+    /// The start of this action.
+    Start(String),
+    /// The end of this action.
+    End(String),
+    /// A time point of the plan, as the plan describes it.
+    TimePoint(String),
+    /// The same, of a start that has failed so often in a row and is tried again.
+    Retry {
+        /// The time point, if it is still to come.
+        of: Option<String>,
+        /// How often it has failed.
+        failures: u32,
+    },
+    /// These conditions, as the problem writes them.
+    Conditions(Vec<String>),
+    /// The same, which are needed throughout an action.
+    Throughout(Vec<String>),
+    /// This fact or fluent, which was seen.
+    Seen(String),
+    /// What was seen when the world was asked to look at the goal.
+    SeenAtTheEnd,
+    /// Whatever is observed next.
+    AnyObservation,
+    /// The end of what is under way.
+    EndOfRunning,
+    /// The start of what was told to start.
+    StartOfOrdered,
+    /// The end of what was told to stop.
+    EndOfCancelled,
+    /// The next start of the order that is executed.
+    NextStart,
+    /// The next happening of that order, which the world brings about.
+    NextHappening,
+    /// What is chosen is best of all that can be done; with the probability to succeed from here.
+    BestOfAll(f64),
+    /// What is chosen is first of the order most likely to succeed; with that probability.
+    FirstOfBestOrder(f64),
+    /// What is chosen is next after the lattermost layer that fits.
+    NextInOrder,
+    /// Another plan succeeds with the probability `other`, the rest of this one with `present`.
+    Odds {
+        /// Of the rest of this plan.
+        present: Rational,
+        /// Of another plan.
+        other: Rational,
+    },
+    /// An order that does not wait for the end of this action.
+    WithoutEndOf(String),
+    /// It was cancelled.
+    Cancelled,
+    /// It has failed so often in a row that its likelihoods do not explain it.
+    FailedInARow {
+        /// What the world says of the last failure; `None`: that it was cancelled.
+        why: Option<String>,
+        /// How often.
+        failures: i32,
+        /// With which probability it starts.
+        success: f64,
+    },
+    /// There is no plan.
+    NoPlan,
+    /// The plan has no envelope.
+    NoEnvelope,
+    /// The plan was made ready without its partial order.
+    NoPartialOrder,
+    /// No times satisfy the plan's constraints.
+    NoTimes,
+    /// A constraint of the plan that nothing satisfies.
+    EmptyConstraint,
+    /// The plan waits, nothing is running, and nothing is due.
+    Nothing,
+    /// Too little time is left even if nothing deviates any more.
+    TooLittleTime,
+    /// What the rest of the plan does to numbers fails when the action takes longer.
+    LaterNumbers,
+    /// What somebody else says: the world, of a failure; who knows the envelope, of an objection.
+    Said(String),
+}
+
+impl fmt::Display for About {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let words = match self {
+            Self::Duration => "duration",
+            Self::RestOfDuration => "remaining duration",
+            Self::Change(fluent) => return write!(f, "change of {fluent}"),
+            Self::Start(action) => return write!(f, "the start of {action}"),
+            Self::End(action) => return write!(f, "the end of {action}"),
+            Self::Parameter(words)
+            | Self::TimePoint(words)
+            | Self::Seen(words)
+            | Self::Said(words) => words,
+            Self::Retry { of, failures } => return retry(f, of.as_deref(), *failures),
+            Self::Conditions(conditions) => return f.write_str(&conditions.join(" and ")),
+            Self::Throughout(conditions) => {
+                return write!(f, "{} throughout", conditions.join(" and "));
+            }
+            Self::SeenAtTheEnd => "what the world looks like at the end",
+            Self::AnyObservation => "something is observed",
+            Self::EndOfRunning => "what is under way has ended",
+            Self::StartOfOrdered => "what was told to start has started",
+            Self::EndOfCancelled => "what was told to stop has stopped",
+            Self::NextStart => "the order's next start",
+            Self::NextHappening => "what is next in the order has happened",
+            Self::BestOfAll(probability) => {
+                return write!(
+                    f,
+                    "best of all that can be done (P = {probability:.4} from here)"
+                );
+            }
+            Self::FirstOfBestOrder(probability) => {
+                return write!(
+                    f,
+                    "first of the order most likely to succeed (P = {probability:.4} from here)"
+                );
+            }
+            Self::NextInOrder => "next after the lattermost layer that fits",
+            Self::Odds { present, other } => {
+                let percent = |share: &Rational| (share * Rational::from(100)).to_decimal(1);
+                return write!(
+                    f,
+                    "another plan succeeds with a probability of {} %, the rest of this one of {} %",
+                    percent(other),
+                    percent(present)
+                );
+            }
+            Self::WithoutEndOf(action) => {
+                return write!(f, "one that does not wait for the end of {action}");
+            }
+            Self::Cancelled => "it was cancelled",
+            Self::FailedInARow {
+                why,
+                failures,
+                success,
+            } => {
+                let why = why.as_deref().unwrap_or("it was cancelled");
+                return write!(
+                    f,
+                    "{why}; {failures} in a row, and it starts with probability {success}"
+                );
+            }
+            Self::NoPlan => "there is no plan",
+            Self::NoEnvelope => "the plan has no envelope",
+            Self::NoPartialOrder => "the plan was made ready without its partial order",
+            Self::NoTimes => "no times satisfy the plan's constraints",
+            Self::EmptyConstraint => "nothing satisfies a constraint",
+            Self::Nothing => "the plan waits for nothing",
+            Self::TooLittleTime => "even if nothing deviates any more, too little time is left",
+            Self::LaterNumbers => {
+                "after more than that, what the rest of the plan does to numbers fails"
+            }
+        };
+        f.write_str(words)
+    }
+}
+
+fn retry(f: &mut fmt::Formatter<'_>, of: Option<&str>, failures: u32) -> fmt::Result {
+    if let Some(of) = of {
+        write!(f, "{of} is tried again: ")?;
+    }
+    match failures {
+        1 => f.write_str("its start has failed once"),
+        many => write!(f, "its start has failed {many} times in a row"),
+    }
+}

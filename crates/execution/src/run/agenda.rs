@@ -1,0 +1,85 @@
+//! What a run has to do before its executor is asked again.
+
+use elbowroom_model::{Situation, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+
+use super::{Next, Run, Stop};
+use crate::event::{Command, Ticket};
+use crate::executor::{News, Order};
+use crate::reason::{Cause, Reason};
+
+/// Something to do. Each takes no time in the world, but for [`Todo::Pass`] and [`Todo::Close`].
+pub(super) enum Todo {
+    /// Begin with this plan, or make one.
+    Begin(Option<TimeTriggeredPlan>),
+    /// Ask the executor.
+    Decide,
+    /// Start an action.
+    Start(Order),
+    /// Cancel one.
+    Cancel(Ticket),
+    /// Let time pass.
+    Pass(Rational),
+    /// Give up what has been silent for too long.
+    GiveUpTheSilent,
+    /// Cancel an action that has been silent since then, and give it up.
+    GiveUp(Ticket, Rational),
+    /// It has been cancelled.
+    NoteSilence(Ticket, Rational),
+    /// Wait until these have ended; without any named, until all have.
+    Settle(Option<Vec<Ticket>>),
+    /// Make a plan from here.
+    Plan(Reason),
+    /// Begin with a plan as soon as the time is over that it took to make it.
+    Adopt(Box<Made>),
+    /// What happened while the plan was made, it does not know.
+    Tell(Vec<News>),
+    /// Wait until then for what was told to stop, and end the run.
+    Close(Rational),
+}
+
+/// A plan that has been made.
+pub(super) struct Made {
+    pub(super) plan: TimeTriggeredPlan,
+    /// From where.
+    pub(super) situation: Situation,
+    /// What is running there.
+    pub(super) running: Vec<Ticket>,
+    /// When it is there, by the world's clock.
+    pub(super) ready: Rational,
+}
+
+impl Run<'_> {
+    /// Does something, which may bring more onto the agenda. What is returned, the world must be
+    /// told before anything else is done.
+    pub(super) fn perform(&mut self, todo: Todo) -> Result<Option<Command>, Stop> {
+        match todo {
+            Todo::Begin(Some(plan)) => {
+                let situation = Situation::initial(&self.task);
+                self.take_up(&plan, &situation, &[])?;
+            }
+            Todo::Begin(None) => self.replan(&Reason::new(Cause::NewPlan))?,
+            Todo::Decide => self.decide_and_follow()?,
+            Todo::Start(order) => return Ok(Some(self.start(order))),
+            Todo::Cancel(ticket) => return Ok(Some(self.cancel(ticket))),
+            Todo::Pass(until) => {
+                let until = until.min(self.settings.time_limit.clone());
+                self.asked = Some(Next::Wait { until });
+            }
+            Todo::GiveUpTheSilent => self.give_up_the_silent(),
+            Todo::GiveUp(ticket, since) => {
+                self.agenda.push(Todo::NoteSilence(ticket, since));
+                return Ok(Some(self.cancel(ticket)));
+            }
+            Todo::NoteSilence(ticket, since) => self.note_silence(ticket, since),
+            Todo::Settle(awaited) => self.go_on_settling(awaited),
+            Todo::Plan(reason) => self.plan_from_here(&reason)?,
+            Todo::Adopt(made) => self.adopt(made)?,
+            Todo::Tell(news) => {
+                self.news.splice(0..0, news);
+            }
+            Todo::Close(until) => self.close(until),
+        }
+        Ok(None)
+    }
+}

@@ -1,0 +1,210 @@
+//! What every executor in the registry owes: to a world that keeps its word, and to one that does
+//! not. Nothing but this crate and a plan is needed for that.
+
+mod scene;
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use elbowroom_execution::executors::EXECUTORS;
+use elbowroom_execution::run::{Next, Report, Run, RunSettings, Verdict};
+use elbowroom_execution::{Command, Entry, Passage, Recorder, Ticket, World, WorldError};
+use elbowroom_num::Rational;
+use scene::{Scene, Toy, Whims};
+
+/// Keeps each entry as a text; of a plan, that it was taken up.
+#[derive(Clone, Default)]
+struct Notes(Arc<Mutex<Vec<String>>>);
+
+impl Recorder for Notes {
+    fn record(&mut self, entry: &Entry<'_>) {
+        let mut notes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        notes.push(match entry {
+            // Its table of facts is a hash map, whose order says nothing.
+            Entry::Mission(mission) => format!("a plan from {}", mission.origin),
+            other => format!("{other:?}"),
+        });
+    }
+}
+
+impl Notes {
+    fn taken(&self) -> Vec<String> {
+        let notes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        notes.clone()
+    }
+}
+
+/// What was started and neither ended nor was cancelled.
+#[derive(Default)]
+struct Books {
+    open: BTreeSet<Ticket>,
+    given: BTreeSet<Ticket>,
+}
+
+/// Drives a run to its end.
+fn drive(mut run: Run<'_>, world: &mut dyn World) -> (Report, Books) {
+    let mut books = Books::default();
+    loop {
+        let answered = match run.next() {
+            Next::Command(command) => {
+                match &command {
+                    Command::Start { ticket, .. } => {
+                        assert!(books.given.insert(*ticket), "each start has its own ticket");
+                        books.open.insert(*ticket);
+                    }
+                    Command::Cancel { ticket } => {
+                        assert!(
+                            books.given.contains(ticket),
+                            "only what was started is cancelled"
+                        );
+                        books.open.remove(ticket);
+                    }
+                }
+                world.command(run.now(), &command)
+            }
+            Next::Wait { until } => {
+                assert!(until >= *run.now(), "nobody waits for the past");
+                world.wait(&until).map(|passage| {
+                    for ended in scene::ended(&passage) {
+                        books.open.remove(&ended);
+                    }
+                    run.observe(passage).expect("it was asked for");
+                })
+            }
+            Next::Look { facts, fluents } => world
+                .look(&facts, &fluents)
+                .map(|seen| run.see(seen).expect("it was asked for")),
+            Next::Over(report) => return (report, books),
+        };
+        if let Err(error) = answered {
+            run.fail(error);
+        }
+    }
+}
+
+#[test]
+fn where_all_goes_as_planned_the_goal_is_reached_without_a_new_plan() {
+    let scene = Scene::new();
+    for registered in EXECUTORS {
+        let executor = registered.example();
+        let notes = Notes::default();
+        let run = scene.run(&executor, notes, RunSettings::default());
+        let (report, books) = drive(run, &mut Toy::new(Whims::None));
+        assert_eq!(report.verdict, Verdict::GoalReached, "{executor}");
+        assert_eq!(report.replans, 0, "{executor}: {:?}", report.reasons);
+        assert!(books.open.is_empty(), "{executor}");
+        assert!(report.starts >= 2, "{executor}");
+    }
+}
+
+#[test]
+fn the_same_history_leads_to_the_same_decisions() {
+    let scene = Scene::new();
+    for registered in EXECUTORS {
+        let executor = registered.example();
+        for seed in 0..5 {
+            let record = || {
+                let notes = Notes::default();
+                let run = scene.run(&executor, notes.clone(), RunSettings::default());
+                drive(run, &mut Toy::new(Whims::Seeded(seed)));
+                notes.taken()
+            };
+            assert_eq!(record(), record(), "{executor}, {seed}");
+        }
+    }
+}
+
+#[test]
+fn whatever_the_world_says_the_run_ends_and_nothing_is_left_running() {
+    let scene = Scene::new();
+    let settings = RunSettings {
+        time_limit: Rational::from(5000),
+        ..RunSettings::default()
+    };
+    let mut verdicts = BTreeSet::new();
+    for registered in EXECUTORS {
+        let executor = registered.example();
+        for seed in 0..40 {
+            let run = scene.run(&executor, Notes::default(), settings.clone());
+            let (report, books) = drive(run, &mut Toy::new(Whims::Seeded(seed)));
+            verdicts.insert(report.verdict.name());
+            assert!(
+                books.open.is_empty(),
+                "{executor}, {seed}: {:?}",
+                books.open
+            );
+            assert!(
+                report.time <= Rational::from(5000 + 6),
+                "{executor}, {seed}"
+            );
+        }
+    }
+    assert!(verdicts.len() > 1, "the whims matter: {verdicts:?}");
+}
+
+#[test]
+fn a_world_that_fails_at_any_moment_ends_the_run_at_once() {
+    /// Answers so often, and then no more.
+    struct Mortal {
+        inner: Toy,
+        left: usize,
+    }
+    impl Mortal {
+        fn live(&mut self) -> Result<(), WorldError> {
+            self.left = self
+                .left
+                .checked_sub(1)
+                .ok_or_else(|| WorldError::new("it is gone"))?;
+            Ok(())
+        }
+    }
+    impl World for Mortal {
+        fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+            self.live()?;
+            self.inner.command(now, command)
+        }
+        fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+            self.live()?;
+            self.inner.wait(until)
+        }
+    }
+    let scene = Scene::new();
+    for registered in EXECUTORS {
+        let executor = registered.example();
+        for left in 0..6 {
+            let run = scene.run(&executor, Notes::default(), RunSettings::default());
+            let inner = Toy::new(Whims::None);
+            let (report, _) = drive(run, &mut Mortal { inner, left });
+            let why = "it is gone".to_owned();
+            let failed = Verdict::WorldFailed { why };
+            if report.verdict != failed {
+                // The plan was done before.
+                assert_eq!(report.verdict, Verdict::GoalReached, "{executor}, {left}");
+                assert!(left > 2, "{executor}, {left}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_run_can_be_moved_to_another_thread_between_two_steps() {
+    let scene = Scene::new();
+    for registered in EXECUTORS {
+        let mut run = scene.run(
+            &registered.example(),
+            Notes::default(),
+            RunSettings::default(),
+        );
+        let Next::Command(first) = run.next() else {
+            panic!("the plan begins with a start");
+        };
+        let moved = std::thread::spawn(move || {
+            let mut world = Toy::new(Whims::None);
+            let told = world.command(&Rational::ZERO, &first);
+            told.expect("the toy takes everything");
+            run.go(&mut world)
+        });
+        let report = moved.join().expect("nobody panics");
+        assert_eq!(report.verdict, Verdict::GoalReached, "{}", registered.name);
+    }
+}

@@ -1,0 +1,255 @@
+//! A problem with a plan made ready, and a world for it, with nothing above this crate.
+
+use std::sync::Arc;
+
+use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
+use elbowroom_execution::run::{Ports, Run, RunSettings};
+use elbowroom_execution::{
+    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, Prepared, Preparer,
+    Recorder, Region, Ticket, World, WorldError,
+};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_pddl::{Source, read_plan, read_problem};
+use elbowroom_plan::deorder::deorder;
+use elbowroom_plan::parametrize::parametrize;
+use elbowroom_plan::partial_order::partial_order;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_probability::Likelihoods;
+
+const DOMAIN: &str = "(define (domain kitchen) (:requirements :durative-actions)
+    (:predicates (boiled) (chopped) (cooked))
+    (:durative-action boil :parameters () :duration (= ?duration 10)
+      :effect (at end (boiled)))
+    (:durative-action chop :parameters () :duration (= ?duration 4)
+      :effect (at end (chopped)))
+    (:durative-action cook :parameters () :duration (= ?duration 8)
+      :condition (and (at start (boiled)) (at start (chopped)))
+      :effect (at end (cooked))))";
+
+const PROBLEM: &str =
+    "(define (problem soup) (:domain kitchen) (:init) (:goal (and (cooked) (boiled))))";
+
+const PLAN: &str = "0: (boil) [10]\n0: (chop) [4]\n10.001: (cook) [8]";
+
+/// The problem, with its plan.
+pub(crate) struct Scene {
+    task: Arc<Task>,
+    plan: TimeTriggeredPlan,
+}
+
+impl Scene {
+    pub(crate) fn new() -> Self {
+        let source = |text: &str| Source::new("test", text);
+        let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).expect("a correct test");
+        let task = Task::new(problem);
+        let (plan, _) = read_plan(&source(PLAN), &task).expect("a correct test");
+        Self {
+            task: Arc::new(task),
+            plan,
+        }
+    }
+
+    /// A run of the plan that has not begun. When the plan no longer works, it is over.
+    pub(crate) fn run(
+        &self,
+        executor: &str,
+        recorder: impl Recorder + 'static,
+        settings: RunSettings,
+    ) -> Run<'static> {
+        let spec: ExecutorSpec = executor.parse().expect("a registered executor");
+        let ports = Ports {
+            planner: Box::new(NoPlanner),
+            preparer: Box::new(ByHand),
+            executor: spec.build(Means {
+                region: Box::new(Everywhere),
+                likelihoods: Arc::new(Likelihoods::certain()),
+                odds: None,
+                foresight: Foresight::default(),
+            }),
+            recorder: Box::new(recorder),
+        };
+        let plan = Some(self.plan.clone());
+        Run::new(Arc::clone(&self.task), plan, settings, ports)
+    }
+}
+
+/// Makes plans ready without a solver: each duration may take up to twice as long as planned, which
+/// in this plan, without deadlines, is right.
+struct ByHand;
+
+impl Preparer for ByHand {
+    fn prepare(
+        &mut self,
+        task: &Arc<Task>,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, String> {
+        let deordered = deorder(task, plan).map_err(|error| error.to_string())?;
+        let nominal = deordered.nominal;
+        let is_open = matches!(need, Need::OpenNetwork | Need::Envelope);
+        let order = (need == Need::PartialOrder).then(|| partial_order(task, plan));
+        let prepared = if is_open {
+            parametrize(task, deordered.plan, &nominal, &[]).map_err(|error| error.to_string())?
+        } else {
+            ParametrizedPlan::closed(task, deordered.plan)
+        };
+        let twice = prepared.parameters.iter().map(|parameter| {
+            let longest = &parameter.nominal * Rational::from(2);
+            Interval::closed(parameter.nominal.clone(), longest)
+        });
+        let envelope = is_open.then(|| DecoupledEnvelope {
+            intervals: twice.collect(),
+        });
+        Ok(Prepared {
+            plan: prepared,
+            nominal,
+            envelope,
+            forms: Forms::default(),
+            order,
+        })
+    }
+}
+
+/// No numbers, no objections.
+struct Everywhere;
+
+impl Region for Everywhere {
+    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
+        None
+    }
+}
+
+/// How a world deviates.
+#[derive(Clone, Copy)]
+pub(crate) enum Whims {
+    /// Not at all.
+    None,
+    /// Actions take longer or fail, and reports are lost, repeated, wrong, or from the future.
+    Seeded(u64),
+}
+
+/// A world in which actions take as long as they are told to, but for its whims.
+pub(crate) struct Toy {
+    now: Rational,
+    coming: Vec<Observation>,
+    whims: Whims,
+    state: u64,
+}
+
+impl Toy {
+    pub(crate) fn new(whims: Whims) -> Self {
+        let state = match whims {
+            Whims::None => 0,
+            Whims::Seeded(seed) => seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1,
+        };
+        Self {
+            now: Rational::ZERO,
+            coming: Vec::new(),
+            whims,
+            state,
+        }
+    }
+
+    /// Whether something happens that does so once in `times`; xorshift.
+    fn one_in(&mut self, times: u64) -> bool {
+        if matches!(self.whims, Whims::None) {
+            return false;
+        }
+        self.state ^= self.state << 13;
+        self.state ^= self.state >> 7;
+        self.state ^= self.state << 17;
+        self.state.is_multiple_of(times)
+    }
+
+    fn report(&mut self, time: Rational, event: Event) {
+        if self.one_in(12) {
+            return;
+        }
+        let observation = Observation { time, event };
+        if self.one_in(8) {
+            self.coming.push(observation.clone());
+        }
+        self.coming.push(observation);
+    }
+}
+
+impl World for Toy {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        let measured = Vec::new;
+        match *command {
+            Command::Start {
+                ticket,
+                ref duration,
+                ..
+            } => {
+                let event = Event::Started {
+                    ticket,
+                    measured: measured(),
+                };
+                self.report(now.clone(), event);
+                let mut end = now + duration.clone().unwrap_or_default();
+                if self.one_in(4) {
+                    end += &Rational::from(3);
+                }
+                let ending = if self.one_in(10) {
+                    let why = "it slipped".to_owned();
+                    Ending::Failed { why }
+                } else {
+                    Ending::Succeeded
+                };
+                let event = Event::Ended {
+                    ticket,
+                    ending,
+                    measured: measured(),
+                };
+                self.report(end, event);
+            }
+            Command::Cancel { ticket } => {
+                let is_other = |it: &Observation| ended_by(it) != Some(ticket);
+                self.coming.retain(is_other);
+                let event = Event::Ended {
+                    ticket,
+                    ending: Ending::Cancelled,
+                    measured: measured(),
+                };
+                self.report(now.clone(), event);
+            }
+        }
+        if self.one_in(20) {
+            let (said, why) = ("mumble".to_owned(), "no words".to_owned());
+            self.report(now.clone(), Event::Unintelligible { said, why });
+        }
+        if self.one_in(20) {
+            let ticket = Ticket(1_000_000);
+            let measured = measured();
+            self.report(now + Rational::from(9), Event::Started { ticket, measured });
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let times = self.coming.iter().map(|it| it.time.clone());
+        let next = times.chain([until.clone()]).min().unwrap_or_default();
+        self.now = next.max(self.now.clone());
+        let now = self.now.clone();
+        let observations = self.coming.extract_if(.., |it| it.time <= now);
+        Ok(Passage {
+            observations: observations.collect(),
+            now: self.now.clone(),
+        })
+    }
+}
+
+/// The start that an observation says has ended.
+fn ended_by(observation: &Observation) -> Option<Ticket> {
+    match observation.event {
+        Event::Ended { ticket, .. } => Some(ticket),
+        _ => None,
+    }
+}
+
+/// The starts that have ended in that time.
+pub(crate) fn ended(passage: &Passage) -> Vec<Ticket> {
+    passage.observations.iter().filter_map(ended_by).collect()
+}

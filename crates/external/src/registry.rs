@@ -1,0 +1,329 @@
+//! The planners that are known by name.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use super::command::{Command, CommandError, find_program};
+
+/// A planner that is known by name: how to call it, and what it says.
+#[derive(Debug)]
+pub struct Registered {
+    /// The name to ask for.
+    pub name: &'static str,
+    /// What it is, in a sentence.
+    pub summary: &'static str,
+    /// The variable of the environment that says where the program is.
+    pub variable: &'static str,
+    /// What the program is called in `PATH`.
+    pub programs: &'static [&'static str],
+    /// Its arguments, with the placeholders of [`Command`].
+    pub arguments: &'static [&'static str],
+    /// Where to get it.
+    pub how_to_get: &'static str,
+    /// What it says.
+    pub habits: Habits,
+}
+
+/// Words, in lower case, by which a planner says how it ended without a plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Habits {
+    /// There is no plan. This is the planner's claim; nobody checks it.
+    pub unsolvable: &'static [&'static str],
+    /// It has given up, or used up a limit of its own.
+    pub gave_up: &'static [&'static str],
+    /// The problem is beyond it.
+    pub unsupported: &'static [&'static str],
+    /// It needs something that is not installed.
+    pub missing: &'static [&'static str],
+}
+
+/// The planners that are known by name, in the order in which documents list them.
+pub const REGISTRY: &[Registered] = &[
+    Registered {
+        name: "popf",
+        summary: "POPF: forward chaining, partial order, linear continuous change \
+                  (Coles, Coles, Fox and Long, ICAPS 2010)",
+        variable: "ELBOWROOM_POPF",
+        programs: &["popf", "popf3-clp", "popf2"],
+        arguments: &["{domain}", "{problem}"],
+        how_to_get: "build it from its source (ROSPlan and PlanSys2 bring one), and put `popf` \
+                     into PATH or its path into ELBOWROOM_POPF",
+        habits: COLIN_FAMILY,
+    },
+    Registered {
+        name: "optic",
+        summary: "OPTIC: POPF with preferences and time-dependent costs; goes on to better plans \
+                  (Benton, Coles and Coles, ICAPS 2012)",
+        variable: "ELBOWROOM_OPTIC",
+        programs: &["optic-clp", "optic", "optic-cplex"],
+        arguments: &["{domain}", "{problem}"],
+        how_to_get: "build it from its source, and put `optic-clp` into PATH or its path into \
+                     ELBOWROOM_OPTIC",
+        habits: COLIN_FAMILY,
+    },
+    Registered {
+        name: "tfd",
+        summary: "Temporal Fast Downward: forward search with context-enhanced additive heuristic \
+                  (Eyerich, Mattmüller and Röger, ICAPS 2009)",
+        variable: "ELBOWROOM_TFD",
+        programs: &["tfd"],
+        arguments: &["{domain}", "{problem}", "{plan}"],
+        how_to_get: "build it from its source, and put the path of its script `plan` into \
+                     ELBOWROOM_TFD",
+        habits: Habits {
+            unsolvable: &[
+                "completely explored state space -- no solution",
+                "initial state is a dead end",
+            ],
+            gave_up: &["search stopped without finding a solution"],
+            unsupported: &["not supported", "notimplementederror"],
+            missing: &[],
+        },
+    },
+    Registered {
+        name: "lpg-td",
+        summary: "LPG-td: local search on temporal action graphs; goes on to better plans \
+                  (Gerevini, Saetti and Serina, JAIR 2006)",
+        variable: "ELBOWROOM_LPG",
+        programs: &["lpg-td", "lpg"],
+        // Its plan files are separated by a small time, what it prints is not. The seed makes it
+        // do the same each time.
+        arguments: &[
+            "-o",
+            "{domain}",
+            "-f",
+            "{problem}",
+            "-out",
+            "{plan}",
+            "-n",
+            "1000",
+            "-seed",
+            "2004",
+            "-cputime",
+            "{time}",
+        ],
+        how_to_get: "`pip install up-lpg` brings the program `up_lpg/lpg`; put its path into \
+                     ELBOWROOM_LPG",
+        habits: Habits {
+            unsolvable: &["the problem is unsolvable", "no plan will solve it"],
+            gave_up: &["search limit exceeded", "max time exceeded", "no solution"],
+            unsupported: &["syntax error", "not supported", "not yet handled"],
+            missing: &[],
+        },
+    },
+];
+
+/// What POPF and its relatives say.
+const COLIN_FAMILY: Habits = Habits {
+    unsolvable: &[
+        ";; problem unsolvable!",
+        "cannot be found either in the initial state",
+    ],
+    gave_up: &["; problem unsolvable by ehc, and best-first search has been disabled"],
+    unsupported: &[
+        "this planner does not support",
+        "are not supported",
+        "is not supported",
+        "cannot handle",
+    ],
+    missing: &[],
+};
+
+/// What our own shim for unified-planning says.
+const UNIFIED_PLANNING: Habits = Habits {
+    unsolvable: &["elbowroom: unsolvable"],
+    gave_up: &["elbowroom: gave up"],
+    unsupported: &["elbowroom: unsupported", "not supported"],
+    missing: &["elbowroom: missing"],
+};
+
+/// What programs say that we know nothing of.
+const ANYONE: Habits = Habits {
+    unsolvable: &[
+        "problem unsolvable",
+        "problem is unsolvable",
+        "no plan will solve it",
+        "proven unsolvable",
+        "unsolvable_proven",
+        "no plan exists",
+        "no solution exists",
+        "completely explored state space -- no solution",
+    ],
+    gave_up: &[
+        "search limit exceeded",
+        "no plan found",
+        "no solution found",
+    ],
+    unsupported: &["not supported", "unsupported"],
+    missing: &[],
+};
+
+/// A program to plan with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Planner {
+    /// What to call it in messages.
+    pub name: String,
+    /// What to start.
+    pub kind: Kind,
+    /// What to do if it is not there.
+    pub how_to_get: String,
+    /// What it says.
+    pub habits: Habits,
+}
+
+/// What to start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A program.
+    Program(Command),
+    /// An engine of unified-planning, by its name there.
+    UnifiedPlanning {
+        /// The engine.
+        engine: String,
+        /// The interpreter of Python.
+        python: PathBuf,
+    },
+}
+
+/// A planner that nobody knows.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlannerError {
+    /// The name is not in the registry.
+    #[error(
+        "unknown planner `{0}`: there are {known}, up:ENGINE, and command lines such as \
+         \"myplanner {{domain}} {{problem}}\"",
+        known = names()
+    )]
+    Unknown(String),
+    /// A command line that cannot be used.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+}
+
+/// The engines that have a package `up-ENGINE` of their own. For another name nothing may be
+/// installed that merely happens to be called so.
+const ENGINES: [&str; 8] = [
+    "aries",
+    "tamer",
+    "lpg",
+    "enhsp",
+    "fast-downward",
+    "pyperplan",
+    "symk",
+    "fmap",
+];
+
+impl Planner {
+    /// The planner of that name; the engine of unified-planning, for `up:ENGINE`; or the program
+    /// of a command line that has placeholders or spaces in it.
+    ///
+    /// # Errors
+    /// When the name is unknown, or the command line does not say where the files go.
+    pub fn named(text: &str) -> Result<Self, PlannerError> {
+        let text = text.trim();
+        if let Some(engine) = text.strip_prefix("up:") {
+            return Ok(Self::unified_planning(engine.trim()));
+        }
+        if let Some(known) = REGISTRY.iter().find(|p| p.name.eq_ignore_ascii_case(text)) {
+            return Ok(known.planner());
+        }
+        if !text.contains(char::is_whitespace) && !text.contains('{') && !text.is_empty() {
+            return Err(PlannerError::Unknown(text.to_owned()));
+        }
+        let command = Command::parse(text)?;
+        Ok(Self {
+            name: command.program.display().to_string(),
+            kind: Kind::Program(command),
+            how_to_get: "check the path, or put its folder into PATH".to_owned(),
+            habits: ANYONE,
+        })
+    }
+
+    fn unified_planning(engine: &str) -> Self {
+        let python = env::var_os("ELBOWROOM_PYTHON").map_or("python3".into(), PathBuf::from);
+        Self {
+            name: format!("up:{engine}"),
+            kind: Kind::UnifiedPlanning {
+                engine: engine.to_owned(),
+                python,
+            },
+            how_to_get: if ENGINES.contains(&engine) {
+                format!(
+                    "install Python and `pip install unified-planning up-{engine}`; where that is \
+                     not the `python3` in PATH, put the path of its interpreter into \
+                     ELBOWROOM_PYTHON"
+                )
+            } else {
+                format!(
+                    "check the name: engines of unified-planning are {}; one that you wrote \
+                     yourself has to be installed where the `python3` in PATH, or the interpreter \
+                     that ELBOWROOM_PYTHON names, finds it",
+                    ENGINES.join(", ")
+                )
+            },
+            habits: UNIFIED_PLANNING,
+        }
+    }
+}
+
+impl Registered {
+    /// The planner, with its program found as far as possible.
+    pub fn planner(&self) -> Planner {
+        let named = env::var_os(self.variable).map(PathBuf::from);
+        let program = named.unwrap_or_else(|| {
+            let found = self
+                .programs
+                .iter()
+                .find_map(|p| find_program(Path::new(p)));
+            found.unwrap_or_else(|| self.programs[0].into())
+        });
+        Planner {
+            name: self.name.to_owned(),
+            kind: Kind::Program(Command {
+                program,
+                arguments: self.arguments.iter().map(|&a| a.to_owned()).collect(),
+            }),
+            how_to_get: self.how_to_get.to_owned(),
+            habits: self.habits,
+        }
+    }
+}
+
+fn names() -> String {
+    let names: Vec<_> = REGISTRY.iter().map(|planner| planner.name).collect();
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_planner_is_a_name_an_engine_or_a_command_line() {
+        assert_eq!(Planner::named("LPG-td").unwrap().name, "lpg-td");
+        assert_eq!(Planner::named("up:aries").unwrap().name, "up:aries");
+        let own = Planner::named("./mine -x {domain} {problem}").unwrap();
+        assert_eq!(own.name, "./mine");
+    }
+
+    #[test]
+    fn an_unknown_name_lists_the_known_ones() {
+        let error = Planner::named("poopf").unwrap_err().to_string();
+        assert!(
+            error.contains("popf, optic, tfd, lpg-td, up:ENGINE"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn every_command_of_the_registry_says_where_the_files_go() {
+        for planner in REGISTRY {
+            let line = format!("program {}", planner.arguments.join(" "));
+            assert!(Command::parse(&line).is_ok(), "{}", planner.name);
+            let phrases = planner.habits;
+            for phrase in [phrases.unsolvable, phrases.gave_up, phrases.unsupported].concat() {
+                assert_eq!(phrase, phrase.to_lowercase());
+            }
+        }
+    }
+}

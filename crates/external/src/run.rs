@@ -1,0 +1,352 @@
+//! From a request to an outcome.
+
+use std::io;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use super::clock::Clock;
+use super::judge::{Judge, Judgement, Repair};
+use super::log::Sayings;
+use super::mailbox::Mail;
+use super::outcome::{Event, Found, Outcome, Report, Statistics};
+use super::reader::{Reader, Shared};
+use super::registry::Planner;
+use super::request::Request;
+use super::start::{not_started, prepare};
+use super::supervise::{Ended, Ending, Limits, supervise};
+use super::workspace::Workspace;
+
+/// How to run a planner.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// How long it may run.
+    pub time_limit: Option<Duration>,
+    /// How much processor time all its processes may use together. Holds as it stands on a busy
+    /// machine too; Linux only.
+    pub work_limit: Option<Duration>,
+    /// How much memory all its processes may use together, in bytes.
+    pub memory_limit: Option<u64>,
+    /// Where its folder is made; by default where the system keeps temporary files.
+    pub scratch: Option<PathBuf>,
+}
+
+impl Default for Settings {
+    /// No limits.
+    fn default() -> Self {
+        Self {
+            time_limit: None,
+            work_limit: None,
+            memory_limit: None,
+            scratch: None,
+        }
+    }
+}
+
+/// How often the observer is asked whether to go on.
+const HEARTBEAT: Duration = Duration::from_millis(20);
+/// How long after the time limit plans that wait to be judged still count.
+const GRACE: Duration = Duration::from_millis(50);
+/// Asks a planner for a plan. `observe` hears of each plan, and otherwise about fifty times a
+/// second; it can end the run, which then answers with the last plan found. `repair` gets plans
+/// that the judge refuses.
+///
+/// Every plan in the report, and in the events before, has been accepted by the judge
+/// ([`elbowroom_model::validate_from`]). When this returns, no process and no file is left.
+pub fn plan(
+    planner: &Planner,
+    request: &mut Request<'_>,
+    settings: &Settings,
+    repair: &mut Repair<'_>,
+    observe: &mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
+) -> Report {
+    let prepared = if cfg!(unix) {
+        prepare(planner, request, settings)
+    } else {
+        // Before anything asks for a clock or a folder: some systems have neither.
+        let reason = format!(
+            "{} is another program, and this system runs none",
+            planner.name
+        );
+        Err(not_started(reason, "plan with the embedded planner"))
+    };
+    match prepared {
+        Ok((question, workspace, command)) => {
+            let judge = Judge {
+                request,
+                question,
+                repair,
+            };
+            let run = Run::new(judge, settings, observe);
+            run.run(planner, workspace, command)
+        }
+        Err(outcome) => Report {
+            outcome,
+            statistics: Statistics::default(),
+        },
+    }
+}
+
+/// A run under way, on the side of the judge.
+struct Run<'a, 'r> {
+    judge: Judge<'a, 'r>,
+    settings: &'a Settings,
+    observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
+    clock: Clock,
+    best: Option<Found>,
+    /// The last plan refused: why, and its text.
+    refused: Option<(String, String)>,
+    /// Why the last text that looked like a plan was none.
+    unreadable: Option<String>,
+    statistics: Statistics,
+    is_stopped: bool,
+}
+
+/// Sets its flag when it goes.
+struct StopAtEnd<'s>(&'s AtomicBool);
+
+impl Drop for StopAtEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+}
+
+impl<'a, 'r> Run<'a, 'r> {
+    fn new(
+        judge: Judge<'a, 'r>,
+        settings: &'a Settings,
+        observe: &'a mut dyn FnMut(&Event<'_>) -> ControlFlow<()>,
+    ) -> Self {
+        Self {
+            judge,
+            settings,
+            observe,
+            clock: Clock::start(),
+            best: None,
+            refused: None,
+            unreadable: None,
+            statistics: Statistics::default(),
+            is_stopped: false,
+        }
+    }
+
+    /// One thread keeps the time and reads, this one judges: a long judgement does not keep the
+    /// planner alive beyond its time.
+    fn run(mut self, planner: &Planner, workspace: Workspace, command: process::Command) -> Report {
+        let shared = Shared::default();
+        let limits = Limits {
+            time: self.settings.time_limit,
+            work: self.settings.work_limit,
+            memory: self.settings.memory_limit,
+        };
+        let mut reader = Reader::new(planner, workspace, &shared);
+        let ended = thread::scope(|scope| {
+            // Should the judge or the observer panic, the planner goes too.
+            let _stop = StopAtEnd(&shared.stop);
+            let supervisor = scope.spawn(|| {
+                let ended = supervise(command, limits, &shared.stop, &mut reader);
+                reader.end(ended.as_ref().ok().map(|ended| ended.ending));
+                ended
+            });
+            self.judge_mail(&shared);
+            supervisor.join()
+        });
+        let Ok(ended) = ended else {
+            // A bug of ours; the process is gone all the same.
+            std::panic::resume_unwind(Box::new("the supervisor of a planner panicked"));
+        };
+        let ended = match ended {
+            Ok(ended) => ended,
+            Err(error) => return self.not_started(planner, &error),
+        };
+        self.statistics.printed = reader.printed_bytes();
+        let sayings = reader.sayings();
+        let excerpt = reader.excerpt();
+        // The folder goes before anyone hears of the end.
+        drop(reader);
+        self.report(planner, ended, sayings, excerpt)
+    }
+
+    fn judge_mail(&mut self, shared: &Shared) {
+        loop {
+            match shared.mailbox.take(HEARTBEAT) {
+                Mail::Text(text) if self.is_over() && self.best.is_some() => drop(text),
+                Mail::Text(text) => self.judge(&text),
+                Mail::Nothing => {
+                    let running = Event::Running {
+                        elapsed: self.clock.elapsed(),
+                        memory: shared.memory.load(Ordering::Relaxed),
+                    };
+                    self.tell(&running);
+                }
+                Mail::Closed => return,
+            }
+            if self.is_stopped {
+                shared.stop.store(true, Ordering::SeqCst);
+            }
+        }
+    }
+
+    /// Whether it is too late for better plans.
+    fn is_over(&self) -> bool {
+        let limit = self.settings.time_limit;
+        self.is_stopped || limit.is_some_and(|limit| self.clock.elapsed() > limit + GRACE)
+    }
+
+    fn tell(&mut self, event: &Event<'_>) {
+        if !self.is_stopped {
+            self.is_stopped = (self.observe)(event).is_break();
+        }
+    }
+
+    fn judge(&mut self, text: &str) {
+        let judgement = self.judge.judge(text);
+        let elapsed = self.clock.elapsed();
+        match judgement {
+            Judgement::Accepted(found) => {
+                // The same plan in a file and on the screen is one plan.
+                if self
+                    .best
+                    .as_ref()
+                    .is_some_and(|best| best.plan == found.plan)
+                {
+                    return;
+                }
+                self.statistics.plans += 1;
+                self.statistics.first_plan.get_or_insert(elapsed);
+                let found = &*self.best.insert(found);
+                if !self.is_stopped {
+                    let event = Event::Plan { found, elapsed };
+                    self.is_stopped = (self.observe)(&event).is_break();
+                }
+            }
+            Judgement::Refused(reason) => {
+                self.statistics.refused += 1;
+                let event = Event::Refused {
+                    reason: &reason,
+                    elapsed,
+                };
+                self.tell(&event);
+                self.refused = Some((reason, text.to_owned()));
+            }
+            Judgement::Unreadable(reason) => {
+                self.statistics.refused += 1;
+                let event = Event::Refused {
+                    reason: &reason,
+                    elapsed,
+                };
+                self.tell(&event);
+                self.unreadable = Some(reason);
+            }
+        }
+    }
+
+    fn not_started(self, planner: &Planner, error: &io::Error) -> Report {
+        let reason = format!("{}: {error}", planner.name);
+        Report {
+            outcome: not_started(reason, &planner.how_to_get),
+            statistics: self.statistics,
+        }
+    }
+
+    fn report(
+        mut self,
+        planner: &Planner,
+        ended: Ended,
+        sayings: Sayings,
+        excerpt: String,
+    ) -> Report {
+        self.statistics.elapsed = self.clock.elapsed();
+        self.statistics.peak_memory = ended.peak_memory;
+        self.statistics.work = ended.work;
+        self.statistics.ending = Some(ended.ending);
+        let outcome = match (self.best.take(), &sayings.missing) {
+            (Some(found), _) => Outcome::Plan(found),
+            (None, Some(reason)) => not_started(reason.clone(), &planner.how_to_get),
+            (None, None) => self.without_plan(ended, sayings, excerpt),
+        };
+        Report {
+            outcome,
+            statistics: self.statistics,
+        }
+    }
+
+    /// What it means that there is no valid plan.
+    fn without_plan(&mut self, ended: Ended, sayings: Sayings, excerpt: String) -> Outcome {
+        let peak = ended.peak_memory;
+        if ended.ending == Ending::MemoryLimit {
+            return Outcome::OutOfMemory { peak };
+        }
+        if let Some((reason, plan)) = self.refused.take() {
+            return Outcome::Refused { reason, plan };
+        }
+        match ended.ending {
+            Ending::MemoryLimit => Outcome::OutOfMemory { peak },
+            // It may have said so and then have hung.
+            Ending::TimeLimit | Ending::Stopped => match sayings.unsolvable {
+                Some(says) => Outcome::Unsolvable { says },
+                None if ended.ending == Ending::Stopped => Outcome::Stopped,
+                None => Outcome::NoneInTime,
+            },
+            Ending::Signalled(_) | Ending::Exited(_) => {
+                self.ended_by_itself(ended.ending, peak, sayings, excerpt)
+            }
+        }
+    }
+
+    fn ended_by_itself(
+        &mut self,
+        ending: Ending,
+        peak: u64,
+        sayings: Sayings,
+        excerpt: String,
+    ) -> Outcome {
+        let signal = crash_signal(ending);
+        if sayings.out_of_memory.is_some() && ending != Ending::Exited(0) {
+            return Outcome::OutOfMemory { peak };
+        }
+        if let Some(says) = sayings.unsupported {
+            return Outcome::Unsupported { says };
+        }
+        if let Some(signal) = signal {
+            return Outcome::Crashed { signal, excerpt };
+        }
+        // Planners print no actions, in many ways, where none are needed.
+        if self.unreadable.is_none()
+            && let Some(found) = self.judge.judge_nothing()
+        {
+            self.statistics.plans = 1;
+            self.statistics.first_plan = Some(self.statistics.elapsed);
+            return Outcome::Plan(found);
+        }
+        if let Some(says) = sayings.unsolvable {
+            return Outcome::Unsolvable { says };
+        }
+        if let Some(says) = sayings.gave_up {
+            return Outcome::GaveUp { says };
+        }
+        let code = match ending {
+            Ending::Exited(code) => code,
+            _ => 0,
+        };
+        let excerpt = match self.unreadable.take() {
+            Some(reason) => format!("{reason}\n{excerpt}"),
+            None => excerpt,
+        };
+        Outcome::NotUnderstood { code, excerpt }
+    }
+}
+
+/// The signal that ended it; also as shells report it, by an exit code of 128 and more.
+fn crash_signal(ending: Ending) -> Option<i32> {
+    /// Those by which the system ends a faulty program.
+    const FAULTS: [i32; 6] = [4, 6, 7, 8, 9, 11];
+    match ending {
+        Ending::Signalled(signal) => Some(signal),
+        Ending::Exited(code) => FAULTS.contains(&(code - 128)).then_some(code - 128),
+        _ => None,
+    }
+}

@@ -1,0 +1,107 @@
+//! From a request to a process that is ready to be started.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::process;
+use std::time::Duration;
+
+use super::command::{Filling, find_program};
+use super::outcome::Outcome;
+use super::registry::{Kind, Planner};
+use super::request::{Question, Request};
+use super::run::Settings;
+use super::workspace::Workspace;
+
+/// The shim that speaks with unified-planning.
+const UP_SHIM: &str = include_str!("up_shim.py");
+/// Given to planners that want a limit of their own where there is none: a day.
+const NO_TIME_LIMIT: u64 = 86_400;
+/// The same for memory: a million MB.
+const NO_MEMORY_LIMIT: u64 = 1_000_000;
+
+/// Everything that is needed to start the planner, or why it cannot be started.
+pub(super) fn prepare(
+    planner: &Planner,
+    request: &Request<'_>,
+    settings: &Settings,
+) -> Result<(Question, Workspace, process::Command), Outcome> {
+    let question = Question::of(request).map_err(|reason| {
+        let help =
+            "plan from a moment at which that action has ended, or with the embedded planner";
+        not_started(reason, help)
+    })?;
+    let program = match &planner.kind {
+        Kind::Program(command) => &command.program,
+        Kind::UnifiedPlanning { python, .. } => python,
+    };
+    let found = find_program(program).ok_or_else(|| {
+        let what = if program.is_file() {
+            "you may not execute"
+        } else {
+            "there is no program"
+        };
+        not_started(format!("{what} {}", program.display()), &planner.how_to_get)
+    })?;
+    let domain = request.domain.text();
+    let scratch = settings.scratch.as_deref();
+    let workspace = Workspace::new(scratch, domain, &question.text).map_err(|error| {
+        let help = "make room there, or set TMPDIR to a folder that you may write to";
+        not_started(format!("no temporary folder can be made: {error}"), help)
+    })?;
+    let command = command(planner, &found, &workspace, settings).map_err(|error| {
+        not_started(
+            format!("its folder cannot be filled: {error}"),
+            "make room on the disk",
+        )
+    })?;
+    Ok((question, workspace, command))
+}
+
+pub(super) fn not_started(reason: String, help: &str) -> Outcome {
+    Outcome::NotStarted {
+        reason,
+        help: help.to_owned(),
+    }
+}
+
+/// The process to be.
+fn command(
+    planner: &Planner,
+    program: &Path,
+    workspace: &Workspace,
+    settings: &Settings,
+) -> io::Result<process::Command> {
+    let seconds = |limit: Duration| limit.as_secs() + u64::from(limit.subsec_nanos() > 0);
+    let filling = Filling {
+        domain: workspace.domain(),
+        problem: workspace.problem(),
+        plan: workspace.plan(),
+        time: settings.time_limit.map_or(NO_TIME_LIMIT, seconds),
+        memory: settings
+            .memory_limit
+            .map_or(NO_MEMORY_LIMIT, |bytes| bytes >> 20),
+    };
+    let mut command = process::Command::new(program);
+    match &planner.kind {
+        Kind::Program(own) => {
+            command.args(own.filled(&filling));
+        }
+        Kind::UnifiedPlanning { engine, .. } => {
+            let shim = workspace.path().join("up_shim.py");
+            fs::write(&shim, UP_SHIM)?;
+            command.arg(shim).arg(engine);
+            command.args([filling.domain, filling.problem]);
+            command.arg(filling.time.to_string());
+        }
+    }
+    command
+        .current_dir(workspace.path())
+        // What it writes elsewhere for a while goes with the folder.
+        .env("TMPDIR", workspace.path())
+        // Points, not commas, in numbers.
+        .env("LC_ALL", "C")
+        .env("PYTHONUNBUFFERED", "1")
+        .env("PYTHONDONTWRITEBYTECODE", "1");
+    Ok(command)
+}

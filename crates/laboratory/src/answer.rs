@@ -1,0 +1,239 @@
+//! How do executors compare? One request and one answer, whatever kind of experiment it is.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
+
+use elbowroom::answers::{Event, TrialsProgress, Watcher};
+use elbowroom_report::plot::IntervalPlot;
+use elbowroom_report::table::Table;
+use elbowroom_text::{Diagnostics, Source};
+use serde::{Deserialize, Serialize};
+
+use crate::compare::{self, Experiment, ExperimentError, Part, Results};
+use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
+
+/// An experiment of either kind.
+#[derive(Clone, Debug)]
+pub enum AnyExperiment {
+    /// On a clock: `docs/formats/experiment.md`.
+    Timed(Box<Experiment>),
+    /// In worlds without time: `docs/perturbed-worlds.md`.
+    Untimed(Box<PerturbedExperiment>),
+}
+
+/// Asks for the trials of an experiment, or for a part of them.
+#[derive(Clone, Copy, Debug)]
+pub struct CompareRequest<'a> {
+    /// The experiment.
+    pub experiment: &'a AnyExperiment,
+    /// Which trials, and on how many threads.
+    pub part: Part,
+}
+
+/// How often each executor succeeded, and what it took: `docs/formats/results-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum CompareAnswer {
+    /// On a clock.
+    Timed(Results),
+    /// In worlds without time.
+    Untimed(PerturbedResults),
+}
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompareError {
+    /// The experiment's file, or one that it names, is wrong.
+    #[error("{0}")]
+    Text(Diagnostics),
+    /// Something else is: what, and what to do.
+    #[error("{0}")]
+    Other(String),
+    /// The results are of another experiment.
+    #[error(
+        "these are results of another experiment; give those of its parts, made from the same files"
+    )]
+    OfAnother,
+}
+
+impl AnyExperiment {
+    /// Reads an experiment. `file` gives the text of a file that it names.
+    ///
+    /// # Errors
+    /// The first mistake, with its place.
+    pub fn read(
+        source: &Source,
+        file: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, CompareError> {
+        if PerturbedExperiment::is_one(source.text()) {
+            let experiment = PerturbedExperiment::read(source, file)?;
+            Ok(Self::Untimed(Box::new(experiment)))
+        } else {
+            let experiment = Experiment::read(source, file)?;
+            Ok(Self::Timed(Box::new(experiment)))
+        }
+    }
+
+    /// How many trials of each problem, case or column it asks for.
+    pub fn trials(&self) -> u64 {
+        match self {
+            Self::Timed(experiment) => experiment.trials,
+            Self::Untimed(experiment) => experiment.trials,
+        }
+    }
+
+    /// How many trials a part of it makes, all together.
+    fn count(&self, part: Part) -> u64 {
+        match self {
+            Self::Timed(experiment) => part.count(experiment),
+            Self::Untimed(experiment) => {
+                let rows =
+                    experiment.cases.len() * experiment.worlds.len() * experiment.executors.len();
+                part.numbers().count() as u64 * rows as u64
+            }
+        }
+    }
+}
+
+/// Makes the trials. When the watcher wants no more, what has been made until then is the answer
+/// ([`CompareAnswer::is_interrupted`]).
+///
+/// # Errors
+/// When a problem cannot be read, has no plan to begin with, or is of a kind that there is no world
+/// for.
+pub fn compare(
+    request: CompareRequest<'_>,
+    watcher: &mut (dyn Watcher + Send),
+) -> Result<CompareAnswer, CompareError> {
+    let CompareRequest { experiment, part } = request;
+    let of = experiment.count(part);
+    let shared = Mutex::new((watcher, 0));
+    let observe = |done: u64| {
+        let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let (watcher, told) = &mut *shared;
+        if done > *told {
+            *told = done;
+            watcher.notice(&Event::Trials(TrialsProgress { done, of }));
+        }
+        matches!(watcher.flow(), ControlFlow::Continue(()))
+    };
+    Ok(match experiment {
+        AnyExperiment::Timed(experiment) => {
+            CompareAnswer::Timed(compare::run(experiment, part, &observe)?)
+        }
+        AnyExperiment::Untimed(experiment) => {
+            CompareAnswer::Untimed(perturbed::run(experiment, part, &observe)?)
+        }
+    })
+}
+
+impl CompareAnswer {
+    /// Reads results as JSON.
+    ///
+    /// # Errors
+    /// When they are none, or of another experiment.
+    pub fn read(text: &str, experiment: &AnyExperiment) -> Result<Self, CompareError> {
+        let (answer, is_of_it) = match experiment {
+            AnyExperiment::Timed(experiment) => {
+                let results = Results::read(text).map_err(|error| CompareError::other(&error))?;
+                let is_of_it = results.are_of(experiment);
+                (Self::Timed(results), is_of_it)
+            }
+            AnyExperiment::Untimed(experiment) => {
+                let results = PerturbedResults::read(text)?;
+                let is_of_it = results.are_of(experiment);
+                (Self::Untimed(results), is_of_it)
+            }
+        };
+        if is_of_it {
+            Ok(answer)
+        } else {
+            Err(CompareError::OfAnother)
+        }
+    }
+
+    /// Puts parts of one experiment together.
+    ///
+    /// # Errors
+    /// When there are none, they are parts of different experiments, or the same part comes twice.
+    pub fn merged(parts: &[Self]) -> Result<Self, CompareError> {
+        let timed = parts.iter().map(|part| match part {
+            Self::Timed(results) => Some(results.clone()),
+            Self::Untimed(_) => None,
+        });
+        if let Some(timed) = timed.collect::<Option<Vec<Results>>>() {
+            let merged = Results::merged(&timed).map_err(|error| CompareError::other(&error))?;
+            return Ok(Self::Timed(merged));
+        }
+        let untimed = parts.iter().map(|part| match part {
+            Self::Timed(_) => None,
+            Self::Untimed(results) => Some(results.clone()),
+        });
+        let untimed: Option<Vec<PerturbedResults>> = untimed.collect();
+        let untimed = untimed.ok_or(CompareError::OfAnother)?;
+        Ok(Self::Untimed(PerturbedResults::merged(&untimed)?))
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> serde_json::Value {
+        match self {
+            Self::Timed(results) => results.json(),
+            Self::Untimed(results) => results.json(),
+        }
+    }
+
+    /// Whether somebody ended it before all trials were made.
+    pub fn is_interrupted(&self) -> bool {
+        match self {
+            Self::Timed(results) => results.is_interrupted,
+            Self::Untimed(results) => results.is_interrupted,
+        }
+    }
+
+    /// The table.
+    ///
+    /// # Errors
+    /// When the results are of another kind of experiment.
+    pub fn table(&self, experiment: &AnyExperiment) -> Result<Table, CompareError> {
+        match (self, experiment) {
+            (Self::Timed(results), AnyExperiment::Timed(experiment)) => {
+                Ok(results.table(experiment))
+            }
+            (Self::Untimed(results), AnyExperiment::Untimed(_)) => Ok(perturbed::table(results)),
+            _ => Err(CompareError::OfAnother),
+        }
+    }
+
+    /// The plots, by name; those of experiments on a clock have none.
+    pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
+        match self {
+            Self::Timed(_) => Vec::new(),
+            Self::Untimed(results) => perturbed::plots(results),
+        }
+    }
+}
+
+impl CompareError {
+    fn other(error: &compare::ResultsError) -> Self {
+        Self::Other(error.to_string())
+    }
+}
+
+impl From<ExperimentError> for CompareError {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Text(diagnostics) => Self::Text(diagnostics),
+            ExperimentError::Other(message) => Self::Other(message),
+        }
+    }
+}
+
+impl From<PerturbedError> for CompareError {
+    fn from(error: PerturbedError) -> Self {
+        match error {
+            PerturbedError::Text(diagnostics) => Self::Text(diagnostics),
+            PerturbedError::Other(message) => Self::Other(message),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Plans that are made knowing what will happen: the most that any executor could reach.
+//!
+//! The problem is rewritten so that each action takes as long, and changes fluents by as much, as
+//! the world has it do the first time. The planner then knows the future. It knows it exactly
+//! unless a plan does the same action twice; a world with failures it takes for one without.
+
+use elbowroom_execution::{PlanAnswer, Planner};
+use elbowroom_model::problem::{
+    Body, Change, Expression, ObjectId, Problem, Schema, SchemaId, Term,
+};
+use elbowroom_model::{Situation, Task};
+use elbowroom_sim::draw::keyed;
+use elbowroom_sim::{Purpose, WorldModel};
+
+use elbowroom::execute::rewrite::{add_function_of, set_durations};
+
+/// What this is, in one sentence.
+pub(super) const SUMMARY: &str = "The share of trials in which the planner, with the executors' \
+    limits, finds a plan when everything is known in advance, or one of the executors gets there.";
+
+/// Whether a plan reaches the goal when the world of that seed is known in advance.
+pub(super) fn can_reach(
+    task: &Task,
+    world: &WorldModel,
+    seed: u64,
+    planner: &mut dyn Planner,
+) -> bool {
+    let known =
+        Task::new(with_foreknowledge(task, world, seed)).with_epsilon(task.epsilon().clone());
+    let situation = Situation::initial(&known);
+    matches!(planner.plan(&known, &situation).answer, PlanAnswer::Plan(_))
+}
+
+/// The problem with the durations and amounts of the world of that seed.
+fn with_foreknowledge(task: &Task, world: &WorldModel, seed: u64) -> Problem {
+    let mut problem = task.problem().clone();
+    for index in 0..problem.schemas.len() {
+        let schema = SchemaId::from(index);
+        set_durations(task, schema, &mut problem, &|name, planned| {
+            let mut rng = keyed(seed, name, 0, Purpose::Duration);
+            world.duration(name, planned, &mut rng)
+        });
+        know_amounts(task, world, seed, schema, &mut problem);
+    }
+    problem
+}
+
+fn know_amounts(
+    task: &Task,
+    world: &WorldModel,
+    seed: u64,
+    schema: SchemaId,
+    problem: &mut Problem,
+) {
+    for place in 0..2_u64 {
+        let count = effects(&mut problem.schemas[schema.index()], place).map_or(0, |e| e.len());
+        for index in 0..count {
+            let effects = effects(&mut problem.schemas[schema.index()], place);
+            let Some(Change::Update {
+                fluent,
+                value: Expression::Constant(planned),
+                ..
+            }) = effects
+                .and_then(|effects| effects.get(index))
+                .map(|it| &it.change)
+            else {
+                continue;
+            };
+            let (fluent, planned) = (fluent.clone(), planned.clone());
+            let function = problem.functions[fluent.function.index()].name.clone();
+            let value = |name: &str, arguments: &[ObjectId]| {
+                let objects: Option<Vec<ObjectId>> = fluent
+                    .arguments
+                    .iter()
+                    .map(|term| match term {
+                        Term::Object(object) => Some(*object),
+                        Term::Variable(variable) => arguments.get(*variable).copied(),
+                    })
+                    .collect();
+                let fluent_name = task.problem().apply_name(&function, &objects?);
+                let rule = world.amount(name, &fluent_name)?;
+                let instance = format!("{name} {fluent_name} {place}");
+                let mut rng = keyed(seed, &instance, 0, Purpose::Amount);
+                Some(rule.draw(&planned, &world.resolution, &mut rng))
+            };
+            let what = format!("amount-{place}-{index}");
+            let planned = planned.clone();
+            let known = add_function_of(task, schema, &what, problem, &|name, arguments| {
+                Some(value(name, arguments).unwrap_or_else(|| planned.clone()))
+            });
+            let effects = self::effects(&mut problem.schemas[schema.index()], place);
+            if let Some(effects) = effects
+                && let Change::Update { value, .. } = &mut effects[index].change
+            {
+                *value = known;
+            }
+        }
+    }
+}
+
+fn effects(schema: &mut Schema, place: u64) -> Option<&mut Vec<elbowroom_model::problem::Effect>> {
+    match (&mut schema.body, place) {
+        (Body::Instantaneous { effects, .. }, 0) => Some(effects),
+        (Body::Durative { start_effects, .. }, 0) => Some(start_effects),
+        (Body::Durative { end_effects, .. }, 1) => Some(end_effects),
+        _ => None,
+    }
+}

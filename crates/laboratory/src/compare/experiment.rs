@@ -1,0 +1,339 @@
+//! Experiment files: `docs/formats/experiment.md`.
+
+mod file;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{Patience, RunSettings};
+use elbowroom_num::Rational;
+use elbowroom_plan::parametrize::VarySpec;
+use elbowroom_text::{Diagnostic, Diagnostics, Severity, Source, Span};
+use indexmap::IndexMap;
+use serde::Deserialize;
+use serde_json::{Value, json};
+use toml::Spanned;
+
+use file::{File, exact, text_of};
+
+/// An experiment, with the texts of all files that it names.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// What it shows.
+    pub title: String,
+    /// The domain, in PDDL.
+    pub domain: String,
+    /// The problem, in PDDL, with blanks: `{name}`.
+    pub problem: String,
+    /// What to fill in: each name takes each of its values, with each value of the others.
+    pub blanks: IndexMap<String, Vec<String>>,
+    /// More to fill in: several names together, row by row.
+    pub together: Vec<Together>,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The rows.
+    pub executors: Vec<ExecutorSpec>,
+    /// Whether to add a row for plans that are made knowing what will happen.
+    pub clairvoyant: bool,
+    /// How many trials of each problem in each column.
+    pub trials: u64,
+    /// Where the dice begin.
+    pub seed: u64,
+    /// How to run.
+    pub settings: RunSettings,
+    /// How close to its limit each end of an envelope should come.
+    pub precision: Rational,
+    /// Who makes plans.
+    pub planner: Planning,
+    /// How many states the planner looks at for one plan.
+    pub planner_states: u64,
+    /// How many of them for a better plan than the first.
+    pub improve_states: u64,
+    /// Figures to stand beside ours.
+    pub published: Vec<Published>,
+}
+
+/// Who makes plans.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Planning {
+    /// The embedded planner.
+    #[default]
+    Embedded,
+    /// Another program, as in `elbowroom plan --planner`. What it answers may depend on how fast
+    /// the machine is.
+    Another {
+        /// Its name, or its command line.
+        name: String,
+        /// How long it may go on to better plans; if nothing is said, its first plan is taken.
+        seconds: Option<Rational>,
+    },
+}
+
+/// A column of the table.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its heading.
+    pub name: String,
+    /// The world file.
+    pub world: String,
+    /// How likely everything is, for executors that go by that: a likelihood file. Without one,
+    /// everything is certain.
+    pub likelihoods: Option<String>,
+    /// What is left open.
+    pub vary: Vec<VarySpec>,
+}
+
+/// Blanks that are filled in together.
+#[derive(Clone, Debug)]
+pub struct Together {
+    /// Their names.
+    pub names: Vec<String>,
+    /// A value for each, row by row.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Figures of a paper, one for each column.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Which row they belong to.
+    pub executor: String,
+    /// Percentages.
+    pub coverage: Vec<f64>,
+    /// Mean number of new plans in successful runs; NaN where there were none.
+    #[serde(default)]
+    pub replans: Vec<f64>,
+}
+
+/// An experiment that cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExperimentError {
+    /// The file, or one that it names, is wrong.
+    #[error("{0}")]
+    Text(Diagnostics),
+    /// Something else is.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl ExperimentError {
+    pub(crate) fn other(message: impl Into<String>) -> Self {
+        Self::Other(message.into())
+    }
+}
+
+impl Experiment {
+    /// All that the results depend on, in an order that stays.
+    pub(super) fn identity(&self) -> Value {
+        // Whoever adds a member says here whether results depend on it.
+        let Self {
+            title: _,
+            published: _,
+            // That many are made as whoever makes them says.
+            trials: _,
+            domain,
+            problem,
+            blanks,
+            together,
+            columns,
+            executors,
+            clairvoyant,
+            seed,
+            settings,
+            precision,
+            planner,
+            planner_states,
+            improve_states,
+        } = self;
+        let RunSettings {
+            running,
+            planning_time,
+            most_replans,
+            patience: Patience { factor, at_least },
+            time_limit,
+        } = settings;
+        let texts = |texts: &mut dyn Iterator<Item = String>| texts.collect::<Vec<_>>();
+        let columns = columns.iter().map(|column| {
+            let Column {
+                name,
+                world,
+                likelihoods,
+                vary,
+            } = column;
+            let vary = texts(&mut vary.iter().map(ToString::to_string));
+            json!([name, world, likelihoods, vary])
+        });
+        let together = together.iter().map(|it| json!([it.names, it.rows]));
+        let planner = match planner {
+            Planning::Embedded => json!([]),
+            Planning::Another { name, seconds } => {
+                json!([name, seconds.as_ref().map(ToString::to_string)])
+            }
+        };
+        json!([
+            domain,
+            problem,
+            blanks.iter().collect::<Vec<_>>(),
+            together.collect::<Vec<_>>(),
+            columns.collect::<Vec<_>>(),
+            texts(&mut executors.iter().map(ToString::to_string)),
+            clairvoyant,
+            seed,
+            running.to_string(),
+            planning_time.to_string(),
+            most_replans,
+            [factor.to_string(), at_least.to_string()],
+            time_limit.to_string(),
+            precision.to_string(),
+            planner,
+            planner_states,
+            improve_states,
+        ])
+    }
+
+    /// Reads an experiment. `file` gives the text of a file that it names.
+    ///
+    /// # Errors
+    /// The first mistake, with its place.
+    pub fn read(
+        source: impl Into<Source>,
+        file: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ExperimentError> {
+        let source = source.into();
+        let wrong = |at: Span, message: String| {
+            let message = message.trim().replace('\n', " ");
+            let found = Diagnostic::new(Severity::Error, &source, at, message);
+            ExperimentError::Text(found.into())
+        };
+        let read: File = elbowroom_text::toml::read(&source)
+            .map_err(|found| ExperimentError::Text(found.into()))?;
+        if read.format.get_ref() != "elbowroom-experiment" || *read.version.get_ref() != 1 {
+            let message = "this program reads format = \"elbowroom-experiment\", version = 1";
+            return Err(wrong(read.format.span(), message.to_owned()));
+        }
+        read.check_size()
+            .map_err(|(at, message)| wrong(at, message))?;
+        let named = |name: &Spanned<String>| {
+            file(name.get_ref()).map_err(|error| wrong(name.span(), error))
+        };
+        let mut executors = Vec::new();
+        for name in read.executors.get_ref() {
+            let spec = name.get_ref().parse::<ExecutorSpec>();
+            executors.push(spec.map_err(|error| wrong(name.span(), error.to_string()))?);
+        }
+        let mut columns = Vec::new();
+        for column in &read.column {
+            let mut vary = Vec::new();
+            for spec in &column.vary {
+                let read = spec.get_ref().parse::<VarySpec>();
+                vary.push(read.map_err(|error| wrong(spec.span(), error.to_string()))?);
+            }
+            columns.push(Column {
+                name: column.name.clone(),
+                world: named(&column.world)?,
+                likelihoods: column.likelihoods.as_ref().map(&named).transpose()?,
+                vary,
+            });
+        }
+        let rows = rows(&executors, read.clairvoyant);
+        read.check_published(&rows)
+            .map_err(|(at, message)| wrong(at, message))?;
+        let mut together = Vec::new();
+        for group in &read.together {
+            let width = group.names.len();
+            if let Some(row) = group
+                .rows
+                .get_ref()
+                .iter()
+                .find(|row| row.get_ref().len() != width)
+            {
+                let message = format!("write {width} values, one for each name");
+                return Err(wrong(row.span(), message));
+            }
+            let rows = group.rows.get_ref().iter();
+            together.push(Together {
+                names: group.names.clone(),
+                rows: rows
+                    .map(|row| row.get_ref().iter().map(text_of).collect())
+                    .collect(),
+            });
+        }
+        let settings = read
+            .settings()
+            .map_err(|(at, message)| wrong(at, message))?;
+        let planner = read
+            .planning()
+            .map_err(|(at, message)| wrong(at, message))?;
+        let precision = match &read.precision {
+            None => Rational::ONE,
+            Some(given) => exact(*given.get_ref())
+                .filter(Rational::is_positive)
+                .ok_or_else(|| wrong(given.span(), "it must be positive".to_owned()))?,
+        };
+        Ok(Self {
+            domain: named(&read.domain)?,
+            problem: named(&read.problem)?,
+            title: read.title,
+            blanks: read
+                .blanks
+                .into_iter()
+                .map(|(name, values)| (name, values.get_ref().iter().map(text_of).collect()))
+                .collect(),
+            together,
+            columns,
+            executors,
+            clairvoyant: read.clairvoyant,
+            trials: read.trials.into_inner(),
+            seed: read.seed,
+            settings,
+            precision,
+            planner,
+            planner_states: read.planner_states.unwrap_or(20_000),
+            improve_states: read.improve_states.unwrap_or(20_000),
+            published: read
+                .published
+                .into_iter()
+                .map(Spanned::into_inner)
+                .collect(),
+        })
+    }
+
+    /// All ways to fill in the blanks; the last blank changes fastest.
+    pub fn fillings(&self) -> Vec<Vec<(String, String)>> {
+        let mut fillings = vec![Vec::new()];
+        for (name, values) in &self.blanks {
+            let longer = |filling: &Vec<(String, String)>, value: &String| {
+                let mut longer = filling.clone();
+                longer.push((name.clone(), value.clone()));
+                longer
+            };
+            fillings = fillings
+                .iter()
+                .flat_map(|filling| values.iter().map(move |value| longer(filling, value)))
+                .collect();
+        }
+        for group in &self.together {
+            let longer = |filling: &Vec<(String, String)>, row: &Vec<String>| {
+                let pairs = group.names.iter().cloned().zip(row.iter().cloned());
+                filling.iter().cloned().chain(pairs).collect::<Vec<_>>()
+            };
+            fillings = fillings
+                .iter()
+                .flat_map(|filling| group.rows.iter().map(move |row| longer(filling, row)))
+                .collect();
+        }
+        fillings
+    }
+
+    /// The names of the rows.
+    pub fn rows(&self) -> Vec<String> {
+        rows(&self.executors, self.clairvoyant)
+    }
+}
+
+fn rows(executors: &[ExecutorSpec], clairvoyant: bool) -> Vec<String> {
+    let rows = executors.iter().map(ToString::to_string);
+    let last = clairvoyant.then(|| CLAIRVOYANT.to_owned());
+    rows.chain(last).collect()
+}
+
+/// The row for plans that are made knowing what will happen.
+pub(crate) const CLAIRVOYANT: &str = "clairvoyant";

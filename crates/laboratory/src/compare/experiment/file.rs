@@ -1,0 +1,196 @@
+//! Experiment files as they stand.
+
+use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
+use elbowroom_num::Rational;
+use elbowroom_text::Span;
+use indexmap::IndexMap;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Planning, Published};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    pub(super) format: Spanned<String>,
+    pub(super) version: Spanned<i64>,
+    pub(super) title: String,
+    pub(super) domain: Spanned<String>,
+    pub(super) problem: Spanned<String>,
+    pub(super) trials: Spanned<u64>,
+    #[serde(default)]
+    pub(super) seed: u64,
+    pub(super) executors: Spanned<Vec<Spanned<String>>>,
+    #[serde(default)]
+    pub(super) clairvoyant: bool,
+    pub(super) running: Option<Spanned<String>>,
+    pub(super) planning_time: Option<Spanned<toml::Value>>,
+    pub(super) max_replans: Option<usize>,
+    pub(super) precision: Option<Spanned<f64>>,
+    pub(super) planner: Option<Spanned<String>>,
+    pub(super) planner_time: Option<Spanned<f64>>,
+    pub(super) planner_states: Option<u64>,
+    pub(super) improve_states: Option<u64>,
+    #[serde(default)]
+    pub(super) blanks: IndexMap<String, Spanned<Vec<toml::Value>>>,
+    #[serde(default)]
+    pub(super) together: Vec<TogetherFile>,
+    pub(super) column: Vec<ColumnFile>,
+    #[serde(default)]
+    pub(super) published: Vec<Spanned<Published>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ColumnFile {
+    pub(super) name: String,
+    pub(super) world: Spanned<String>,
+    pub(super) likelihoods: Option<Spanned<String>>,
+    #[serde(default)]
+    pub(super) vary: Vec<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TogetherFile {
+    pub(super) names: Vec<String>,
+    pub(super) rows: Spanned<Vec<Spanned<Vec<toml::Value>>>>,
+}
+
+impl File {
+    /// That there is something to make and something to make it with: where not, and what to do.
+    pub(super) fn check_size(&self) -> Result<(), (Span, String)> {
+        let wrong = |span: Span, message: &str| Err((span, message.to_owned()));
+        if *self.trials.get_ref() == 0 {
+            return wrong(self.trials.span(), "make at least one trial");
+        }
+        if self.executors.get_ref().is_empty() {
+            return wrong(self.executors.span(), "name at least one executor");
+        }
+        if self.column.is_empty() {
+            return wrong(self.format.span(), "write at least one [[column]]");
+        }
+        let blanks = self.blanks.values();
+        if let Some(empty) = blanks.into_iter().find(|it| it.get_ref().is_empty()) {
+            return wrong(empty.span(), "give the blank at least one value");
+        }
+        let mut groups = self.together.iter().map(|group| &group.rows);
+        if let Some(empty) = groups.find(|rows| rows.get_ref().is_empty()) {
+            return wrong(empty.span(), "give the blanks at least one row");
+        }
+        Ok(())
+    }
+
+    /// That published figures belong to rows and columns of the table.
+    pub(super) fn check_published(&self, rows: &[String]) -> Result<(), (Span, String)> {
+        for published in &self.published {
+            let wrong = |message: String| Err((published.span(), message));
+            let figures = published.get_ref();
+            if !rows.contains(&figures.executor) {
+                let name = &figures.executor;
+                let rows = rows.join(", ");
+                return wrong(format!("`{name}` is no row of the table; it has {rows}"));
+            }
+            let count = figures.replans.len();
+            if figures.coverage.len() != self.column.len()
+                || (count != 0 && count != self.column.len())
+            {
+                return wrong(format!(
+                    "write one figure for each of the {} columns, nan where there is none",
+                    self.column.len()
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn planning(&self) -> Result<Planning, (Span, String)> {
+        let seconds = match &self.planner_time {
+            None => None,
+            Some(given) => {
+                let seconds = exact(*given.get_ref()).filter(Rational::is_positive);
+                let wrong = || (given.span(), "it must be positive".to_owned());
+                Some(seconds.ok_or_else(wrong)?)
+            }
+        };
+        match &self.planner {
+            Some(name) if name.get_ref() != EMBEDDED => {
+                known(name.get_ref()).map_err(|message| (name.span(), message))?;
+                Ok(Planning::Another {
+                    name: name.get_ref().clone(),
+                    seconds,
+                })
+            }
+            _ => match &self.planner_time {
+                None => Ok(Planning::Embedded),
+                Some(time) => Err((
+                    time.span(),
+                    "`planner_time` is for another planner: name it with `planner`, or limit the \
+                     embedded one with `planner_states` and `improve_states`"
+                        .to_owned(),
+                )),
+            },
+        }
+    }
+
+    pub(super) fn settings(&self) -> Result<RunSettings, (Span, String)> {
+        let mut settings = RunSettings::default();
+        if let Some(running) = &self.running {
+            settings.running = one_of(running, RunningRule::NAMES)?;
+        }
+        if let Some(time) = &self.planning_time {
+            let number = match time.get_ref() {
+                toml::Value::Integer(number) => Some(Rational::from(*number)),
+                toml::Value::Float(number) => exact(*number),
+                _ => None,
+            };
+            // Measured times would make a result depend on the machine.
+            let number = number.filter(|number| !number.is_negative());
+            settings.planning_time = PlanningTime::Seconds(number.ok_or_else(|| {
+                (
+                    time.span(),
+                    "write a number of seconds, so that results can be repeated".to_owned(),
+                )
+            })?);
+        } else {
+            settings.planning_time = PlanningTime::Seconds(Rational::ZERO);
+        }
+        if let Some(most) = self.max_replans {
+            settings.most_replans = most;
+        }
+        Ok(settings)
+    }
+}
+
+/// The planner that is always there.
+const EMBEDDED: &str = "embedded";
+
+/// Whether there is such a planner; if not, which there are.
+fn known(name: &str) -> Result<(), String> {
+    let found = elbowroom_external::Planner::named(name);
+    found.map(|_| ()).map_err(|error| error.to_string())
+}
+
+/// The value of that name; or where the name stands, and what it may be.
+fn one_of<T: Copy>(
+    given: &Spanned<String>,
+    names: &[(T, &'static str)],
+) -> Result<T, (Span, String)> {
+    let found = names.iter().find(|(_, name)| name == given.get_ref());
+    found.map(|(value, _)| *value).ok_or_else(|| {
+        let known: Vec<&str> = names.iter().map(|(_, name)| *name).collect();
+        let message = format!("choose one of {}", known.join(", "));
+        (given.span(), message)
+    })
+}
+
+pub(super) fn text_of(value: &toml::Value) -> String {
+    match value {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+pub(super) fn exact(value: f64) -> Option<Rational> {
+    value.is_finite().then(|| value.to_string().parse().ok())?
+}

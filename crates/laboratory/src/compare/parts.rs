@@ -1,0 +1,126 @@
+//! Experiments in parts: which parts belong together, and what they make together.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+/// Results of a part of an experiment, or of several.
+pub(crate) trait Partial: Clone {
+    /// What distinguishes the experiment, and into how many parts it was split.
+    fn origin(&self) -> (&str, u64);
+    /// Whether both have the same rows and columns.
+    fn has_shape_of(&self, other: &Self) -> bool;
+    /// Into how many parts it was split, and which of them are in here.
+    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>);
+    /// Adds the counts of another part.
+    fn add(&mut self, other: &Self);
+}
+
+/// Puts parts of one experiment together.
+///
+/// # Errors
+/// When they are parts of different ones, or the same part comes twice; the message for the user.
+pub(crate) fn merged<P: Partial>(parts: &[P]) -> Result<P, String> {
+    let Some((first, rest)) = parts.split_first() else {
+        return Err("there is nothing to put together".to_owned());
+    };
+    let mut whole = first.clone();
+    for part in rest {
+        if part.origin() != whole.origin() || !part.has_shape_of(&whole) {
+            return Err("these are parts of different experiments".to_owned());
+        }
+        whole.add(part);
+        let mut part = part.clone();
+        let (theirs, mine) = (part.parts().1, whole.parts().1);
+        if let Some(twice) = theirs.iter().find(|shard| mine.contains(shard)) {
+            return Err(format!("part {twice} is there twice"));
+        }
+        mine.append(theirs);
+    }
+    let (count, shards) = whole.parts();
+    shards.sort_unstable();
+    if (0..*count).eq(shards.iter().copied()) {
+        (*count, *shards) = (1, vec![0]);
+    }
+    Ok(whole)
+}
+
+/// Whether an experiment that is split into `shards` parts has these, each of them once.
+pub(crate) fn are_possible(shards: u64, parts: &[u64]) -> bool {
+    let mut seen = BTreeSet::new();
+    !parts.is_empty() && parts.iter().all(|part| *part < shards && seen.insert(part))
+}
+
+/// How many trials of `what` were made, in words; where parts are missing, it says so.
+pub(crate) fn made(trials: u64, what: &str, shards: u64, parts: &[u64]) -> String {
+    let shards = shards.max(1);
+    if (0..shards).all(|part| parts.contains(&part)) {
+        return format!("{trials} trials of {what}");
+    }
+    // Part p has the trials p, p + shards, … below `trials`.
+    let of_part = |part: &u64| trials.saturating_sub(*part).div_ceil(shards);
+    let count: u64 = parts.iter().map(of_part).sum();
+    let names: Vec<String> = parts
+        .iter()
+        .map(|part| format!("{part}/{shards}"))
+        .collect();
+    format!(
+        "incomplete: {count} of {trials} trials of {what}; parts made: {}",
+        names.join(", ")
+    )
+}
+
+/// For what is written down only where it is true.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "what serde asks for")]
+pub(crate) fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// A number that is different for different experiments: FNV-1a over all that their results depend
+/// on. How that is called in here makes no difference, so that stored results stay what they are.
+pub(crate) fn fingerprint(identity: &Value, trials: u64) -> String {
+    let everything = format!("{trials} {identity}");
+    let hash = everything
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{are_possible, made};
+    use crate::compare::Part;
+
+    #[test]
+    fn what_was_made_is_what_the_parts_have() {
+        assert_eq!(
+            made(8, "each problem", 3, &[0, 1, 2]),
+            "8 trials of each problem"
+        );
+        for (trials, shards) in [(8, 3), (2, 5), (9, 3), (1, 1)] {
+            for shard in 0..shards {
+                let part = Part {
+                    trials,
+                    shard,
+                    shards,
+                    jobs: 0,
+                };
+                let words = made(trials, "it", shards, &[shard]);
+                let count = part.numbers().count();
+                let expected =
+                    format!("{count} of {trials} trials of it; parts made: {shard}/{shards}");
+                assert!(shards == 1 || words.ends_with(&expected), "{words}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_is_there_once_and_below_the_number_of_parts() {
+        assert!(are_possible(3, &[2, 0]));
+        for (shards, parts) in [(3, vec![3]), (3, vec![1, 1]), (1, vec![]), (0, vec![0])] {
+            assert!(!are_possible(shards, &parts), "{shards}: {parts:?}");
+        }
+    }
+}

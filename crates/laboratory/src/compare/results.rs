@@ -1,0 +1,316 @@
+//! What came of an experiment, or of a part of it.
+
+use std::collections::BTreeMap;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::run::{Report, Verdict};
+use elbowroom_report::statistics::{Mean, Proportion};
+use elbowroom_report::table::Table;
+use serde::{Deserialize, Serialize};
+
+use super::clairvoyant;
+use super::experiment::CLAIRVOYANT;
+use super::parts::{self, Partial, fingerprint};
+use super::{Experiment, Part};
+
+/// Counts by row and column. Everything is a sum, so parts add up exactly, in any order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Results {
+    format: String,
+    version: u64,
+    /// What the experiment shows.
+    pub title: String,
+    /// Distinguishes experiments, so that no apples are added to pears.
+    pub fingerprint: String,
+    /// How many trials of each problem and column the whole has.
+    pub trials: u64,
+    /// Into how many parts it was split.
+    pub shards: u64,
+    /// Which parts are in here.
+    pub parts: Vec<u64>,
+    /// Whether somebody ended it before all trials of these parts were made.
+    #[serde(default, skip_serializing_if = "parts::is_false")]
+    pub is_interrupted: bool,
+    /// The rows: executors.
+    pub rows: Vec<String>,
+    /// The columns.
+    pub columns: Vec<String>,
+    /// By row and column.
+    pub cells: Vec<Vec<Cell>>,
+    /// The rows compared in pairs with the first one, by row and column.
+    pub pairs: Vec<Vec<Pair>>,
+}
+
+/// What came of the runs of one executor in one column.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// How many runs.
+    pub runs: u64,
+    /// How many of them reached the goal.
+    pub successes: u64,
+    /// How many new plans these made.
+    pub replans: u64,
+    /// How the runs ended.
+    pub verdicts: BTreeMap<String, u64>,
+    /// Why plans were given up.
+    pub causes: BTreeMap<String, u64>,
+}
+
+/// Trials in which one of two executors reached the goal and the other did not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pair {
+    /// Only the first row's did.
+    pub only_first: u64,
+    /// Only this row's did.
+    pub only_this: u64,
+}
+
+/// Results that cannot be read, or do not belong together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ResultsError(String);
+
+const FORMAT: &str = "elbowroom-results";
+
+impl Results {
+    /// No trial has been made.
+    pub fn empty(experiment: &Experiment, part: Part) -> Self {
+        let rows = experiment.rows();
+        let columns: Vec<String> = experiment
+            .columns
+            .iter()
+            .map(|it| it.name.clone())
+            .collect();
+        Self {
+            format: FORMAT.to_owned(),
+            version: 1,
+            title: experiment.title.clone(),
+            fingerprint: fingerprint(&experiment.identity(), part.trials),
+            trials: part.trials,
+            shards: part.shards,
+            parts: vec![part.shard],
+            is_interrupted: false,
+            cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
+            pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
+            rows,
+            columns,
+        }
+    }
+
+    /// Reads results as JSON.
+    ///
+    /// # Errors
+    /// When they are none.
+    pub fn read(text: &str) -> Result<Self, ResultsError> {
+        let results: Self = serde_json::from_str(text)
+            .map_err(|error| ResultsError(format!("no results: {error}")))?;
+        if results.format != FORMAT || results.version != 1 {
+            return Err(ResultsError(
+                "this program reads elbowroom-results, version 1".to_owned(),
+            ));
+        }
+        let (height, width) = (results.rows.len(), results.columns.len());
+        let cells: Vec<usize> = results.cells.iter().map(Vec::len).collect();
+        let pairs: Vec<usize> = results.pairs.iter().map(Vec::len).collect();
+        if cells != vec![width; height] || pairs != cells {
+            return Err(ResultsError("rows and columns do not fit".to_owned()));
+        }
+        if !parts::are_possible(results.shards, &results.parts) {
+            return Err(ResultsError("there are no such parts".to_owned()));
+        }
+        Ok(results)
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Whether these are results of that experiment, with any number of trials.
+    pub fn are_of(&self, experiment: &Experiment) -> bool {
+        self.fingerprint == fingerprint(&experiment.identity(), self.trials)
+            && self.rows == experiment.rows()
+            && self
+                .columns
+                .iter()
+                .eq(experiment.columns.iter().map(|it| &it.name))
+    }
+
+    /// Puts parts of one experiment together.
+    ///
+    /// # Errors
+    /// When they are parts of different ones, or the same part comes twice.
+    pub fn merged(parts: &[Self]) -> Result<Self, ResultsError> {
+        parts::merged(parts).map_err(ResultsError)
+    }
+
+    /// The table: coverage with its 95 % interval, and mean number of new plans of successful
+    /// runs; beside them the published figures.
+    pub fn table(&self, experiment: &Experiment) -> Table {
+        let mut headings = vec!["executor".to_owned()];
+        for column in &self.columns {
+            headings.push(format!("{column}: coverage [95 %]"));
+            headings.push("replans".to_owned());
+            if !experiment.published.is_empty() {
+                headings.push("published".to_owned());
+            }
+        }
+        let rows = self.rows.iter().enumerate().map(|(index, row)| {
+            let mut cells = vec![row.clone()];
+            for (column, cell) in self.cells[index].iter().enumerate() {
+                cells.extend(cell.words());
+                if !experiment.published.is_empty() {
+                    cells.push(experiment.published_words(row, column));
+                }
+            }
+            cells
+        });
+        let mut made = parts::made(self.trials, "each problem", self.shards, &self.parts);
+        if self.is_interrupted {
+            // All rows have the same trials.
+            let made_here = self.cells.first().map_or(0, |row| {
+                let runs = row.iter().map(|cell| cell.runs);
+                runs.sum::<u64>()
+            });
+            made = format!(
+                "interrupted after {made_here} trials of {made}; problems are taken one after the \
+                 other, and those that are missing may be harder or easier"
+            );
+        }
+        Table {
+            caption: format!("{} ({made})", self.title),
+            rows: rows.collect(),
+            headings,
+            keys: 1,
+            notes: notes(&self.rows),
+        }
+    }
+}
+
+/// What each row's executor does, as it is registered; each executor once.
+fn notes(rows: &[String]) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    for row in rows {
+        let note = match row.parse::<ExecutorSpec>() {
+            Ok(spec) => format!("`{}`: {}", spec.registered.name, spec.registered.summary),
+            Err(_) if row == CLAIRVOYANT => format!("`{row}`: {}", clairvoyant::SUMMARY),
+            Err(_) => continue,
+        };
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes
+}
+
+impl Partial for Results {
+    fn origin(&self) -> (&str, u64) {
+        (&self.fingerprint, self.shards)
+    }
+
+    fn has_shape_of(&self, other: &Self) -> bool {
+        (&self.rows, &self.columns) == (&other.rows, &other.columns)
+    }
+
+    fn parts(&mut self) -> (&mut u64, &mut Vec<u64>) {
+        (&mut self.shards, &mut self.parts)
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.is_interrupted |= other.is_interrupted;
+        for (mine, theirs) in self
+            .cells
+            .iter_mut()
+            .flatten()
+            .zip(other.cells.iter().flatten())
+        {
+            mine.runs += theirs.runs;
+            mine.successes += theirs.successes;
+            mine.replans += theirs.replans;
+            merge(&mut mine.verdicts, &theirs.verdicts);
+            merge(&mut mine.causes, &theirs.causes);
+        }
+        for (mine, theirs) in self
+            .pairs
+            .iter_mut()
+            .flatten()
+            .zip(other.pairs.iter().flatten())
+        {
+            mine.only_first += theirs.only_first;
+            mine.only_this += theirs.only_this;
+        }
+    }
+}
+
+impl Cell {
+    /// One more run.
+    pub(super) fn count(&mut self, report: &Report) {
+        self.runs += 1;
+        *self
+            .verdicts
+            .entry(report.verdict.name().to_owned())
+            .or_default() += 1;
+        for reason in &report.reasons {
+            let cause = reason.cause.name().to_owned();
+            *self.causes.entry(cause).or_default() += 1;
+        }
+        if report.verdict == Verdict::GoalReached {
+            self.successes += 1;
+            self.replans += report.replans as u64;
+        }
+    }
+
+    /// Coverage, and mean number of new plans of successful runs.
+    fn words(&self) -> [String; 2] {
+        let coverage = Proportion {
+            successes: self.successes,
+            count: self.runs,
+        };
+        let replans = Mean {
+            sum: self.replans,
+            count: self.successes,
+        };
+        let percent = |share: f64| format!("{:.1}", share * 100.0);
+        let coverage = match (coverage.share(), coverage.wilson()) {
+            (Some(share), Some((lower, upper))) => {
+                format!(
+                    "{} [{}, {}]",
+                    percent(share),
+                    percent(lower),
+                    percent(upper)
+                )
+            }
+            _ => "-".to_owned(),
+        };
+        let replans = replans
+            .value()
+            .map_or("-".to_owned(), |mean| format!("{mean:.2}"));
+        [coverage, replans]
+    }
+}
+
+impl Experiment {
+    fn published_words(&self, row: &str, column: usize) -> String {
+        let Some(published) = self.published.iter().find(|it| it.executor == row) else {
+            return "-".to_owned();
+        };
+        let replans = published
+            .replans
+            .get(column)
+            .filter(|mean| mean.is_finite());
+        match (published.coverage.get(column), replans) {
+            (Some(coverage), Some(replans)) => format!("{coverage:.1} ({replans:.1})"),
+            (Some(coverage), None) => format!("{coverage:.1}"),
+            (None, _) => "-".to_owned(),
+        }
+    }
+}
+
+fn merge(mine: &mut BTreeMap<String, u64>, theirs: &BTreeMap<String, u64>) {
+    for (name, count) in theirs {
+        *mine.entry(name.clone()).or_default() += count;
+    }
+}

@@ -1,0 +1,307 @@
+//! The trials of one problem.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom_execution::executors::{ExecutorSpec, Foresight};
+use elbowroom_execution::run::{PlanningTime, Report, Verdict};
+use elbowroom_execution::{PlanAnswer, Planner, Preparer};
+use elbowroom_external as external;
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_pddl::Source;
+use elbowroom_planner::embedded;
+use elbowroom_probability::{Likelihoods, likelihoods};
+use elbowroom_sim::WorldModel;
+
+use super::{Column, Experiment, ExperimentError, Part, Planning, Results, clairvoyant};
+use elbowroom::execute::{
+    Analyst, Embedded, Execution, Likeliest, RememberingPlanner, RememberingPreparer,
+    SharedLikeliest,
+};
+use elbowroom::flow;
+
+/// How many plans are remembered for one problem: some megabytes.
+const PLANS: usize = 20_000;
+
+/// How many plans made ready are remembered for one problem and column: some megabytes.
+const PREPARED: usize = 500;
+
+/// One problem, and some of its trials.
+pub(super) struct Setting<'a> {
+    pub(super) experiment: &'a Experiment,
+    pub(super) problem: usize,
+    pub(super) filling: &'a [(String, String)],
+    /// Which of the part's trials: every `pieces`-th, from this one on.
+    pub(super) piece: usize,
+    pub(super) pieces: usize,
+}
+
+/// What all trials of a problem have in common.
+struct Common<'a> {
+    task: Arc<Task>,
+    first: TimeTriggeredPlan,
+    planner: RememberingPlanner<Box<dyn Planner + 'a>>,
+    columns: Vec<Place>,
+}
+
+/// A column for one problem.
+struct Place {
+    world: WorldModel,
+    likelihoods: Arc<Likelihoods>,
+    foresight: Foresight,
+    preparer: RememberingPreparer<Analyst>,
+    /// For executors that look for likelier plans: who makes them, and the same with a memory.
+    odds: SharedLikeliest,
+    likeliest: RememberingPlanner<SharedLikeliest>,
+}
+
+impl Setting<'_> {
+    /// Makes the trials of a part. `tell` is called after each, and says whether to go on;
+    /// `goes_on` says so in between.
+    pub(super) fn run(
+        &self,
+        part: Part,
+        tell: &(dyn Fn() -> bool + Sync),
+        goes_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Results, ExperimentError> {
+        let experiment = self.experiment;
+        let mut results = Results::empty(experiment, part);
+        if !goes_on() {
+            return Ok(results);
+        }
+        let mut common = self.common(goes_on)?;
+        for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
+            for column in 0..experiment.columns.len() {
+                self.trial(trial, column, &mut common, &mut results);
+                if !tell() {
+                    return Ok(results);
+                }
+            }
+        }
+        Ok(results)
+    }
+
+    /// Reads the problem, makes the first plan, and makes it ready for all executors.
+    fn common<'a>(
+        &self,
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Common<'a>, ExperimentError> {
+        let (domain, problem) = self.texts()?;
+        let task = match elbowroom_pddl::read_problem(&domain, &problem) {
+            Ok((problem, _)) => Task::new(problem),
+            Err(diagnostics) => return Err(ExperimentError::Text(diagnostics)),
+        };
+        let situation = Situation::initial(&task);
+        let mut planner = self.planner(domain, problem, goes_on)?;
+        let first = match planner.plan(&task, &situation).answer {
+            PlanAnswer::Plan(plan) => plan,
+            PlanAnswer::Unsolvable => {
+                return Err(self.wrong("no plan exists, so there is nothing to execute"));
+            }
+            PlanAnswer::NotFound { why } => return Err(self.wrong(&why)),
+        };
+        let task = Arc::new(task);
+        let columns = self.experiment.columns.iter();
+        let columns = columns.map(|column| self.place(column, &task, &first));
+        Ok(Common {
+            columns: columns.collect::<Result<_, _>>()?,
+            planner: RememberingPlanner::new(planner, PLANS),
+            task,
+            first,
+        })
+    }
+
+    fn place(
+        &self,
+        column: &Column,
+        task: &Arc<Task>,
+        first: &TimeTriggeredPlan,
+    ) -> Result<Place, ExperimentError> {
+        let world = Source::new(format!("world of {}", column.name), column.world.as_str());
+        let world = WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)?;
+        let likelihoods = match &column.likelihoods {
+            None => Likelihoods::certain(),
+            Some(text) => {
+                let name = format!("likelihoods of {}", column.name);
+                likelihoods::read(Source::new(name, text.as_str()), task)
+                    .map_err(ExperimentError::Text)?
+            }
+        };
+        let mut preparer = RememberingPreparer::new(Analyst::new(self.flow(column)), PREPARED);
+        for spec in &self.experiment.executors {
+            preparer
+                .prepare(task, first, spec.registered.need)
+                .map_err(|why| self.wrong(&why))?;
+        }
+        let planning_time = match &self.experiment.settings.planning_time {
+            PlanningTime::Seconds(seconds) => seconds.clone(),
+            PlanningTime::Measured => Rational::ZERO,
+        };
+        let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
+        let odds = SharedLikeliest::new(odds);
+        Ok(Place {
+            world,
+            likelihoods: Arc::new(likelihoods),
+            foresight: Foresight::default(),
+            preparer,
+            likeliest: RememberingPlanner::new(odds.clone(), PLANS),
+            odds,
+        })
+    }
+
+    /// Every executor in the same world.
+    fn trial(&self, trial: u64, column: usize, common: &mut Common<'_>, results: &mut Results) {
+        // The same seed in all columns: their worlds differ only where the columns do.
+        let seed = self
+            .experiment
+            .seed
+            .wrapping_mul(1_000_003)
+            .wrapping_add(self.problem as u64)
+            .wrapping_mul(1_000_003)
+            .wrapping_add(trial);
+        let executors = &self.experiment.executors;
+        let mut reached = Vec::with_capacity(executors.len() + 1);
+        for (row, spec) in executors.iter().enumerate() {
+            let report = self.execute(seed, spec, column, common);
+            reached.push(report.verdict == Verdict::GoalReached);
+            results.cells[row][column].count(&report);
+        }
+        if self.experiment.clairvoyant {
+            let world = &common.columns[column].world;
+            // What somebody reached without knowing can be reached knowing.
+            let is_possible = reached.contains(&true)
+                || clairvoyant::can_reach(&common.task, world, seed, &mut self.embedded());
+            let cell = &mut results.cells[reached.len()][column];
+            cell.runs += 1;
+            cell.successes += u64::from(is_possible);
+            reached.push(is_possible);
+        }
+        for (row, this) in reached.iter().enumerate() {
+            let pair = &mut results.pairs[row][column];
+            pair.only_first += u64::from(reached[0] && !this);
+            pair.only_this += u64::from(*this && !reached[0]);
+        }
+    }
+
+    fn execute(
+        &self,
+        seed: u64,
+        spec: &ExecutorSpec,
+        column: usize,
+        common: &mut Common<'_>,
+    ) -> Report {
+        let settings = &self.experiment.settings;
+        // Trials are shared out among threads, and each is the same whichever came before.
+        let task = Arc::new(common.task.with_own_table());
+        let Place {
+            world,
+            likelihoods,
+            foresight,
+            preparer,
+            odds,
+            likeliest,
+        } = &mut common.columns[column];
+        let asks_odds = spec.asks_odds();
+        let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
+        let planner: &mut dyn Planner = if asks_odds {
+            likeliest
+        } else {
+            &mut common.planner
+        };
+        Execution::of(&task)
+            .beginning_with(common.first.clone())
+            .by(spec.clone())
+            .with_settings(settings.clone())
+            .with_likelihoods(Arc::clone(likelihoods))
+            .with_foresight(foresight.clone())
+            .with_odds(odds)
+            .planned_by(planner)
+            .prepared_by(preparer)
+            .run_in(&mut *world.world(&task, seed))
+    }
+
+    fn planner<'a>(
+        &self,
+        domain: Source,
+        problem: Source,
+        goes_on: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
+        match &self.experiment.planner {
+            Planning::Embedded => Ok(Box::new(self.embedded())),
+            Planning::Another { name, seconds } => {
+                another(name, seconds.as_ref(), domain, problem, goes_on)
+            }
+        }
+    }
+
+    fn embedded(&self) -> Embedded<'static> {
+        Embedded {
+            settings: embedded::Settings::default(),
+            most_states: self.experiment.planner_states,
+            improve_states: self.experiment.improve_states,
+            clock: None,
+            goes_on: None,
+        }
+    }
+
+    fn flow(&self, column: &Column) -> flow::Settings {
+        let mut flow = flow::Settings {
+            vary: column.vary.clone(),
+            ..flow::Settings::default()
+        };
+        flow.search.precision = self.experiment.precision.clone();
+        flow
+    }
+
+    /// The domain, and the problem with its blanks filled in.
+    fn texts(&self) -> Result<(Source, Source), ExperimentError> {
+        let mut text = self.experiment.problem.clone();
+        for (name, value) in self.filling {
+            let blank = format!("{{{name}}}");
+            if !text.contains(&blank) {
+                return Err(self.wrong(&format!("the problem has no blank {blank}")));
+            }
+            text = text.replace(&blank, value);
+        }
+        let domain = Source::new("domain", self.experiment.domain.as_str());
+        Ok((domain, Source::new("problem", text.as_str())))
+    }
+
+    fn wrong(&self, message: &str) -> ExperimentError {
+        if self.filling.is_empty() {
+            return ExperimentError::other(format!("the problem: {message}"));
+        }
+        let filling = self.filling.iter();
+        let filling: Vec<_> = filling
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        ExperimentError::other(format!(
+            "the problem with {}: {message}",
+            filling.join(", ")
+        ))
+    }
+}
+
+/// Another program.
+fn another<'a>(
+    name: &str,
+    seconds: Option<&Rational>,
+    domain: Source,
+    problem: Source,
+    goes_on: &'a (dyn Fn() -> bool + Sync),
+) -> Result<Box<dyn Planner + 'a>, ExperimentError> {
+    let planner = external::Planner::named(name);
+    let seconds = seconds.map(|seconds| Duration::from_secs_f64(seconds.to_f64().min(1e9)));
+    Ok(Box::new(elbowroom::execute::External {
+        planner: planner.map_err(|error| ExperimentError::other(error.to_string()))?,
+        domain,
+        problem,
+        settings: external::Settings {
+            time_limit: Some(seconds.unwrap_or(Duration::from_secs(60))),
+            ..external::Settings::default()
+        },
+        takes_first: seconds.is_none(),
+        goes_on,
+    }))
+}

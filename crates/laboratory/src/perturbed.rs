@@ -1,0 +1,248 @@
+//! Comparing executors in perturbed worlds: the experiments of paper 2.
+//!
+//! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
+//! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a trial
+//! depend on the experiment's seed, the case and the trial's number only, so results do not depend on how many
+//! trials run at once.
+
+mod experiment;
+mod planner;
+mod results;
+mod table;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+
+use crate::untimed::{
+    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest,
+    UntimedExecutor, UntimedWorld, all_actions, trial,
+};
+use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
+use elbowroom_model::ground::Action;
+use elbowroom_model::{State, Task};
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_probability::Likelihoods;
+use elbowroom_probability::optimum::{self, DeadEnds};
+use rayon::prelude::*;
+
+pub use experiment::{
+    Case, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
+};
+pub use results::{PerturbedResults, Row, Work};
+pub use table::{plots, table};
+
+use crate::compare::Part;
+use planner::EmbeddedPlans;
+
+/// Who watches the trials.
+struct Watch<'w> {
+    /// Whether to make another one.
+    goes_on: &'w (dyn Fn() -> bool + Sync),
+    /// One has been made.
+    tell: &'w (dyn Fn() + Sync),
+}
+
+/// One case, ready to be run.
+struct Setting<'e> {
+    experiment: &'e PerturbedExperiment,
+    case: &'e Case,
+    /// Cases have dice of their own.
+    number: u64,
+    task: Arc<Task>,
+    actions: Vec<Action>,
+    likelihoods: Arc<Likelihoods>,
+    chances: Chances,
+    perturbed: Option<PerturbedFacts>,
+    foresight: OnceLock<Result<Foresighted, NoForesight>>,
+}
+
+/// Makes the trials of each case, in each world, with each executor. `observe` is told how many are
+/// done, and says whether to go on. If not, what has been made until then is kept
+/// ([`PerturbedResults::is_interrupted`]).
+///
+/// # Errors
+/// When the problem or likelihoods cannot be read, or are of a kind that there is no world for.
+pub fn run(
+    experiment: &PerturbedExperiment,
+    part: Part,
+    observe: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<PerturbedResults, PerturbedError> {
+    let done = AtomicU64::new(0);
+    let watch = Watch {
+        goes_on: &|| observe(done.load(Ordering::Relaxed)),
+        tell: &|| {
+            observe(done.fetch_add(1, Ordering::Relaxed) + 1);
+        },
+    };
+    let cases = (0..).zip(&experiment.cases);
+    let settings: Vec<Setting<'_>> = cases
+        .map(|(number, case)| Setting::new(experiment, case, number))
+        .collect::<Result<_, _>>()?;
+    let rows: Vec<_> = settings
+        .iter()
+        .flat_map(|setting| {
+            let worlds = experiment.worlds.iter();
+            worlds.flat_map(move |world| {
+                let executors = experiment.executors.iter();
+                executors.map(move |executor| (setting, *world, *executor))
+            })
+        })
+        .collect();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(part.jobs)
+        .build()
+        .map_err(|error| PerturbedError::other(format!("cannot start threads: {error}")))?;
+    let rows: Result<Vec<Row>, _> = pool.install(|| {
+        rows.par_iter()
+            .map(|(setting, world, executor)| setting.row(*world, *executor, part, &watch))
+            .collect()
+    });
+    let rows = rows?;
+    let is_whole = rows
+        .iter()
+        .all(|row| row.success.count == part.numbers().count() as u64);
+    let mut results = PerturbedResults::new(experiment, part, rows);
+    results.is_interrupted = !is_whole;
+    Ok(results)
+}
+
+impl<'e> Setting<'e> {
+    fn new(
+        experiment: &'e PerturbedExperiment,
+        case: &'e Case,
+        number: u64,
+    ) -> Result<Self, PerturbedError> {
+        let domain = Source::new("domain", case.domain.as_str());
+        let problem = Source::new("problem", case.problem.as_str());
+        let (problem, _) = read_problem(&domain, &problem).map_err(PerturbedError::Text)?;
+        let task = Task::new(problem);
+        let wrong = |error: &dyn std::fmt::Display| {
+            PerturbedError::other(format!("{}: {error}", case.name))
+        };
+        let actions = all_actions(&task).map_err(|error| wrong(&error))?;
+        let likelihoods = elbowroom_probability::likelihoods::read(
+            Source::new(
+                format!("likelihoods of {}", case.name),
+                case.likelihoods.as_str(),
+            ),
+            &task,
+        )
+        .map_err(PerturbedError::Text)?;
+        let chances = Chances::new(&task, &actions, &likelihoods).map_err(|error| wrong(&error))?;
+        let perturbed = match &experiment.perturbation {
+            Some(names) => Some(names.find(&task)?.facts(&task, &chances)),
+            None => None,
+        };
+        Ok(Self {
+            experiment,
+            case,
+            number,
+            task: Arc::new(task),
+            actions,
+            likelihoods: Arc::new(likelihoods),
+            chances,
+            perturbed,
+            foresight: OnceLock::new(),
+        })
+    }
+
+    /// The table of the sound world, made when it is first asked for.
+    fn table(&self) -> &Result<Foresighted, NoForesight> {
+        self.foresight.get_or_init(|| {
+            // The first plan takes a round; each step that ends in a dead end takes another.
+            let patience = self.experiment.rounds.saturating_sub(1).max(1);
+            let settings = optimum::Settings {
+                most_running: self.case.most_running,
+                dead_ends: DeadEnds::Patience(patience),
+                ..optimum::Settings::default()
+            };
+            let actions = self.actions.clone();
+            Foresighted::new(&self.task, actions, &self.likelihoods, settings)
+        })
+    }
+
+    fn foresight(&self) -> Result<&Foresighted, PerturbedError> {
+        self.table().as_ref().map_err(|error| self.no_table(error))
+    }
+
+    fn no_table(&self, error: &NoForesight) -> PerturbedError {
+        PerturbedError::other(format!("{}: {error}", self.case.name))
+    }
+
+    fn executor(&self, name: ExecutorName) -> Result<Box<dyn UntimedExecutor>, PerturbedError> {
+        let foresight = || self.table().clone();
+        let executor = name.build(&Means {
+            task: Arc::clone(&self.task),
+            likelihoods: Arc::clone(&self.likelihoods),
+            foresight: &foresight,
+        });
+        executor.map_err(|error| self.no_table(&error))
+    }
+
+    fn plans(&self) -> Box<Plans<'static>> {
+        let task = Arc::clone(&self.task);
+        match self.experiment.planner {
+            PlannerKind::Shortest => {
+                let mut planner = Shortest::new(task, self.actions.clone());
+                Box::new(move |state| planner.plan(state))
+            }
+            PlannerKind::Embedded => {
+                let mut planner = EmbeddedPlans::new(task);
+                Box::new(move |state| planner.plan(state))
+            }
+        }
+    }
+
+    fn row(
+        &self,
+        world: WorldKind,
+        kind: ExecutorName,
+        part: Part,
+        watch: &Watch<'_>,
+    ) -> Result<Row, PerturbedError> {
+        if !(watch.goes_on)() {
+            return Ok(Row::new(self.case, world, kind, None));
+        }
+        let mut executor = self.executor(kind)?;
+        // The table is of the sound world; elsewhere it promises nothing.
+        let foresight = match world {
+            WorldKind::Sound => Some(self.foresight()?),
+            WorldKind::AsPublished => None,
+        };
+        let is_dead_end = foresight.map(|foresight| {
+            move |state: &State, running: &[ActionName]| foresight.is_dead_end(state, running)
+        });
+        let mut plans = self.plans();
+        let mut game = Game {
+            task: &self.task,
+            plans: &mut *plans,
+            dead_ends: is_dead_end.as_ref().map(|watch| watch as _),
+            limits: Limits {
+                rounds: self.experiment.rounds,
+                ..Limits::default()
+            },
+        };
+        let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
+        let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
+            .wrapping_add(self.number.wrapping_mul(1_000_000_007));
+        for number in part.numbers() {
+            if !(watch.goes_on)() {
+                break;
+            }
+            let seed = first_seed.wrapping_add(number);
+            let mut sound;
+            let mut published;
+            let world: &mut dyn UntimedWorld =
+                if let (WorldKind::AsPublished, Some(perturbed)) = (world, &self.perturbed) {
+                    published = PublishedWorld::new(&self.chances, perturbed, seed);
+                    &mut published
+                } else {
+                    sound = SoundWorld::new(&self.chances, self.task.initial(), seed);
+                    &mut sound
+                };
+            row.add(trial(&mut game, world, &mut *executor));
+            (watch.tell)();
+        }
+        Ok(row)
+    }
+}

@@ -1,0 +1,243 @@
+//! Results of perturbed experiments as a table, and as plots.
+
+use elbowroom_report::plot::{IntervalPlot, Point, Series};
+use elbowroom_report::statistics::{Mean, Proportion};
+use elbowroom_report::table::Table;
+
+use crate::compare::parts;
+
+use super::{PerturbedResults, Row, WorldKind};
+use crate::untimed::ExecutorName;
+
+/// The results as a table.
+pub fn table(results: &PerturbedResults) -> Table {
+    let rows = &results.rows;
+    let headings = [
+        "case",
+        "world",
+        "executor",
+        "success %",
+        "95 % interval",
+        "published %",
+        "z",
+        "optimum %",
+        "replans",
+        "messages (success)",
+        "failed starts (success)",
+        "actions (success)",
+        "messages (failure)",
+        "failed starts (failure)",
+        "actions (failure)",
+    ];
+    let percent =
+        |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
+    let mean = |mean: Mean| mean.value().map_or_else(String::new, |m| format!("{m:.2}"));
+    let row = |row: &Row| {
+        let interval = row.success.wilson();
+        let interval =
+            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
+        let z = row.distance().map(|z| format!("{z:+.1}"));
+        vec![
+            row.case.clone(),
+            row.world.name().to_owned(),
+            row.executor.name().to_owned(),
+            percent(row.success.share()),
+            interval.unwrap_or_default(),
+            percent(row.published.and_then(Proportion::share)),
+            z.unwrap_or_default(),
+            percent(row.optimum),
+            mean(row.replans),
+            mean(row.succeeded.messages),
+            mean(row.succeeded.failed_starts),
+            mean(row.succeeded.actions),
+            mean(row.failed.messages),
+            mean(row.failed.failed_starts),
+            mean(row.failed.actions),
+        ]
+    };
+    let mut title = results.title.clone();
+    let made = parts::made(results.trials, "each row", results.shards, &results.parts);
+    if results.is_interrupted {
+        title = format!("{title} (interrupted; of {made})");
+    } else if made.starts_with("incomplete") {
+        title = format!("{title} ({made})");
+    }
+    let caption = [title].into_iter();
+    let caption = caption.chain(agreement(rows)).chain(nearness(rows));
+    Table {
+        caption: caption.collect::<Vec<_>>().join("\n"),
+        headings: headings.map(str::to_owned).to_vec(),
+        keys: 3,
+        rows: rows.iter().map(row).collect(),
+        notes: Vec::new(),
+    }
+}
+
+/// How the published success rates compare with ours.
+fn agreement(rows: &[Row]) -> Option<String> {
+    let compared = rows.iter().filter(|row| row.published.is_some()).count();
+    let inside = rows.iter().filter(|row| row.is_inside() == Some(true));
+    let agreeing = rows.iter().filter(|row| row.agrees() == Some(true));
+    let squares: f64 = rows.iter().filter_map(Row::distance).map(|z| z * z).sum();
+    (compared > 0).then(|| {
+        format!(
+            "Of {compared} published success rates, {} have ours in their 95 % interval; {} do \
+             not differ from ours at the 5 % level. The squared distances z add up to \
+             {squares:.0}; {compared} are expected.",
+            inside.count(),
+            agreeing.count(),
+        )
+    })
+}
+
+/// How near the best executor comes to what can be.
+fn nearness(rows: &[Row]) -> Option<String> {
+    let cases = cases(rows);
+    let best = cases.iter().filter_map(|case| {
+        let of_case = rows.iter().filter(|row| row.case == *case);
+        let shares = of_case.filter_map(|row| {
+            let optimum = row.optimum.filter(|optimum| *optimum > 0.0)?;
+            Some((row.success.share()? / optimum, case, row.executor))
+        });
+        shares.max_by(|a, b| a.0.total_cmp(&b.0))
+    });
+    let (ratio, case, executor) = best.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "In the sound world the best executor reaches at least {:.1} % of the optimum ({}, {case}).",
+        100.0 * ratio,
+        executor.name()
+    ))
+}
+
+/// The pictures of the paper, world by world: a name for a file, and the plot. Success with the
+/// optimum (its Table 1), replans (Figure 4), and actions, as the paper counts them, in trials that
+/// succeeded and that failed (Figures 5 and 6).
+pub fn plots(results: &PerturbedResults) -> Vec<(String, IntervalPlot)> {
+    let mut worlds: Vec<WorldKind> = results.rows.iter().map(|row| row.world).collect();
+    worlds.sort_unstable();
+    worlds.dedup();
+    let of_world = |world: WorldKind| {
+        let mean = |mean: Mean| {
+            mean.value().map(|value| Point {
+                value,
+                interval: None,
+            })
+        };
+        let success = |row: &Row| share(row.success);
+        let actions = |work: super::Work| {
+            // Messages and failed starts are counted in the same trials.
+            let mut both = work.messages;
+            both.sum += work.failed_starts.sum;
+            mean(both)
+        };
+        let plot = |what: &str, axis: &str, value: &dyn Fn(&Row) -> Option<Point>| {
+            picture(results, world, (what, axis), value)
+        };
+        let mut successes = plot(
+            "success, with 95 % intervals",
+            "successful trials, %",
+            &success,
+        );
+        successes.reference = reference(results, world);
+        successes.series.extend(published(results, world));
+        [
+            ("success", successes),
+            (
+                "replans",
+                plot("replans of successful trials", "mean", &|row| {
+                    mean(row.replans)
+                }),
+            ),
+            (
+                "actions-success",
+                plot("actions of successful trials", "mean", &|row| {
+                    actions(row.succeeded)
+                }),
+            ),
+            (
+                "actions-failure",
+                plot("actions of failed trials", "mean", &|row| {
+                    actions(row.failed)
+                }),
+            ),
+        ]
+        .map(|(name, plot)| (format!("{}-{name}", world.name()), plot))
+    };
+    worlds.into_iter().flat_map(of_world).collect()
+}
+
+fn cases(rows: &[Row]) -> Vec<String> {
+    let mut cases: Vec<String> = rows.iter().map(|row| row.case.clone()).collect();
+    cases.dedup();
+    cases
+}
+
+fn picture(
+    results: &PerturbedResults,
+    world: WorldKind,
+    (what, axis): (&str, &str),
+    value: &dyn Fn(&Row) -> Option<Point>,
+) -> IntervalPlot {
+    let groups = cases(&results.rows);
+    let rows = || results.rows.iter().filter(|row| row.world == world);
+    let mut executors: Vec<ExecutorName> = Vec::new();
+    for row in rows() {
+        if !executors.contains(&row.executor) {
+            executors.push(row.executor);
+        }
+    }
+    let series = executors.into_iter().map(|executor| {
+        let point = |case: &String| {
+            let mut found = rows().filter(|row| row.case == *case && row.executor == executor);
+            found.next().and_then(value)
+        };
+        Series {
+            name: executor.name().to_owned(),
+            points: groups.iter().map(point).collect(),
+        }
+    });
+    IntervalPlot {
+        title: format!("{} ({}): {what}", results.title, world.name()),
+        axis: axis.to_owned(),
+        series: series.collect(),
+        groups,
+        reference: None,
+    }
+}
+
+/// A share in percent, with Wilson's interval.
+fn share(of: Proportion) -> Option<Point> {
+    Some(Point {
+        value: 100.0 * of.share()?,
+        interval: of.wilson().map(|(a, b)| (100.0 * a, 100.0 * b)),
+    })
+}
+
+/// What was published, executor by executor.
+fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
+    let published = |row: &Row| row.published.and_then(share);
+    let mut series = picture(results, world, ("", ""), &published).series;
+    series.retain(|series| series.points.iter().any(Option::is_some));
+    for series in &mut series {
+        series.name += ", published";
+    }
+    series
+}
+
+/// The optimum, where it is known.
+fn reference(results: &PerturbedResults, world: WorldKind) -> Option<Series> {
+    let point = |case: String| {
+        let mut rows = results.rows.iter();
+        let is_it = |row: &&Row| row.case == case && row.world == world && row.optimum.is_some();
+        let value = 100.0 * rows.find(is_it)?.optimum?;
+        Some(Point {
+            value,
+            interval: None,
+        })
+    };
+    let points: Vec<_> = cases(&results.rows).into_iter().map(point).collect();
+    points.iter().any(Option::is_some).then(|| Series {
+        name: "optimum".to_owned(),
+        points,
+    })
+}

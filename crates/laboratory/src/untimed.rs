@@ -1,0 +1,315 @@
+//! Executing plans where there is no time: the experiments of paper 2.
+//!
+//! A world without time goes on when something is done in it, and only then. A *step* is the
+//! attempt to start an action, or its end. Facts are seen as they are after every step. The rules of
+//! a trial are those of the published experiments (Ribeiro et al., TIME 2021, section 3):
+//!
+//! - a trial has so many planning *rounds* (ten there: a plan, and nine replans);
+//! - in each round a plan is made from what holds, and executed until the executor has done all of
+//!   it, or gives it up;
+//! - the trial succeeds if the goal holds when an execution ends, given up or not; what is still
+//!   under way then counts as let go;
+//! - where there is no plan, all rounds that are left are lost, as nothing changes between rounds.
+//!
+//! One rule is ours, and holds only where somebody looks out for dead ends ([`Game::dead_ends`]): a
+//! step that ends where there is no plan uses up a round, as asking for a plan there would. Without
+//! it an executor could do something, no matter what, until what is broken mends itself, and how
+//! often executors succeed would say how stubborn they are.
+//!
+//! Executors here choose steps, not times, and so are of another kind than
+//! [`Executor`](elbowroom_execution::Executor): there is nothing to wait for.
+
+mod adaptable;
+mod esterel;
+mod lookahead;
+mod published;
+mod registry;
+mod shortest;
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::{Action, Body, Change, Condition, SnapAction};
+use elbowroom_model::problem::{ObjectId, SchemaId};
+use elbowroom_model::{State, Task, TimeTriggeredPlan};
+
+pub use adaptable::Adaptable;
+pub use elbowroom_probability::{Unsupported, all_actions};
+pub use esterel::Esterel;
+pub use lookahead::{Foresighted, NoForesight};
+pub use published::AsPublished;
+pub use registry::{EXECUTORS, ExecutorName, Means, Registered, UnknownExecutor};
+pub use shortest::Shortest;
+
+/// A world without time: a port.
+pub trait UntimedWorld {
+    /// What is true, as everyone sees it.
+    fn state(&self) -> &State;
+
+    /// Tries to start an action whose start condition holds; says whether it has started. An
+    /// instantaneous action is then done.
+    fn attempt(&mut self, action: &Action) -> bool;
+
+    /// Ends an action that has started and whose end condition holds.
+    fn end(&mut self, action: &Action);
+}
+
+/// Who executes plans in such worlds.
+pub trait UntimedExecutor {
+    /// Forgets the trial before. What has been calculated may be kept.
+    fn begin(&mut self) {}
+
+    /// Executes a plan until it is done, or does not work any more.
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>);
+}
+
+/// Who plans: from what holds to a plan, `None` if there is none.
+///
+/// The same plan should be the same `Arc`: executors remember what they have made of it.
+pub type Plans<'a> = dyn FnMut(&State) -> Option<Arc<TimeTriggeredPlan>> + 'a;
+
+/// When a trial is over in any case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Planning rounds.
+    pub rounds: usize,
+    /// Steps.
+    pub steps: usize,
+}
+
+impl Default for Limits {
+    /// The ten rounds of the experiments. The steps are only there so that an action that never
+    /// starts is not tried for ever.
+    fn default() -> Self {
+        Self {
+            rounds: 10,
+            steps: 100_000,
+        }
+    }
+}
+
+/// Says whether a state is a dead end while these actions are under way: whether the goal could not
+/// be reached from it even if nothing went wrong any more.
+pub type DeadEndWatch<'a> = dyn Fn(&State, &[ActionName]) -> bool + 'a;
+
+/// A ground action: its schema and its arguments.
+pub type ActionName = (SchemaId, Vec<ObjectId>);
+
+/// What a trial is played by.
+pub struct Game<'g> {
+    /// The problem.
+    pub task: &'g Task,
+    /// Who plans.
+    pub plans: &'g mut Plans<'g>,
+    /// Who looks out for dead ends, if somebody does; then each step that ends in one uses up a
+    /// round, and the trial is lost with the last one.
+    pub dead_ends: Option<&'g DeadEndWatch<'g>>,
+    /// When it is over in any case.
+    pub limits: Limits,
+}
+
+/// What was done in a trial.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Actions that have started.
+    pub starts: u64,
+    /// Actions that have ended; of those that take time.
+    pub ends: u64,
+    /// Attempts to start that failed.
+    pub failed_starts: u64,
+}
+
+impl Tally {
+    /// Starts and ends: what the experiments send as messages.
+    pub fn messages(self) -> u64 {
+        self.starts + self.ends
+    }
+
+    /// What the experiments call executed actions: messages and failed starts.
+    pub fn steps(self) -> u64 {
+        self.messages() + self.failed_starts
+    }
+}
+
+/// How a trial went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Trial {
+    /// Whether the goal held when an execution ended.
+    pub is_success: bool,
+    /// Executions without success: 0 if the first plan led to the goal. Where the trial has failed,
+    /// all rounds.
+    pub replans: usize,
+    /// What was done.
+    pub tally: Tally,
+}
+
+/// A world as an executor is given it: it counts what is done.
+pub struct Stage<'w> {
+    task: &'w Task,
+    world: &'w mut dyn UntimedWorld,
+    tally: Tally,
+    most_steps: u64,
+    dead_ends: Option<&'w DeadEndWatch<'w>>,
+    /// What has started in this execution and not ended; known only where dead ends are looked for.
+    running: Vec<ActionName>,
+    rounds_left: usize,
+    is_dead_end: bool,
+    is_lost: bool,
+}
+
+impl Stage<'_> {
+    /// What is true.
+    pub fn state(&self) -> &State {
+        self.world.state()
+    }
+
+    /// Whether a condition holds.
+    pub fn holds(&self, condition: &Condition) -> bool {
+        holds(condition, self.state())
+    }
+
+    /// Whether the goal holds.
+    pub fn is_goal(&self) -> bool {
+        self.holds(self.task.goal())
+    }
+
+    /// Whether nothing may be done any more: all steps are used up ([`Limits::steps`]), or, in a
+    /// dead end, all rounds.
+    pub fn is_over(&self) -> bool {
+        self.is_lost || self.tally.steps() >= self.most_steps
+    }
+
+    /// Whether the last step has ended in a dead end; `None` if nobody looks out for them.
+    pub fn is_dead_end(&self) -> Option<bool> {
+        self.dead_ends.map(|_| self.is_dead_end)
+    }
+
+    /// How many more steps may end in a dead end; the next one after these loses the trial.
+    pub fn patience(&self) -> usize {
+        self.rounds_left.saturating_sub(1)
+    }
+
+    /// Tries to start an action whose start condition holds.
+    pub fn attempt(&mut self, action: &Action) -> bool {
+        let has_started = self.world.attempt(action);
+        if has_started {
+            self.tally.starts += 1;
+        } else {
+            self.tally.failed_starts += 1;
+        }
+        if self.dead_ends.is_some() && has_started && action.durative().is_some() {
+            self.running.push(name_of(action));
+        }
+        self.look_out();
+        has_started
+    }
+
+    /// Ends an action that has started and whose end condition holds.
+    pub fn end(&mut self, action: &Action) {
+        self.world.end(action);
+        self.tally.ends += 1;
+        if self.dead_ends.is_some() {
+            let name = name_of(action);
+            self.running.retain(|other| *other != name);
+        }
+        self.look_out();
+    }
+
+    /// Lets an action go that has started: it will not be ended. That is no step.
+    pub fn let_go(&mut self, action: &Action) {
+        let name = name_of(action);
+        self.running.retain(|other| *other != name);
+    }
+
+    /// Asks whether the step has ended in a dead end, and what that costs.
+    fn look_out(&mut self) {
+        let Some(dead_ends) = self.dead_ends else {
+            return;
+        };
+        self.is_dead_end = dead_ends(self.world.state(), &self.running);
+        if self.is_dead_end {
+            self.rounds_left = self.rounds_left.saturating_sub(1);
+            self.is_lost = self.rounds_left == 0;
+        }
+    }
+}
+
+fn name_of(action: &Action) -> ActionName {
+    (action.schema, action.arguments.clone())
+}
+
+/// Makes a trial.
+pub fn trial(
+    game: &mut Game<'_>,
+    world: &mut dyn UntimedWorld,
+    executor: &mut dyn UntimedExecutor,
+) -> Trial {
+    executor.begin();
+    let mut stage = Stage {
+        task: game.task,
+        world,
+        tally: Tally::default(),
+        most_steps: game.limits.steps as u64,
+        dead_ends: game.dead_ends,
+        running: Vec::new(),
+        rounds_left: game.limits.rounds,
+        is_dead_end: false,
+        is_lost: false,
+    };
+    let mut executions = 0;
+    while stage.rounds_left > 0 && !stage.is_over() {
+        let Some(plan) = (game.plans)(stage.state()) else {
+            break;
+        };
+        stage.rounds_left -= 1;
+        stage.running.clear();
+        stage.is_dead_end = false;
+        executor.execute(&plan, &mut stage);
+        if stage.is_goal() {
+            return Trial {
+                is_success: true,
+                replans: executions,
+                tally: stage.tally,
+            };
+        }
+        executions += 1;
+    }
+    Trial {
+        is_success: false,
+        replans: game.limits.rounds,
+        tally: stage.tally,
+    }
+}
+
+/// Whether a condition holds; one on numbers never does, as there are none
+/// ([`all_actions`] refuses them).
+fn holds(condition: &Condition, state: &State) -> bool {
+    match condition {
+        Condition::Fact(fact) => state.facts.contains(fact),
+        Condition::Compare(..) => false,
+        Condition::Not(part) => !holds(part, state),
+        Condition::And(parts) => parts.iter().all(|part| holds(part, state)),
+        Condition::Or(parts) => parts.iter().any(|part| holds(part, state)),
+    }
+}
+
+/// Needed at the start; all that an instantaneous action needs.
+fn start_of(action: &Action) -> &SnapAction {
+    match &action.body {
+        Body::Instantaneous(snap) => snap,
+        Body::Durative(body) => &body.start,
+    }
+}
+
+/// What a snap action does if nothing goes wrong; additions win over deletions.
+fn apply(snap: &SnapAction, state: &mut State) {
+    for effect in &snap.effects {
+        if let Change::Delete(fact) = effect.change {
+            state.facts.remove(&fact);
+        }
+    }
+    for effect in &snap.effects {
+        if let Change::Add(fact) = effect.change {
+            state.facts.insert(fact);
+        }
+    }
+}

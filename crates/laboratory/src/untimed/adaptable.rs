@@ -1,0 +1,240 @@
+//! Olisipo as the paper has it: [`Adaptable`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use elbowroom_model::ground::FactId;
+use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan};
+use elbowroom_num::Rational;
+use elbowroom_plan::partial_order::partial_order;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_probability::dispatch::{goal_holds, lattermost_layer, patient};
+use elbowroom_probability::{
+    Candidates, Circumstances, Likelihoods, Model, OrderSearch, Running, SearchSettings, Semantics,
+    TotalOrderPlan,
+};
+
+use super::{Stage, UntimedExecutor, start_of};
+
+/// After every step, the lattermost layer that fits says what is next; where none fits, the order
+/// most likely to succeed from here is looked for; where there is none, the plan is given up
+/// (paper 2, Algorithm 1 and section 2.2.1).
+///
+/// A plan is not given up where there is no other: in a dead end, orders count that succeed only if
+/// something changes by itself ([`Candidates::All`]). The paper leaves open what is done there; its
+/// P(A ∩ G) of such an order is not 0, and giving up is no better.
+///
+/// What was chosen is remembered by order, state and what is under way.
+#[derive(Clone, Debug)]
+pub struct Adaptable {
+    task: Arc<Task>,
+    likelihoods: Arc<Likelihoods>,
+    semantics: Semantics,
+    plans: Vec<(Arc<TimeTriggeredPlan>, Option<Prepared>)>,
+}
+
+/// A plan, and what was found out about it.
+#[derive(Clone, Debug)]
+struct Prepared {
+    search: OrderSearch,
+    /// The search for orders that count on luck.
+    lucky: OrderSearch,
+    /// All orders found so far.
+    orders: Vec<TotalOrderPlan>,
+    known: BTreeMap<Key, Chosen>,
+}
+
+/// The present order, what is true, and what is under way.
+type Key = (Option<usize>, BTreeSet<FactId>, Vec<InstanceId>);
+
+#[derive(Clone, Copy, Debug)]
+struct Chosen {
+    /// The happening; `None` to give up, or if the goal is reached.
+    next: Option<NodeId>,
+    order: Option<usize>,
+}
+
+impl Adaptable {
+    /// For plans of this task in a world of these likelihoods. `semantics` is how orders are
+    /// valued: as in the paper, or as the world is.
+    pub fn new(task: Arc<Task>, likelihoods: Arc<Likelihoods>, semantics: Semantics) -> Self {
+        Self {
+            task,
+            likelihoods,
+            semantics,
+            plans: Vec::new(),
+        }
+    }
+
+    fn prepare(&mut self, plan: &Arc<TimeTriggeredPlan>, state: &State) -> usize {
+        let known = self.plans.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
+        known.unwrap_or_else(|| {
+            let prepared =
+                model(&self.task, plan, state, &self.likelihoods, self.semantics).map(|model| {
+                    let model = Arc::new(model);
+                    let lucky = SearchSettings {
+                        candidates: Candidates::All,
+                        ..SearchSettings::default()
+                    };
+                    Prepared {
+                        search: OrderSearch::new(Arc::clone(&model), SearchSettings::default()),
+                        lucky: OrderSearch::new(model, lucky),
+                        orders: Vec::new(),
+                        known: BTreeMap::new(),
+                    }
+                });
+            self.plans.push((Arc::clone(plan), prepared));
+            self.plans.len() - 1
+        })
+    }
+}
+
+/// The model of a plan's happenings; `None` if the likelihoods say nothing of one of its actions.
+pub(super) fn model(
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    state: &State,
+    likelihoods: &Likelihoods,
+    semantics: Semantics,
+) -> Option<Model> {
+    let mut situation = Situation::initial(task);
+    situation.state = state.clone();
+    let task = task.beginning_at(&situation);
+    let plan = partial_order(&task, plan);
+    Model::new(task, plan, likelihoods, semantics).ok()
+}
+
+/// What is known, and what is under way.
+pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstances {
+    let mut circumstances = Circumstances::observed(Rational::ZERO, state);
+    let under_way = running.iter().map(|&instance| Running {
+        instance,
+        start: Rational::ZERO,
+    });
+    circumstances.running = under_way.collect();
+    circumstances
+}
+
+/// Does a happening of a plan, and follows what is under way. Says whether it could be done.
+pub(super) fn perform(
+    model: &Model,
+    node: NodeId,
+    running: &mut Vec<InstanceId>,
+    stage: &mut Stage<'_>,
+) -> bool {
+    match model.plan().nodes[node.index()] {
+        Node::Start(id) | Node::Instant(id) => {
+            let action = &model.plan().instance(id).action;
+            if !stage.holds(&start_of(action).condition) {
+                return false;
+            }
+            if stage.attempt(action) && action.durative().is_some() {
+                running.push(id);
+            }
+        }
+        Node::End(id) => {
+            let action = &model.plan().instance(id).action;
+            let holds =
+                |body: &elbowroom_model::ground::DurativeBody| stage.holds(&body.end.condition);
+            if !action.durative().is_some_and(holds) {
+                return false;
+            }
+            running.retain(|&other| other != id);
+            stage.end(action);
+        }
+        Node::Zero | Node::Timed(_) => return false,
+    }
+    true
+}
+
+impl Prepared {
+    fn choose(
+        &mut self,
+        order: Option<usize>,
+        stage: &Stage<'_>,
+        running: &[InstanceId],
+    ) -> Chosen {
+        let key = (order, stage.state().facts.clone(), running.to_vec());
+        if let Some(known) = self.known.get(&key) {
+            return *known;
+        }
+        let is_dead_end = stage.is_dead_end() == Some(true);
+        let now = circumstances(stage.state(), running);
+        let chosen = self.consider(order, &now, is_dead_end);
+        self.known.insert(key, chosen);
+        chosen
+    }
+
+    fn consider(&mut self, order: Option<usize>, now: &Circumstances, is_dead_end: bool) -> Chosen {
+        let stop = Chosen { next: None, order };
+        if now.running.is_empty() && goal_holds(self.search.model(), now) {
+            return stop;
+        }
+        if let Some(index) = order
+            && let Some((at, _)) = lattermost_layer(&self.search, &self.orders[index], now)
+        {
+            let next = Some(self.orders[index].sequence[at]);
+            return Chosen { next, order };
+        }
+        // A condition that couples too many facts: as if there were no order.
+        let found = self.search.best_order(now, &mut patient).ok();
+        let Some(found) = found.and_then(|found| found.order) else {
+            if is_dead_end && let Some(next) = self.by_luck(now) {
+                return Chosen {
+                    next: Some(next),
+                    order: None,
+                };
+            }
+            // The plan does not lead to the goal from here. What is under way ends before it is
+            // given up: a robot that is let go between two places is at neither.
+            let model = self.search.model();
+            let first = now.running.first();
+            let end = first.and_then(|first| {
+                model
+                    .plan()
+                    .nodes
+                    .iter()
+                    .position(|node| *node == Node::End(first.instance))
+            });
+            return Chosen {
+                next: end.map(NodeId::from),
+                order,
+            };
+        };
+        let next = found.sequence.first().copied();
+        let known = self.orders.iter().position(|order| *order == found);
+        let index = known.unwrap_or(self.orders.len());
+        if known.is_none() {
+            self.orders.push(found);
+        }
+        Chosen {
+            next,
+            order: Some(index),
+        }
+    }
+
+    /// The first happening of the order most likely to succeed, though it cannot without luck.
+    fn by_luck(&mut self, now: &Circumstances) -> Option<NodeId> {
+        let found = self.lucky.best_order(now, &mut patient).ok()?;
+        found.order?.sequence.first().copied()
+    }
+}
+
+impl UntimedExecutor for Adaptable {
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+        let index = self.prepare(plan, stage.state());
+        let Some(prepared) = &mut self.plans[index].1 else {
+            return;
+        };
+        let model = Arc::clone(prepared.search.model());
+        let (mut order, mut running) = (None, Vec::new());
+        while !stage.is_over() {
+            let chosen = prepared.choose(order, stage, &running);
+            order = chosen.order;
+            let is_done = |node| perform(&model, node, &mut running, stage);
+            if !chosen.next.is_some_and(is_done) {
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Paper 2's baseline: [`Esterel`].
+
+use std::sync::Arc;
+
+use elbowroom_model::ground::Action;
+use elbowroom_model::{Situation, State, Step, Task, TimeTriggeredPlan};
+use elbowroom_plan::deorder::deorder;
+use elbowroom_plan::{Bound, Instance, Node, StnPlan};
+
+use super::{Stage, UntimedExecutor, start_of};
+
+/// Executes the deordered plan like `ROSPlan`'s Esterel dispatcher, node by node.
+///
+/// In passes over the happenings in the order of the plan, each is done as soon as all are done
+/// that the network puts before it; the end of an action not in the pass in which it was started. A
+/// failed start ends the pass, and is tried again in the next one, without limit. A condition that
+/// does not hold when its happening is due ends the execution. Over-all conditions and effects are
+/// not watched, and the goal is not looked at before everything is done.
+#[derive(Clone, Debug)]
+pub struct Esterel {
+    task: Arc<Task>,
+    networks: Vec<(Arc<TimeTriggeredPlan>, Vec<Happening>)>,
+}
+
+#[derive(Clone, Debug)]
+struct Happening {
+    action: Arc<Action>,
+    /// The position of its start, if it is an end.
+    start: Option<usize>,
+    /// What must be done before.
+    after: Vec<usize>,
+}
+
+impl Esterel {
+    /// For plans of this task.
+    pub fn new(task: Arc<Task>) -> Self {
+        Self {
+            task,
+            networks: Vec::new(),
+        }
+    }
+
+    fn network(&mut self, plan: &Arc<TimeTriggeredPlan>, state: &State) -> usize {
+        let known = self.networks.iter().position(|(p, _)| Arc::ptr_eq(p, plan));
+        known.unwrap_or_else(|| {
+            let happenings = happenings(&self.task, plan, state);
+            self.networks.push((Arc::clone(plan), happenings));
+            self.networks.len() - 1
+        })
+    }
+}
+
+impl UntimedExecutor for Esterel {
+    fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+        let index = self.network(plan, stage.state());
+        let happenings = &self.networks[index].1;
+        let mut is_done = vec![false; happenings.len()];
+        while !is_done.iter().all(|&done| done) {
+            // That an action has started is heard between passes.
+            let has_started = is_done.clone();
+            for (index, happening) in happenings.iter().enumerate() {
+                let is_due = happening.after.iter().all(|&before| is_done[before])
+                    && happening.start.is_none_or(|start| has_started[start]);
+                if is_done[index] || !is_due {
+                    continue;
+                }
+                if stage.is_over() {
+                    return;
+                }
+                let action = &*happening.action;
+                let body = action.durative().filter(|_| happening.start.is_some());
+                let snap = body.map_or_else(|| start_of(action), |body| &body.end);
+                if !stage.holds(&snap.condition) {
+                    return;
+                }
+                if body.is_some() {
+                    stage.end(action);
+                } else if !stage.attempt(action) {
+                    break;
+                }
+                is_done[index] = true;
+            }
+        }
+    }
+}
+
+/// The happenings of a plan, with what must be done before each.
+fn happenings(task: &Task, plan: &TimeTriggeredPlan, state: &State) -> Vec<Happening> {
+    let mut situation = Situation::initial(task);
+    situation.state = state.clone();
+    let task = task.beginning_at(&situation);
+    let deordered = deorder(&task, plan);
+    let is_ordered = deordered.is_ok();
+    // A planner that makes plans that do not work: what is listed first is done first.
+    let network = deordered.map_or_else(
+        |_| StnPlan::unconstrained(&task, listed(plan)),
+        |deordered| deordered.plan,
+    );
+    let mut happenings: Vec<Happening> = Vec::new();
+    for (node, meaning) in network.nodes() {
+        let (id, start) = match meaning {
+            Node::Start(id) | Node::Instant(id) => (id, None),
+            Node::End(id) => (id, Some(network.start(id).index() - 1)),
+            Node::Zero | Node::Timed(_) => continue,
+        };
+        let before = network.constraints.iter().filter_map(|constraint| {
+            let is_later = matches!(&constraint.lower, Bound::Finite(least) if least.is_positive());
+            (is_later && constraint.to == node && constraint.from.index() > 0)
+                .then(|| constraint.from.index() - 1)
+        });
+        let mut after: Vec<usize> = before.collect();
+        if !is_ordered && node.index() > 1 {
+            after.push(node.index() - 2);
+        }
+        happenings.push(Happening {
+            action: Arc::new(network.instance(id).action.clone()),
+            start,
+            after,
+        });
+    }
+    happenings
+}
+
+/// The actions of a plan as they are listed.
+fn listed(plan: &TimeTriggeredPlan) -> Vec<Instance> {
+    let instance = |(index, step): (usize, &Step)| Instance {
+        label: format!("n{index}"),
+        action: step.action.clone(),
+    };
+    plan.steps.iter().enumerate().map(instance).collect()
+}

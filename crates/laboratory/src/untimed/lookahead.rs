@@ -1,0 +1,107 @@
+//! The executor that knows the world: [`Foresighted`].
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::ground::Action;
+use elbowroom_model::{State, Task, TimeTriggeredPlan};
+use elbowroom_plan::{InstanceId, PartialOrderPlan};
+use elbowroom_probability::likelihoods::Missing;
+use elbowroom_probability::optimum::{Move, NotSmall, Optimum, Perturbed, Settings};
+use elbowroom_probability::{Likelihoods, Model, Semantics};
+
+use super::adaptable::{circumstances, perform};
+use super::{ActionName, Stage, UntimedExecutor};
+
+/// Does what is best in the world of the likelihoods, whatever the plan says: `lookahead` without a
+/// clock.
+#[derive(Clone, Debug)]
+pub struct Foresighted {
+    process: Perturbed,
+    optimum: Optimum,
+    instances: BTreeMap<ActionName, InstanceId>,
+}
+
+/// The world cannot be tabulated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoForesight {
+    /// Likelihoods are missing.
+    #[error(transparent)]
+    Missing(#[from] Missing),
+    /// The world is too large, or of another kind.
+    #[error(transparent)]
+    NotSmall(#[from] NotSmall),
+}
+
+impl Foresighted {
+    /// Tabulates the world.
+    ///
+    /// # Errors
+    /// When likelihoods are missing, or the world is too large.
+    pub fn new(
+        task: &Arc<Task>,
+        actions: Vec<Action>,
+        likelihoods: &Likelihoods,
+        settings: Settings,
+    ) -> Result<Self, NoForesight> {
+        let plan = PartialOrderPlan::unordered(task, actions);
+        let model = Model::new(Arc::clone(task), plan, likelihoods, Semantics::World)?;
+        let process = Perturbed::new(model, settings)?;
+        let optimum = process.optimum();
+        let instances = process.model().plan().instances();
+        let instances = instances.map(|(id, instance)| {
+            let action = &instance.action;
+            ((action.schema, action.arguments.clone()), id)
+        });
+        Ok(Self {
+            instances: instances.collect(),
+            process,
+            optimum,
+        })
+    }
+
+    /// Whether who plans finds no plan from here; what is not in the table is not called a dead
+    /// end. See [`Game::dead_ends`](super::Game::dead_ends).
+    pub fn is_dead_end(&self, state: &State, running: &[ActionName]) -> bool {
+        let find = |name: &ActionName| self.instances.get(name).copied();
+        let running: Option<Vec<InstanceId>> = running.iter().map(find).collect();
+        running.is_some_and(|running| self.process.is_dead_end_at(state, &running))
+    }
+
+    /// The best success probability that any executor can have from the beginning.
+    pub fn value(&self) -> f64 {
+        let initial = self.process.model().task().initial();
+        self.optimum
+            .value(&self.process, &circumstances(initial, &[]))
+    }
+}
+
+impl UntimedExecutor for Foresighted {
+    fn execute(&mut self, _: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>) {
+        let model = Arc::clone(self.process.model());
+        let mut running: Vec<InstanceId> = Vec::new();
+        while !(stage.is_over() || running.is_empty() && stage.is_goal()) {
+            // Where nobody looks out for dead ends, luck is not tried, as it could be for ever.
+            if stage.is_dead_end().is_none() && self.process.is_dead_end_at(stage.state(), &running)
+            {
+                return;
+            }
+            let patience = stage.patience();
+            let chosen = self
+                .optimum
+                .choose_at(&self.process, stage.state(), &running, patience);
+            match chosen {
+                Move::Do(node) => {
+                    if !perform(&model, node, &mut running, stage) {
+                        return;
+                    }
+                }
+                Move::Abandon(id) => {
+                    running.retain(|&other| other != id);
+                    stage.let_go(&model.plan().instance(id).action);
+                }
+                Move::Stop => return,
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The executors without time: one list of them all. To add one: a file with its
+//! [`UntimedExecutor`], and an entry in [`EXECUTORS`].
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use elbowroom_execution::executors;
+use elbowroom_model::Task;
+use elbowroom_probability::{Likelihoods, Semantics};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{Adaptable, AsPublished, Esterel, Foresighted, NoForesight, UntimedExecutor};
+
+/// What there is to know of an executor before there is one.
+#[derive(Clone, Copy)]
+pub struct Registered {
+    /// Its name. What exists on a clock, too, has the same name there
+    /// ([`executors::EXECUTORS`]).
+    pub name: &'static str,
+    /// What it does, in one sentence or two.
+    pub summary: &'static str,
+    /// Where it comes from.
+    pub paper: &'static str,
+    /// Makes one.
+    make: fn(&Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight>,
+}
+
+/// What an executor may ask.
+pub struct Means<'m> {
+    /// The problem.
+    pub task: Arc<Task>,
+    /// How likely everything is.
+    pub likelihoods: Arc<Likelihoods>,
+    /// The table of the sound world, made when it is first asked for.
+    pub foresight: &'m dyn Fn() -> Result<Foresighted, NoForesight>,
+}
+
+/// Every executor, in the order in which results list them.
+pub const EXECUTORS: &[Registered] = &[
+    Registered {
+        name: "esterel",
+        summary: "The baseline: happenings as soon as the network allows, failed starts again \
+                  without limit, a new plan when a condition is false.",
+        paper: "the Esterel Dispatcher of ROSPlan, in Ribeiro et al. (2021), section 3",
+        make: |means| Ok(Box::new(Esterel::new(Arc::clone(&means.task)))),
+    },
+    Registered {
+        name: "adaptable",
+        summary: "The paper's PGen and PExec. What is under way is ended before a plan is given \
+                  up. In a dead end, where there is no other plan, it does what its plan has the \
+                  best chance with, counting on luck.",
+        paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
+        make: |means| {
+            let (task, likelihoods) = means.both();
+            Ok(Box::new(Adaptable::new(
+                task,
+                likelihoods,
+                Semantics::Paper,
+            )))
+        },
+    },
+    Registered {
+        name: "as-published",
+        summary: "The authors' program: the last order found instead of the best, and no second \
+                  search. When its order no longer fits, it does nothing more (theirs did a \
+                  little, to no avail).",
+        paper: "the program behind the results of Ribeiro et al. (2021)",
+        make: |means| {
+            let (task, likelihoods) = means.both();
+            Ok(Box::new(AsPublished::new(task, likelihoods)))
+        },
+    },
+    Registered {
+        name: "lookahead",
+        summary: "What is best in the sound world (`docs/probability.md`), without regard to the \
+                  plan. It is exact where at most `most_running` actions are under way at once.",
+        paper: "goes beyond Ribeiro et al. (2021)",
+        make: |means| Ok(Box::new((means.foresight)()?)),
+    },
+];
+
+impl Means<'_> {
+    fn both(&self) -> (Arc<Task>, Arc<Likelihoods>) {
+        (Arc::clone(&self.task), Arc::clone(&self.likelihoods))
+    }
+}
+
+impl fmt::Debug for Registered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Registered({})", self.name)
+    }
+}
+
+/// An executor of the list, by its name; in the order of the list.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ExecutorName(usize);
+
+impl ExecutorName {
+    /// What is registered under the name.
+    pub fn registered(self) -> &'static Registered {
+        &EXECUTORS[self.0]
+    }
+
+    /// The name.
+    pub fn name(self) -> &'static str {
+        self.registered().name
+    }
+
+    /// Makes the executor.
+    ///
+    /// # Errors
+    /// When it needs a table of the world, and there can be none.
+    pub fn build(self, means: &Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight> {
+        (self.registered().make)(means)
+    }
+}
+
+/// There is no executor of that name where there is no time.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "there is no executor `{name}`{clock}; choose one of {known}",
+    clock = if *.needs_clock { " without a clock" } else { "" },
+    known = EXECUTORS.iter().map(|known| known.name).collect::<Vec<_>>().join(", ")
+)]
+pub struct UnknownExecutor {
+    /// What was asked for.
+    pub name: String,
+    /// Whether there is one on a clock.
+    pub needs_clock: bool,
+}
+
+impl FromStr for ExecutorName {
+    type Err = UnknownExecutor;
+
+    fn from_str(name: &str) -> Result<Self, UnknownExecutor> {
+        let found = EXECUTORS.iter().position(|known| known.name == name);
+        found.map(Self).ok_or_else(|| UnknownExecutor {
+            name: name.to_owned(),
+            needs_clock: name.parse::<executors::ExecutorSpec>().is_ok(),
+        })
+    }
+}
+
+impl fmt::Debug for ExecutorName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Serialize for ExecutorName {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.name().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for ExecutorName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        name.parse().map_err(D::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EXECUTORS, ExecutorName};
+
+    #[test]
+    fn names_are_read_as_they_are_written_and_sorted_as_they_are_listed() {
+        let names = EXECUTORS.iter().map(|known| known.name);
+        let read: Vec<ExecutorName> = names.clone().map(|name| name.parse().unwrap()).collect();
+        assert!(read.is_sorted());
+        assert!(read.iter().map(|read| read.name()).eq(names));
+    }
+
+    #[test]
+    fn an_executor_that_needs_a_clock_is_told_from_one_that_nobody_knows() {
+        let wrong = |name: &str| name.parse::<ExecutorName>().unwrap_err().to_string();
+        assert!(wrong("guarded").contains("`guarded` without a clock"));
+        assert!(wrong("gaurded").starts_with("there is no executor `gaurded`; choose one of"));
+        assert!(wrong("guarded").ends_with("esterel, adaptable, as-published, lookahead"));
+    }
+
+    #[test]
+    fn the_page_says_of_each_executor_what_the_list_says() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../docs/perturbed-worlds.md"
+        );
+        let page = std::fs::read_to_string(path).unwrap();
+        for known in EXECUTORS {
+            let row = format!("| `{}` | {} |\n", known.name, known.summary);
+            assert!(page.contains(&row), "docs/perturbed-worlds.md lacks\n{row}");
+        }
+    }
+}

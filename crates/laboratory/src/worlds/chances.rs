@@ -1,0 +1,112 @@
+//! The likelihoods of a task's facts and actions, ready to be drawn: [`Chances`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, FactId, SnapAction};
+use elbowroom_model::problem::{ObjectId, SchemaId};
+use elbowroom_probability::likelihoods::Missing;
+use elbowroom_probability::{Flip, Likelihoods};
+
+/// What is drawn in a perturbed world, and with which probabilities.
+#[derive(Clone, Debug)]
+pub struct Chances {
+    /// How each fact changes by itself.
+    pub(super) flips: Vec<(FactId, Flip)>,
+    actions: BTreeMap<(SchemaId, Vec<ObjectId>), ActionChances>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct ActionChances {
+    /// An attempt to start succeeds.
+    pub(super) start: f64,
+    pub(super) start_effects: Vec<EffectChance>,
+    pub(super) end_effects: Vec<EffectChance>,
+}
+
+/// An effect; in lists of them, deletions come first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EffectChance {
+    pub(super) fact: FactId,
+    pub(super) makes_true: bool,
+    pub(super) probability: f64,
+}
+
+impl Chances {
+    /// The chances of all facts of the task and of these actions.
+    ///
+    /// Facts that no action changes, and that the likelihoods do not mention, never change.
+    ///
+    /// # Errors
+    /// When the likelihoods say nothing of something that matters.
+    pub fn new(
+        task: &Task,
+        actions: &[Action],
+        likelihoods: &Likelihoods,
+    ) -> Result<Self, Missing> {
+        let mut changed = BTreeSet::new();
+        let mut chances = BTreeMap::new();
+        for action in actions {
+            let effects = |snap: &SnapAction| effects(task, action, snap, likelihoods);
+            let (start_effects, end_effects) = match &action.body {
+                Body::Instantaneous(snap) => (effects(snap)?, Vec::new()),
+                Body::Durative(body) => (effects(&body.start)?, effects(&body.end)?),
+            };
+            let all = start_effects.iter().chain(&end_effects);
+            changed.extend(all.map(|effect| task.atom(effect.fact).0));
+            let start = likelihoods.start(action)?;
+            chances.insert(
+                (action.schema, action.arguments.clone()),
+                ActionChances {
+                    start,
+                    start_effects,
+                    end_effects,
+                },
+            );
+        }
+        let mut flips = Vec::new();
+        let count = u32::try_from(task.fact_count()).unwrap_or(u32::MAX);
+        for fact in (0..count).map(FactId) {
+            let (predicate, arguments) = task.atom(fact);
+            let named = (predicate, arguments.clone());
+            let is_mentioned = likelihoods.predicates.contains_key(&predicate)
+                || likelihoods.facts.contains_key(&named);
+            if is_mentioned || changed.contains(&predicate) {
+                flips.push((fact, likelihoods.flip(task, fact)?));
+            }
+        }
+        Ok(Self {
+            flips,
+            actions: chances,
+        })
+    }
+
+    /// Those of an action. One that is not among those of [`Chances::new`] never starts.
+    pub(super) fn of(&self, action: &Action) -> Option<&ActionChances> {
+        self.actions.get(&(action.schema, action.arguments.clone()))
+    }
+}
+
+fn effects(
+    task: &Task,
+    action: &Action,
+    snap: &SnapAction,
+    likelihoods: &Likelihoods,
+) -> Result<Vec<EffectChance>, Missing> {
+    let change = |effect: &elbowroom_model::ground::Effect| match effect.change {
+        Change::Delete(fact) => Some((false, fact)),
+        Change::Add(fact) => Some((true, fact)),
+        Change::Update { .. } => None,
+    };
+    let mut changes: Vec<_> = snap.effects.iter().filter_map(change).collect();
+    // Stable: otherwise in the order of the domain.
+    changes.sort_by_key(|(makes_true, _)| *makes_true);
+    let with_likelihood = |(makes_true, fact): (bool, FactId)| {
+        Ok(EffectChance {
+            fact,
+            makes_true,
+            probability: likelihoods.effect(task, action, fact, makes_true)?,
+        })
+    };
+    changes.into_iter().map(with_likelihood).collect()
+}

@@ -1,0 +1,91 @@
+//! A world that does what the likelihoods say: [`SoundWorld`].
+
+use crate::untimed::UntimedWorld;
+use elbowroom_model::State;
+use elbowroom_model::ground::Action;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::chances::{Chances, EffectChance};
+use elbowroom_sim::draw::{Purpose, keyed};
+
+/// Every draw is independent of all others.
+///
+/// An attempt to start succeeds with its probability; an effect takes place with its own, and
+/// otherwise leaves the fact as it was, deletions before additions. After each attempt, successful
+/// or not, and each end, every fact may change by itself once.
+///
+/// It is the world of [`optimum`](elbowroom_probability::optimum). Starts, effects and changes draw
+/// from three sources that depend on the seed only, so two executors that do the same meet the
+/// same.
+#[derive(Clone, Debug)]
+pub struct SoundWorld<'a> {
+    chances: &'a Chances,
+    state: State,
+    starts: ChaCha8Rng,
+    effects: ChaCha8Rng,
+    changes: ChaCha8Rng,
+}
+
+impl<'a> SoundWorld<'a> {
+    /// The world of that seed, in this state.
+    pub fn new(chances: &'a Chances, initial: &State, seed: u64) -> Self {
+        Self {
+            chances,
+            state: initial.clone(),
+            starts: keyed(seed, "", 0, Purpose::Failure),
+            effects: keyed(seed, "", 0, Purpose::Effect),
+            changes: keyed(seed, "", 0, Purpose::Change),
+        }
+    }
+
+    fn take_effect(&mut self, effects: &[EffectChance]) {
+        for effect in effects {
+            if self.effects.random::<f64>() >= effect.probability {
+                continue;
+            }
+            if effect.makes_true {
+                self.state.facts.insert(effect.fact);
+            } else {
+                self.state.facts.remove(&effect.fact);
+            }
+        }
+    }
+
+    fn change(&mut self) {
+        for &(fact, flip) in &self.chances.flips {
+            let draw = self.changes.random::<f64>();
+            if self.state.facts.contains(&fact) {
+                if draw < flip.becomes_false {
+                    self.state.facts.remove(&fact);
+                }
+            } else if draw < flip.becomes_true {
+                self.state.facts.insert(fact);
+            }
+        }
+    }
+}
+
+impl UntimedWorld for SoundWorld<'_> {
+    fn state(&self) -> &State {
+        &self.state
+    }
+
+    fn attempt(&mut self, action: &Action) -> bool {
+        let chances = self.chances.of(action);
+        let draw = self.starts.random::<f64>();
+        let started = chances.filter(|chances| draw < chances.start);
+        if let Some(chances) = started {
+            self.take_effect(&chances.start_effects);
+        }
+        self.change();
+        started.is_some()
+    }
+
+    fn end(&mut self, action: &Action) {
+        if let Some(chances) = self.chances.of(action) {
+            self.take_effect(&chances.end_effects);
+        }
+        self.change();
+    }
+}

@@ -1,0 +1,147 @@
+//! Experiments: the same result for any number of threads, and parts that add up.
+
+use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
+
+/// A file of the project, by its path from the root.
+fn read(path: &str) -> String {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::fs::read_to_string(root.join(path)).expect("a correct test")
+}
+
+fn experiment() -> Experiment {
+    let text = read("experiments/table1.toml");
+    let file = |name: &str| Ok(read(&format!("experiments/{name}")));
+    let mut experiment = Experiment::read(&text, &file).expect("a correct test");
+    for values in experiment.blanks.values_mut() {
+        *values = vec![values[4].clone()];
+    }
+    experiment.columns.truncate(2);
+    experiment
+}
+
+const WHOLE: Part = Part {
+    trials: 6,
+    shard: 0,
+    shards: 1,
+    jobs: 1,
+};
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads_and_parts_add_up() {
+    let experiment = experiment();
+    let make = |part| run(&experiment, part, &|_| true).expect("a correct test");
+    let whole = make(WHOLE);
+    assert_eq!(whole, make(Part { jobs: 3, ..WHOLE }));
+    let parts = [0, 1, 2].map(|shard| {
+        make(Part {
+            shard,
+            shards: 3,
+            ..WHOLE
+        })
+    });
+    assert_eq!(Results::merged(&parts).expect("a correct test"), whole);
+    assert!(Results::merged(&[parts[0].clone(), parts[0].clone()]).is_err());
+    let text = whole.json().to_string();
+    assert_eq!(Results::read(&text).expect("a correct test"), whole);
+}
+
+#[test]
+fn mistakes_in_an_experiment_have_their_line() {
+    let text = read("experiments/table1.toml");
+    let file = |name: &str| Ok(read(&format!("experiments/{name}")));
+    let broken = text.replace("\"fixed:10\"", "\"fixed:ten\"");
+    let error = Experiment::read(&broken, &file).unwrap_err().to_string();
+    let line = 1 + text[..text.find("fixed:10").expect("a correct test")]
+        .matches('\n')
+        .count();
+    assert!(error.starts_with(&format!("text:{line}:")), "{error}");
+}
+
+/// `clumsy.toml` with few trials.
+fn clumsy(change: &dyn Fn(&str) -> String) -> Result<Experiment, String> {
+    let file = |name: &str| Ok(read(&format!("experiments/{name}")));
+    let text = change(&read("experiments/clumsy.toml"));
+    Experiment::read(&text, &file).map_err(|error| error.to_string())
+}
+
+/// Three starts in ten fail, which no executor can know but by the likelihoods.
+#[test]
+fn a_column_says_how_likely_everything_is() {
+    let told = clumsy(&str::to_owned).expect("a correct test");
+    let untold = clumsy(&|text| {
+        let lines = text.lines();
+        let kept = lines.filter(|line| !line.starts_with("likelihoods"));
+        kept.collect::<Vec<_>>().join("\n")
+    });
+    let untold = untold.expect("a correct test");
+    let part = Part {
+        trials: 60,
+        ..WHOLE
+    };
+    let make = |experiment| run(experiment, part, &|_| true).expect("a correct test");
+    let (told, untold) = (make(&told), make(&untold));
+    let row = |name: &str| told.rows.iter().position(|row| row == name).unwrap();
+    let (adaptable, failing) = (row("adaptable"), 1);
+    // Told, it tries failed starts again; untold, a start is certain, and so a failure is a reason
+    // to plan anew.
+    assert_eq!(told.cells[adaptable][failing].replans, 0);
+    assert!(untold.cells[adaptable][failing].replans > 30);
+    for other in ["esterel", "stn", "guarded", "live"].map(row) {
+        assert_eq!(
+            told.cells[other], untold.cells[other],
+            "{}",
+            told.rows[other]
+        );
+    }
+}
+
+#[test]
+fn mistakes_about_likelihoods_are_told_with_their_place() {
+    let text = read("experiments/clumsy.toml");
+    let line = 1 + text[..text
+        .find("clumsy/starts-fail.toml")
+        .expect("a correct test")]
+        .matches('\n')
+        .count();
+    let file = |name: &str| match name {
+        "clumsy/starts-fail.toml" => Err("cannot read it".to_owned()),
+        name => Ok(read(&format!("experiments/{name}"))),
+    };
+    let error = Experiment::read(&text, &file).unwrap_err().to_string();
+    assert!(error.starts_with(&format!("text:{line}:")), "{error}");
+    assert!(error.ends_with(": error: cannot read it"), "{error}");
+    let file = |name: &str| {
+        let text = read(&format!("experiments/{name}"));
+        Ok(text.replace("facts.unlocked", "facts.unlokced"))
+    };
+    let experiment = Experiment::read(&text, &file).expect("a correct test");
+    let error = run(&experiment, WHOLE, &|_| true).unwrap_err().to_string();
+    assert!(
+        error.contains("likelihoods of and the door locks:11:"),
+        "{error}"
+    );
+    assert!(error.contains("unlokced"), "{error}");
+}
+
+/// What results are kept under must not change with how the program is written.
+#[test]
+fn the_fingerprint_of_an_experiment_depends_on_what_it_says_and_stays() {
+    let made = |change: &dyn Fn(&mut Experiment)| {
+        let mut experiment = experiment();
+        change(&mut experiment);
+        Results::empty(&experiment, WHOLE).fingerprint
+    };
+    let same = made(&|_| {});
+    assert_eq!(same, made(&|experiment| experiment.title.clear()));
+    assert_eq!(same, made(&|experiment| experiment.published.clear()));
+    let others = [
+        made(&|experiment| experiment.seed += 1),
+        made(&|experiment| experiment.domain.push(' ')),
+        made(&|experiment| experiment.executors.reverse()),
+        made(&|experiment| experiment.columns.reverse()),
+        made(&|experiment| experiment.settings.most_replans += 1),
+        made(&|experiment| experiment.planner_states += 1),
+    ];
+    let different: std::collections::BTreeSet<_> = others.iter().chain([&same]).collect();
+    assert_eq!(different.len(), others.len() + 1);
+}

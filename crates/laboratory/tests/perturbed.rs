@@ -1,0 +1,178 @@
+//! Paper 2's experiments.
+#![allow(clippy::unwrap_used, reason = "a helper that panics fails the test")]
+
+use std::fs;
+use std::path::Path;
+
+use elbowroom_laboratory::compare::Part;
+use elbowroom_laboratory::perturbed::{
+    self, PerturbedExperiment, PerturbedResults, PlannerKind, Row, WorldKind,
+};
+
+fn experiment(name: &str) -> PerturbedExperiment {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
+    let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
+    PerturbedExperiment::read(&file(name).unwrap(), &file).unwrap()
+}
+
+fn part(trials: u64, jobs: usize) -> Part {
+    Part {
+        trials,
+        shard: 0,
+        shards: 1,
+        jobs,
+    }
+}
+
+fn rows(name: &str, world: WorldKind, trials: u64) -> Vec<Row> {
+    let mut experiment = experiment(name);
+    experiment.worlds = vec![world];
+    perturbed::run(&experiment, part(trials, 0), &|_| true)
+        .unwrap()
+        .rows
+}
+
+fn share(rows: &[Row], case: &str, executor: &str) -> f64 {
+    let is_it = |row: &&Row| row.case == case && row.executor.name() == executor;
+    rows.iter().find(is_it).unwrap().success.share().unwrap()
+}
+
+#[test]
+fn the_published_success_rates_come_out_where_the_world_is_as_published() {
+    for (name, count) in [("olisipo_sf3.toml", 20), ("olisipo_af3.toml", 16)] {
+        let rows = rows(name, WorldKind::AsPublished, 1000);
+        let distances: Vec<f64> = rows.iter().filter_map(Row::distance).collect();
+        assert_eq!(distances.len(), count);
+        for (row, distance) in rows
+            .iter()
+            .filter(|row| row.published.is_some())
+            .zip(&distances)
+        {
+            assert!(
+                distance.abs() < 3.5,
+                "{} {}: {distance}",
+                row.case,
+                row.executor.name()
+            );
+        }
+        let outside = distances
+            .iter()
+            .filter(|distance| distance.abs() > 1.96)
+            .count();
+        assert!(outside <= 3, "{name}: {distances:?}");
+    }
+}
+
+#[test]
+fn the_lookahead_succeeds_as_often_as_its_table_says() {
+    for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
+        let rows = rows(name, WorldKind::Sound, 1000).into_iter();
+        for row in rows.filter(|row| row.executor.name() == "lookahead") {
+            let optimum = row.optimum.unwrap();
+            let share = row.success.share().unwrap();
+            let deviation = (optimum * (1.0 - optimum) / 1000.0).sqrt();
+            let distance = (share - optimum) / deviation;
+            assert!(distance.abs() < 4.0, "{}: {share} {optimum}", row.case);
+        }
+    }
+}
+
+#[test]
+fn olisipo_succeeds_more_often_than_esterel_in_a_sound_world_and_no_more_often_than_can_be() {
+    for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
+        let rows = rows(name, WorldKind::Sound, 2000);
+        for case in &experiment(name).cases {
+            let adaptable = share(&rows, &case.name, "adaptable");
+            let esterel = share(&rows, &case.name, "esterel");
+            assert!(adaptable > esterel, "{}: {adaptable} {esterel}", case.name);
+        }
+        for row in rows {
+            let optimum = row.optimum.unwrap();
+            let share = row.success.share().unwrap();
+            let deviation = (optimum * (1.0 - optimum) / 2000.0).sqrt();
+            assert!(share < optimum + 4.0 * deviation, "{row:?}");
+        }
+    }
+}
+
+/// The whole is the same for any number of threads, and the sum of its parts, in any order.
+fn parts_add_up(experiment: &PerturbedExperiment, trials: u64) -> PerturbedResults {
+    let run = |part| perturbed::run(experiment, part, &|_| true).unwrap();
+    let whole = run(part(trials, 1));
+    assert_eq!(whole, run(part(trials, 3)));
+    let shard = |shard| Part {
+        shard,
+        shards: 2,
+        ..part(trials, 2)
+    };
+    let parts = [run(shard(1)), run(shard(0))]
+        .map(|part| PerturbedResults::read(&part.json().to_string()).unwrap());
+    assert_ne!(parts[0], whole);
+    assert_eq!(PerturbedResults::merged(&parts).unwrap(), whole);
+    let twice = [parts[0].clone(), parts[0].clone()];
+    assert!(PerturbedResults::merged(&twice).is_err());
+    assert!(PerturbedResults::merged(&[parts[0].clone(), run(part(trials - 1, 1))]).is_err());
+    whole
+}
+
+#[test]
+fn results_do_not_depend_on_how_many_run_at_once_and_parts_add_up() {
+    let whole = parts_add_up(&experiment("olisipo_sf3.toml"), 21);
+    for (name, plot) in perturbed::plots(&whole) {
+        assert!(plot.svg().unwrap().contains("SF3 p10"), "{name}");
+    }
+}
+
+/// Two cases of one of the experiments, with plans of the embedded planner.
+fn with_embedded_plans(name: &str) -> PerturbedExperiment {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
+    let file = |name: &str| fs::read_to_string(folder.join(name)).map_err(|e| e.to_string());
+    let text = file(name).unwrap();
+    // What stands behind a table's heading belongs to the table.
+    let text = text.replacen("\ntrials", "\nplanner = \"embedded\"\ntrials", 1);
+    let mut read = PerturbedExperiment::read(&text, &file).unwrap();
+    assert_eq!(read.planner, PlannerKind::Embedded);
+    read.cases = read.cases.split_off(2);
+    read.cases.truncate(2);
+    read
+}
+
+#[test]
+fn plans_of_the_embedded_planner_are_the_same_for_any_number_of_threads_and_in_parts() {
+    for (name, has_other_plans) in [("olisipo_sf3.toml", false), ("olisipo_af3.toml", true)] {
+        let experiment = with_embedded_plans(name);
+        let whole = parts_add_up(&experiment, 60);
+        // In SF3, the shortest plan is the only one that does nothing in vain.
+        let other = PerturbedExperiment {
+            planner: PlannerKind::Shortest,
+            ..experiment
+        };
+        let shortest = perturbed::run(&other, part(60, 0), &|_| true).unwrap();
+        assert!((whole.rows != shortest.rows) == has_other_plans, "{name}");
+        assert_ne!(whole.fingerprint, shortest.fingerprint);
+        assert!(PerturbedResults::merged(&[whole.clone(), shortest.clone()]).is_err());
+        // Who does not go by a plan, does the same whoever plans.
+        let foresighted = |results: &PerturbedResults| {
+            let rows = results.rows.iter();
+            let rows = rows
+                .filter(|row| row.executor.name() == "lookahead" && row.world == WorldKind::Sound);
+            rows.cloned().collect::<Vec<Row>>()
+        };
+        assert_eq!(foresighted(&whole), foresighted(&shortest));
+    }
+}
+
+#[test]
+fn with_plans_of_the_embedded_planner_nobody_succeeds_more_often_than_can_be() {
+    for name in ["olisipo_sf3.toml", "olisipo_af3.toml"] {
+        let mut experiment = with_embedded_plans(name);
+        experiment.worlds = vec![WorldKind::Sound];
+        let rows = perturbed::run(&experiment, part(500, 0), &|_| true).unwrap();
+        for row in &rows.rows {
+            let (optimum, share) = (row.optimum.unwrap(), row.success.share().unwrap());
+            let deviation = (optimum * (1.0 - optimum) / 500.0).sqrt();
+            assert!(share < optimum + 4.0 * deviation, "{row:?}");
+            assert!(share > 0.05, "{row:?}");
+        }
+    }
+}

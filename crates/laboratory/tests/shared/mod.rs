@@ -1,0 +1,37 @@
+//! Benchmark files beside the repository. Tests that need them say so and pass where they are
+//! absent.
+#![allow(clippy::print_stdout, reason = "a test that is skipped should say so")]
+
+use std::path::{Path, PathBuf};
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_problem};
+
+/// The folder of benchmark data, if it is there.
+pub(crate) fn data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    println!("skipped: there is no {}", folder.display());
+    None
+}
+
+/// The task of a domain and a problem file, or what is wrong with them.
+pub(crate) fn task(domain: &Path, problem: &Path) -> Result<Task, String> {
+    let source = |path: &Path| {
+        let read = std::fs::read(path);
+        let bytes = read.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        Source::from_bytes(path.display().to_string(), &bytes)
+    };
+    match read_problem(&source(domain), &source(problem)) {
+        Ok((problem, _)) => Ok(Task::new(problem)),
+        Err(diagnostics) => Err(diagnostics.render(false)),
+    }
+}
+
+/// A number as one writes it.
+pub(crate) fn number(text: &str) -> Rational {
+    text.parse().expect("a correct test")
+}

@@ -1,0 +1,80 @@
+//! Where plans begin, in the numbers of the search.
+
+use elbowroom_model::{RunningAction, Situation};
+use elbowroom_num::{End, Rational};
+
+use super::Action;
+use super::times::known_duration;
+use crate::embedded::time::{Scale, Ticks};
+
+/// A situation: what holds, and what is under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Beginning {
+    /// When it is, exactly.
+    pub(crate) time: Rational,
+    /// By the search's numbers; the truth of derived facts is left open.
+    pub(crate) facts: Vec<bool>,
+    pub(crate) values: Vec<Option<Rational>>,
+    /// What the metric has summed up so far.
+    pub(crate) cost: Rational,
+    /// What is under way: the first actions, in their order.
+    pub(crate) running: Vec<Running>,
+}
+
+/// An action that is under way.
+#[derive(Clone, Debug)]
+pub(crate) struct Running {
+    pub(crate) start: Ticks,
+    pub(crate) least: Ticks,
+    pub(crate) most: Option<Ticks>,
+    /// The duration, if it leaves no choice.
+    pub(crate) duration: Option<Rational>,
+}
+
+/// What is under way in a situation, and whether its times lie on the grid.
+pub(super) fn running(situation: &Situation, scale: Scale) -> (Vec<Running>, bool) {
+    let mut is_exact = true;
+    let running = situation.running.iter().map(|running| {
+        let (running, exact) = one(running, &situation.time, scale);
+        is_exact &= exact;
+        running
+    });
+    (running.collect(), is_exact)
+}
+
+fn one(running: &RunningAction, now: &Rational, scale: Scale) -> (Running, bool) {
+    let (start, start_is_exact) = scale.floor(&running.start);
+    let (least, least_is_exact) = match &running.duration.lower {
+        End::Infinite => (0, true),
+        End::Closed(value) => scale.ceil(value),
+        End::Open(value) => (scale.floor(value).0 + 1, false),
+    };
+    let elapsed = now - &running.start;
+    let (most, most_is_exact) = match &running.duration.upper {
+        End::Infinite => (None, true),
+        End::Closed(value) => {
+            let (ticks, is_exact) = scale.floor(value);
+            (Some(ticks), is_exact)
+        }
+        End::Open(value) => (Some(scale.ceil(value).0 - 1), false),
+    };
+    let running = Running {
+        start,
+        least: least.max(scale.ceil(&elapsed).0),
+        most,
+        duration: known_duration(running).cloned(),
+    };
+    (running, start_is_exact && least_is_exact && most_is_exact)
+}
+
+/// Whether all that changes continuously in the beginning has a value to change.
+pub(super) fn has_values_to_change(
+    actions: &[Action],
+    running: usize,
+    values: &[Option<Rational>],
+) -> bool {
+    let flows = actions[..running].iter().flat_map(|action| &action.flows);
+    flows
+        .filter(|flow| flow.rate.value(values, None).is_some())
+        .all(|flow| values[flow.fluent as usize].is_some())
+}

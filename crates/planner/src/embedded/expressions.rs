@@ -1,0 +1,109 @@
+//! Numbers as linear expressions over the times of happenings (COLIN; Coles, Coles, Fox & Long, IJCAI
+//! 2009).
+
+use elbowroom_model::problem::Comparison;
+use elbowroom_num::Rational;
+
+use super::network::NodeId;
+
+/// `constant + Σ coefficient · time of node`, in units of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Form {
+    /// Ascending, without zeros.
+    pub(crate) terms: Vec<(NodeId, Rational)>,
+    pub(crate) constant: Rational,
+}
+
+/// A number that moves: `base + rate · now`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Course {
+    pub(crate) base: Form,
+    pub(crate) rate: Rational,
+}
+
+/// The numbers of a state that depend on times, and what has been demanded of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Symbolic {
+    /// By fluent; those have no value in `State::values`.
+    pub(crate) courses: Vec<(u32, Course)>,
+    /// `form comparison 0`.
+    pub(crate) demands: Vec<(Form, Comparison)>,
+}
+
+/// When something is read: the time, and the duration of the action that reads.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Moment {
+    pub(crate) time: Form,
+    pub(crate) duration: Option<Form>,
+}
+
+impl Form {
+    pub(crate) fn constant(constant: Rational) -> Self {
+        Self {
+            terms: Vec::new(),
+            constant,
+        }
+    }
+
+    /// The time of a node.
+    pub(crate) fn node(node: NodeId) -> Self {
+        Self {
+            terms: vec![(node, Rational::ONE)],
+            constant: Rational::ZERO,
+        }
+    }
+
+    pub(crate) fn as_constant(&self) -> Option<&Rational> {
+        self.terms.is_empty().then_some(&self.constant)
+    }
+
+    /// `self + factor · other`
+    pub(crate) fn plus(mut self, factor: &Rational, other: &Self) -> Self {
+        for (node, coefficient) in &other.terms {
+            let change = factor * coefficient;
+            match self.terms.binary_search_by_key(node, |term| term.0) {
+                Ok(found) => self.terms[found].1 += change,
+                Err(place) => self.terms.insert(place, (*node, change)),
+            }
+        }
+        self.terms.retain(|term| !term.1.is_zero());
+        self.constant += factor * &other.constant;
+        self
+    }
+
+    pub(crate) fn times(&self, factor: &Rational) -> Self {
+        Self::default().plus(factor, self)
+    }
+
+    pub(crate) fn at(&self, times: &[Rational]) -> Rational {
+        let terms = self.terms.iter();
+        terms.fold(self.constant.clone(), |sum, (node, coefficient)| {
+            sum + coefficient * &times[usize::from(*node)]
+        })
+    }
+}
+
+impl Symbolic {
+    pub(crate) fn course(&self, fluent: u32) -> Option<&Course> {
+        let place = self.courses.binary_search_by_key(&fluent, |entry| entry.0);
+        place.ok().map(|place| &self.courses[place].1)
+    }
+
+    /// Whether the fluent's value depends on times.
+    pub(crate) fn governs(&self, fluent: u32) -> bool {
+        self.course(fluent).is_some()
+    }
+
+    /// Whether there is anything to solve.
+    pub(crate) fn has_demands(&self) -> bool {
+        !self.demands.is_empty()
+    }
+
+    /// An estimate of the memory it takes, in bytes.
+    pub(crate) fn size(&self) -> usize {
+        let term = size_of::<(NodeId, Rational)>();
+        let forms = self.courses.iter().map(|(_, course)| &course.base);
+        let forms = forms.chain(self.demands.iter().map(|(form, _)| form));
+        forms.map(|form| 80 + term * form.terms.capacity()).sum()
+    }
+}

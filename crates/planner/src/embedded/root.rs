@@ -1,0 +1,34 @@
+//! The state in which the search begins.
+
+use super::compile::Compiled;
+use super::expressions::Form;
+use super::state::{Open, State};
+use super::symbolic;
+
+/// The state of the situation, with what is under way.
+pub(crate) fn root(compiled: &Compiled) -> State {
+    let beginning = &compiled.beginning;
+    let mut state = State::new(compiled, &beginning.facts, beginning.values.clone());
+    state.cost.clone_from(&beginning.cost);
+    for (number, running) in (0..).zip(&beginning.running) {
+        let mut open = Open::under_way(number, running.start, running.least, running.most);
+        open.duration.clone_from(&running.duration);
+        state.open.push(open);
+    }
+    if compiled.is_symbolic {
+        state.symbolic = Some(Box::default());
+        let now = Form::constant(beginning.time.clone());
+        for place in 0..state.open.len() {
+            for flow in &compiled.actions[place].flows {
+                if let Some(rate) = flow.rate.value(&state.values, None) {
+                    state.open[place].flows.push((flow.fluent, rate));
+                }
+            }
+            for (fluent, rate) in state.open[place].flows.clone() {
+                // Without a value there is nothing to change; then nothing is claimed to be exact.
+                let _ = symbolic::flow(&mut state, fluent, &rate, &now);
+            }
+        }
+    }
+    state
+}

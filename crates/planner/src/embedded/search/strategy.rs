@@ -1,0 +1,125 @@
+//! How a search goes about it.
+
+use super::super::compile::Compressibility;
+use super::super::tuning::{Member, Tuning};
+
+/// How a search goes about it.
+#[derive(Clone, Copy, Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is one way to go about it, and any of them may be combined"
+)]
+pub(crate) struct Strategy {
+    /// If present, actions that can be compressed at least so safely are, and states are compared
+    /// roughly. Some plans are lost.
+    pub(crate) compresses: Option<Compressibility>,
+    /// How many states that differ in times only are kept; more are dropped, and some plans lost.
+    pub(crate) variants: usize,
+    /// Whether what is chosen later also happens later, or at the same time. Then it is known, of
+    /// what is under way, by when it must be over. Some plans are lost.
+    pub(crate) is_chronological: bool,
+    /// Whether what is new comes first, and then what has more of the goal; and whether successors
+    /// are looked at one by one for that, or the states that are expanded.
+    pub(crate) novelty: Option<NoveltyOf>,
+    /// Whether what is used up and never filled up is spared.
+    pub(crate) saves_consumables: bool,
+    /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
+    pub(crate) replenishes: bool,
+    /// What is looked for.
+    pub(crate) aim: Aim,
+}
+
+/// Of what a search asks how new it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoveltyOf {
+    /// Of the states that are expanded, among those of as much of the goal and the same estimate
+    /// (BFWS(f₂); Lipovetzky & Geffner, AAAI 2017).
+    Expanded,
+    /// Of each successor, among those of as much of the goal and of a relaxed plan (BFWS(f₅)). States
+    /// are estimated only where they have one more goal.
+    Successors,
+}
+
+/// What a search looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.
+    Goal,
+    /// Plans of a better metric. What costs least to finish comes first.
+    CostToGo,
+    /// Plans of a better metric. What has been spent counts too, what is still to be spent so many
+    /// times as much (weighted A*; Pohl 1970).
+    WeightedAStar(i64),
+    /// Shorter plans of the same metric.
+    Shortest,
+}
+
+impl Strategy {
+    /// Loses nothing but what [`Search::is_incomplete`](super::Search::is_incomplete) tells.
+    pub(crate) const COMPLETE: Self = Self {
+        compresses: None,
+        variants: usize::MAX,
+        is_chronological: false,
+        saves_consumables: false,
+        novelty: None,
+        replenishes: false,
+        aim: Aim::Goal,
+    };
+
+    /// The strategy of that member of the portfolio.
+    pub(crate) fn of(member: Member, tuning: &Tuning) -> Self {
+        match member {
+            Member::Compressing => Self::compressing(Compressibility::HoldsResource, tuning),
+            Member::CompressingSafe => Self::compressing(Compressibility::Safe, tuning),
+            Member::Replenishing => Self::of(Member::Compressing, tuning).replenishing(),
+            Member::Chronological => Self {
+                variants: tuning.chronological_variants,
+                is_chronological: true,
+                ..Self::COMPLETE
+            },
+            Member::Saving => Self {
+                variants: tuning.compressed_variants,
+                is_chronological: true,
+                saves_consumables: true,
+                ..Self::COMPLETE
+            },
+            Member::Novelty => Self {
+                novelty: Some(NoveltyOf::Expanded),
+                ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Width => Self {
+                novelty: Some(NoveltyOf::Successors),
+                ..Self::of(Member::Compressing, tuning)
+            },
+            Member::Complete => Self::COMPLETE,
+        }
+    }
+
+    /// Compresses actions that are at least so safe.
+    fn compressing(least: Compressibility, tuning: &Tuning) -> Self {
+        Self {
+            compresses: Some(least),
+            variants: tuning.compressed_variants,
+            ..Self::COMPLETE
+        }
+    }
+
+    /// Whether it loses nothing but what
+    /// [`Search::is_incomplete`](super::Search::is_incomplete) tells.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.compresses.is_none() && !self.is_chronological
+    }
+
+    /// The same, filling up what is used up.
+    pub(crate) fn replenishing(self) -> Self {
+        Self {
+            replenishes: true,
+            ..self
+        }
+    }
+
+    /// The same with another aim.
+    pub(crate) fn towards(self, aim: Aim) -> Self {
+        Self { aim, ..self }
+    }
+}

@@ -1,0 +1,297 @@
+//! The constants of the search, in one place, each with what speaks for its value; and what can be
+//! switched off, to find out what it is worth.
+//!
+//! None of them decides whether a plan is valid, or whether none exists. They decide how soon an
+//! answer comes.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A technique of the search that can be switched off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Technique {
+    /// Actions that cannot matter to the goal are left out.
+    Relevance,
+    /// Of objects that can change places, one is tried.
+    Symmetry,
+    /// A preference for the steps of the relaxed plan (preferred operators).
+    PreferredOperators,
+    /// Temporal `h²`: dead ends by pairs of facts.
+    DeadEnds,
+    /// A search in which new states are expanded first (BFWS(f₂)).
+    Novelty,
+    /// A search for new successors (BFWS(f₅)).
+    Width,
+    /// Searches in the order of time.
+    Chronological,
+    /// In the relaxed problem a fact that holds only while an envelope runs does not serve who
+    /// needs it for longer.
+    Envelopes,
+    /// What an action under way rules out for good.
+    Exclusions,
+    /// An end that would break the over-all condition of an action under way waits for it in the
+    /// network, from the moment at which both are under way.
+    Nesting,
+    /// Relaxed plans draw on what is never filled up, and searches save it.
+    Consumables,
+    /// Relaxed plans fill up what they use up.
+    Reservoirs,
+}
+
+impl Technique {
+    /// All there are, with the names by which they are told.
+    pub const ALL: &'static [(Self, &'static str)] = &[
+        (Self::Relevance, "relevance"),
+        (Self::Symmetry, "symmetry"),
+        (Self::PreferredOperators, "preferred-operators"),
+        (Self::DeadEnds, "dead-ends"),
+        (Self::Novelty, "novelty"),
+        (Self::Width, "width"),
+        (Self::Chronological, "chronological"),
+        (Self::Envelopes, "envelopes"),
+        (Self::Exclusions, "exclusions"),
+        (Self::Nesting, "nesting"),
+        (Self::Consumables, "consumables"),
+        (Self::Reservoirs, "reservoirs"),
+    ];
+}
+
+/// A search of the portfolio.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Member {
+    /// Actions are compressed unless they are envelopes.
+    Compressing,
+    /// Actions are compressed that are no envelopes and hold no resource.
+    CompressingSafe,
+    /// The first one, filling up what is used up.
+    Replenishing,
+    /// In the order of time.
+    Chronological,
+    /// In the order of time, saving what is never filled up.
+    Saving,
+    /// What is new comes first, among states of the same estimate (BFWS(f₂)).
+    Novelty,
+    /// Successors are new or not, and hardly any state is estimated (BFWS(f₅)).
+    Width,
+    /// Loses nothing.
+    Complete,
+}
+
+impl Member {
+    /// All there are, with the names by which they are told.
+    pub const ALL: &'static [(Self, &'static str)] = &[
+        (Self::Compressing, "compressing"),
+        (Self::CompressingSafe, "compressing-safe"),
+        (Self::Replenishing, "replenishing"),
+        (Self::Chronological, "chronological"),
+        (Self::Saving, "saving"),
+        (Self::Novelty, "novelty"),
+        (Self::Width, "width"),
+        (Self::Complete, "complete"),
+    ];
+}
+
+/// What cannot be set.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TuningError {
+    /// There is no constant, technique or search of that name.
+    #[error("there is no `{name}`; choose one of {}", .known.join(", "))]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<&'static str>,
+    },
+    /// The value is no number that the constant can take.
+    #[error("`{name}` takes a whole number, not `{value}`")]
+    Value {
+        /// The constant.
+        name: &'static str,
+        /// What was given.
+        value: String,
+    },
+}
+
+impl fmt::Display for Technique {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Self::ALL.iter().find(|(technique, _)| technique == self);
+        f.write_str(name.map_or("", |(_, name)| name))
+    }
+}
+
+impl FromStr for Technique {
+    type Err = TuningError;
+
+    fn from_str(name: &str) -> Result<Self, TuningError> {
+        by_name(Self::ALL, name)
+    }
+}
+
+impl FromStr for Member {
+    type Err = TuningError;
+
+    fn from_str(name: &str) -> Result<Self, TuningError> {
+        by_name(Self::ALL, name)
+    }
+}
+
+fn by_name<T: Copy>(all: &[(T, &'static str)], name: &str) -> Result<T, TuningError> {
+    let found = all.iter().find(|(_, known)| *known == name);
+    found
+        .map(|found| found.0)
+        .ok_or_else(|| TuningError::Unknown {
+            name: name.to_owned(),
+            known: all.iter().map(|(_, known)| *known).collect(),
+        })
+}
+
+/// Declares the constants once: fields, defaults, and a setter by name.
+macro_rules! constants {
+    ($($(#[$doc:meta])* $name:ident: $type:ty = $value:expr;)*) => {
+        /// The constants of the search, and what is switched off. See the module.
+        #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub struct Tuning {
+            /// What is switched off.
+            pub without: Vec<Technique>,
+            /// The only search, if there is to be but one. A search that the problem gives no reason
+            /// for is run as well.
+            pub only: Option<Member>,
+            $($(#[$doc])* pub $name: $type,)*
+        }
+
+        impl Default for Tuning {
+            fn default() -> Self {
+                Self { without: Vec::new(), only: None, $($name: $value,)* }
+            }
+        }
+
+        impl Tuning {
+            /// The names of the constants.
+            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
+
+            /// Sets the constant of that name.
+            ///
+            /// # Errors
+            /// When there is none, or the value does not fit.
+            pub fn set(&mut self, name: &str, value: &str) -> Result<(), TuningError> {
+                $(if name == stringify!($name) {
+                    self.$name = value.parse().map_err(|_| TuningError::Value {
+                        name: stringify!($name),
+                        value: value.to_owned(),
+                    })?;
+                    return Ok(());
+                })*
+                Err(TuningError::Unknown {
+                    name: name.to_owned(),
+                    known: Self::NAMES.to_vec(),
+                })
+            }
+        }
+    };
+}
+
+constants! {
+    /// How many states each incomplete search looks at in the first round of the portfolio; each
+    /// round has twice as many. Not measured: most benchmark instances are solved within it, so that
+    /// easy problems pay for one search only.
+    first_round: u64 = 20_000;
+    /// The same where searches that fill up reservoirs take turns with others. Not measured; less,
+    /// as only one of the two kinds usually has a chance.
+    first_round_with_reservoirs: u64 = 2_048;
+    /// The same where chronological searches take turns with others. Not measured; less, for the same
+    /// reason.
+    first_round_with_concurrency: u64 = 4_096;
+    /// The most operators of estimates that a first round comes to, so that a large problem, each state
+    /// of which takes long, does not wait for one search. Measured on parking, 18th of IPC 2014, with
+    /// 25,215 actions: BFWS(f₅) finds a plan after 17 states, but had no turn within 20 s while the
+    /// first round went by states alone.
+    first_round_work: u64 = 20_000_000;
+    /// How many states an incomplete search looks at for each one of the complete search. Not
+    /// measured; the complete search seldom finds a first plan, but is needed for proofs.
+    incomplete_share: u64 = 8;
+    /// How many states each search for better plans looks at in its first round. Not measured.
+    improving_round: u64 = 4_096;
+
+    /// How many turns the preferred successors get for a better estimate. The value of LAMA (Richter
+    /// & Westphal, JAIR 2010); not measured here.
+    boost: i64 = 1_000;
+    /// One of so many turns goes to the successor that has waited longest, in the complete search.
+    /// Not measured; any number keeps the search from losing itself where states are endlessly many.
+    exploration_interval: u64 = 32;
+    /// How many states that differ in times only are kept by compressing searches. Not measured.
+    compressed_variants: usize = 4;
+    /// The same in chronological searches. Not measured; more, as times are what they decide.
+    chronological_variants: usize = 32;
+    /// How many unsettled happenings a state of a chronological search may have: it remembers a
+    /// distance for each pair of them. Not measured; chosen for memory (74 kB for each state).
+    most_unsettled: u64 = 96;
+
+    /// After how many states temporal `h²` is asked whether the root is a dead end. Not measured;
+    /// problems with an easy plan are solved before.
+    root_check_after: u64 = 64;
+    /// After how many states it is asked about the states at which a search goes on. Not measured;
+    /// as above.
+    dead_end_checks_after: u64 = 512;
+    /// After so many states the share of time for these checks doubles, after twice as many it is
+    /// three times as large, and so on. Not measured; the longer a search takes, the likelier it is
+    /// lost in dead ends.
+    dead_end_patience: u64 = 4_096;
+    /// Beyond so many atoms temporal `h²` is not computed: its table takes the square in memory, and
+    /// each check more than that in time. Not measured.
+    most_pair_atoms: usize = 400;
+    /// The same for the pairs that one round of it looks up. Not measured; about 10 ms.
+    most_pair_lookups: usize = 2_000_000;
+
+    /// Beyond so many facts, only single facts make a state new, not pairs: a bit for each pair and
+    /// each worth is kept. Not measured; chosen for memory (64 kB for each worth).
+    most_facts_for_novel_pairs: usize = 1_024;
+    /// How many worths of states the search for new states tells apart. Not measured; chosen for
+    /// memory.
+    most_worths: usize = 4_096;
+
+    /// What a step of mean cost counts for, besides the one that every step counts for ("plus one";
+    /// Richter & Westphal, JAIR 2010). Not measured; small, as each cost is a bucket of the queue.
+    mean_step_cost: u32 = 8;
+    /// The most that a step counts for. Not measured; as above.
+    most_step_cost: u32 = 500;
+
+    /// How many comparisons of actions are spent on finding interchangeable objects. Not measured;
+    /// about 100 ms.
+    most_symmetry_comparisons: usize = 300_000;
+}
+
+impl Tuning {
+    /// Whether the technique is in use.
+    pub fn uses(&self, technique: Technique) -> bool {
+        !self.without.contains(&technique)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constants_are_set_by_name() {
+        let mut tuning = Tuning::default();
+        tuning.set("boost", "7").unwrap();
+        assert_eq!(tuning.boost, 7);
+        let message = tuning.set("boost", "seven").unwrap_err().to_string();
+        assert_eq!(message, "`boost` takes a whole number, not `seven`");
+        let message = tuning.set("boots", "7").unwrap_err().to_string();
+        assert!(message.starts_with("there is no `boots`; choose one of first_round, "));
+    }
+
+    #[test]
+    fn techniques_and_searches_are_told_by_name() {
+        for (technique, name) in Technique::ALL {
+            assert_eq!(name.parse(), Ok(*technique));
+            assert_eq!(technique.to_string(), *name);
+        }
+        for (member, name) in Member::ALL {
+            assert_eq!(name.parse(), Ok(*member));
+        }
+        assert!("envelope".parse::<Technique>().is_err());
+    }
+}

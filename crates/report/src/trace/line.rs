@@ -1,0 +1,489 @@
+//! The lines of a trace, for those who write and those who read: `docs/formats/trace.md`.
+
+use elbowroom_num::Rational;
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use crate::exact::{self, Exact};
+
+/// A line of a trace, but for its first one.
+///
+/// A number is [`Exact`]; the decimal beside it is for people, and is ignored when read.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Line {
+    /// A plan is taken up.
+    Plan(PlanLine),
+    /// The executor decided.
+    Decided(DecidedLine),
+    /// The world was given a command.
+    Command(CommandLine),
+    /// Time has passed.
+    Passed(PassedLine),
+    /// The world was asked to look at the goal.
+    Looked(LookedLine),
+    /// An observation, and what was made of it.
+    Observed(ObservedLine),
+    /// A plan is being made.
+    Planning(PlanningLine),
+    /// A plan has been made, or not.
+    Planned(PlannedLine),
+    /// Somebody asked the run to end.
+    Interrupted(InterruptedLine),
+    /// The run is over.
+    Over(ReportLine),
+}
+
+/// A plan is taken up; its times count from its `origin`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanLine {
+    /// When.
+    pub now: Exact,
+    /// What the world's clock reads at the plan's time 0.
+    pub origin: Exact,
+    /// The actions.
+    pub steps: Vec<StepLine>,
+    /// The plan with room.
+    pub network: NetworkLine,
+    /// What is left open.
+    pub parameters: Vec<ParameterLine>,
+}
+
+/// An action of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StepLine {
+    /// When it starts.
+    pub start: Exact,
+    /// Its name: `(drive rover depot shelf)`.
+    pub action: String,
+    /// How long it takes; `None` for an instantaneous action.
+    pub duration: Option<Exact>,
+}
+
+/// A plan as a network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkLine {
+    /// The actions.
+    pub instances: Vec<InstanceLine>,
+    /// Bounds on differences of times.
+    pub constraints: Vec<ConstraintLine>,
+}
+
+/// An action of a network.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstanceLine {
+    /// By which nodes are named.
+    pub label: String,
+    /// Its name.
+    pub action: String,
+}
+
+/// `lower <= to - from <= upper`; `None` where there is no bound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstraintLine {
+    /// A node.
+    pub from: String,
+    /// A node.
+    pub to: String,
+    /// Not less.
+    pub lower: Option<BoundLine>,
+    /// Not more.
+    pub upper: Option<BoundLine>,
+}
+
+/// A bound of a constraint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum BoundLine {
+    /// The value of the parameter of that name.
+    Parameter {
+        /// The name.
+        parameter: String,
+    },
+    /// A number.
+    Number(Exact),
+}
+
+/// Something left open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterLine {
+    /// Its name.
+    pub name: String,
+    /// Its value if nothing deviates.
+    pub nominal: Exact,
+    /// For which values the plan is guaranteed to work.
+    pub envelope: Option<IntervalLine>,
+}
+
+/// The ends of an interval; `None` where it has none.
+pub type IntervalLine = (Option<Exact>, Option<Exact>);
+
+/// The executor decided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecidedLine {
+    /// When.
+    pub now: Exact,
+    /// What.
+    pub decision: DecisionLine,
+    /// Why.
+    pub reason: ReasonLine,
+}
+
+/// What was decided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum DecisionLine {
+    /// To start actions.
+    Start {
+        /// Which.
+        orders: Vec<OrderLine>,
+    },
+    /// To wait.
+    Wait {
+        /// Until when, if nothing is observed earlier.
+        until: Option<Exact>,
+    },
+    /// To stop actions.
+    Cancel {
+        /// Which.
+        steps: Vec<u32>,
+    },
+    /// To give up the plan.
+    Replan,
+    /// That the goal is reached.
+    GoalReached,
+}
+
+/// An action to start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrderLine {
+    /// The step of the plan.
+    pub step: u32,
+    /// Its name.
+    pub action: String,
+    /// How long it is planned to take; `None` for an instantaneous action.
+    pub duration: Option<Exact>,
+    /// When it may start.
+    pub planned: WindowLine,
+}
+
+/// When a happening is planned.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WindowLine {
+    /// Not before.
+    pub earliest: Option<Exact>,
+    /// Not after.
+    pub latest: Option<Exact>,
+}
+
+/// A reason: its words, and its parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReasonLine {
+    /// What kind of reason: [`Cause::name`](elbowroom_execution::Cause::name).
+    pub cause: String,
+    /// The whole of it as a sentence.
+    pub words: String,
+    /// The action that it is about.
+    pub action: Option<String>,
+    /// The quantity, condition or moment that it is about, in words.
+    pub about: Option<String>,
+    /// What was observed.
+    pub observed: Option<Exact>,
+    /// What is allowed.
+    pub allowed: Option<IntervalLine>,
+    /// The constraints behind that, in words.
+    pub behind: Vec<String>,
+    /// By how much it was missed.
+    pub by: Option<Exact>,
+    /// Since when this has been so.
+    pub since: Option<Exact>,
+    /// What is still promised of the rest of the plan, where the executor makes promises:
+    /// [`Promise::name`](elbowroom_execution::Promise::name).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub promise: Option<String>,
+}
+
+/// The world was given a command.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CommandLine {
+    /// When.
+    pub now: Exact,
+    /// Which.
+    pub command: GivenLine,
+    /// When that was planned.
+    pub planned: WindowLine,
+}
+
+/// A command.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum GivenLine {
+    /// Start an action.
+    Start {
+        /// By which reports refer to it.
+        ticket: u64,
+        /// Its name.
+        action: String,
+        /// How long it is planned to take.
+        duration: Option<Exact>,
+    },
+    /// Stop an action.
+    Cancel {
+        /// Which start.
+        ticket: u64,
+    },
+}
+
+/// Time has passed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PassedLine {
+    /// Until when the world was asked to wait at most.
+    pub until: Exact,
+    /// What time it is now.
+    pub now: Exact,
+    /// What was observed.
+    pub observations: Vec<ObservationLine>,
+}
+
+/// The world was asked to look at the goal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LookedLine {
+    /// When.
+    pub now: Exact,
+    /// What it reported.
+    pub observations: Vec<ObservationLine>,
+}
+
+/// An observation, and what was made of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObservedLine {
+    /// When it was reported.
+    pub now: Exact,
+    /// The observation.
+    pub observation: ObservationLine,
+    /// When that was planned.
+    pub planned: WindowLine,
+    /// What is wrong with it, if it was not taken at its word.
+    pub remark: Option<String>,
+}
+
+/// What the world reported.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ObservationLine {
+    /// An action has started.
+    Started {
+        /// Which start.
+        ticket: u64,
+        /// Amounts, by fluent.
+        measured: IndexMap<String, Exact>,
+        /// When.
+        time: Exact,
+    },
+    /// An action has ended.
+    Ended {
+        /// Which start.
+        ticket: u64,
+        /// How: `succeeded`, `failed` or `cancelled`.
+        outcome: String,
+        /// Amounts, by fluent.
+        measured: IndexMap<String, Exact>,
+        /// Why it failed; where it has.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        why: Option<String>,
+        /// When.
+        time: Exact,
+    },
+    /// A fact is seen.
+    Fact {
+        /// Its name: `(at rover depot)`.
+        fact: String,
+        /// Whether it is true.
+        becomes: bool,
+        /// When.
+        time: Exact,
+    },
+    /// A fluent is seen.
+    Value {
+        /// Its name.
+        fluent: String,
+        /// Its value.
+        value: Exact,
+        /// When.
+        time: Exact,
+    },
+    /// Something that cannot be understood.
+    Unintelligible {
+        /// What was said.
+        said: String,
+        /// What is wrong with it.
+        why: String,
+        /// When.
+        time: Exact,
+    },
+}
+
+/// A plan is being made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanningLine {
+    /// When.
+    pub now: Exact,
+    /// Why.
+    pub reason: ReasonLine,
+    /// From where.
+    pub situation: SituationLine,
+}
+
+/// Where a plan begins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SituationLine {
+    /// When.
+    pub time: Exact,
+    /// What is true.
+    pub facts: Vec<String>,
+    /// The values of the fluents.
+    pub values: IndexMap<String, Exact>,
+    /// What is running.
+    pub running: Vec<RunningLine>,
+}
+
+/// An action that is running.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunningLine {
+    /// Its name.
+    pub action: String,
+    /// When it has started.
+    pub start: Exact,
+    /// How long it is expected to take.
+    pub duration: IntervalLine,
+}
+
+/// A plan has been made, or not.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannedLine {
+    /// When, with the time that it took.
+    pub now: Exact,
+    /// How long it took in the world's time.
+    pub took: Exact,
+    /// The plan.
+    pub plan: Option<Vec<StepLine>>,
+    /// Why there is none.
+    pub why_not: Option<String>,
+    /// Whether it is certain that there is none.
+    #[serde(rename = "unsolvable")]
+    pub is_unsolvable: bool,
+}
+
+/// Somebody asked the run to end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InterruptedLine {
+    /// When.
+    pub now: Exact,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportLine {
+    /// How it ended: [`Verdict::name`](elbowroom_execution::run::Verdict::name).
+    pub verdict: String,
+    /// What there is to add.
+    pub why: Option<String>,
+    /// When, by the world's clock.
+    #[serde(with = "exact")]
+    pub time: Rational,
+    /// How many new plans were made, or asked for.
+    pub replans: usize,
+    /// Why.
+    pub reasons: Vec<ReasonLine>,
+    /// What can never become true again, where no plan reaches the goal any more.
+    pub dead_end: Vec<ReasonLine>,
+    /// How many actions were started.
+    pub starts: usize,
+    /// What was done.
+    pub executed: Vec<ExecutedLine>,
+}
+
+/// Something that was done.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExecutedLine {
+    /// When it started.
+    pub start: Exact,
+    /// Its name.
+    pub action: String,
+    /// How long it took; `None` for an instantaneous action.
+    pub duration: Option<Exact>,
+    /// Which start it was.
+    pub ticket: u64,
+    /// How it ended; `None` if it had not.
+    pub outcome: Option<String>,
+}
+
+impl Line {
+    /// The line as it stands in a trace, without a line feed.
+    pub fn text(&self) -> String {
+        /// The last line has always ended with its name; all others begin with it.
+        #[derive(Serialize)]
+        struct Over<'a> {
+            #[serde(flatten)]
+            report: &'a ReportLine,
+            event: &'static str,
+        }
+
+        /// A line that begins with its name.
+        #[derive(Serialize)]
+        #[serde(tag = "event", rename_all = "kebab-case")]
+        enum Named<'a> {
+            Plan(&'a PlanLine),
+            Decided(&'a DecidedLine),
+            Command(&'a CommandLine),
+            Passed(&'a PassedLine),
+            Looked(&'a LookedLine),
+            Observed(&'a ObservedLine),
+            Planning(&'a PlanningLine),
+            Planned(&'a PlannedLine),
+            Interrupted(&'a InterruptedLine),
+        }
+
+        let named = match self {
+            Self::Over(report) => {
+                let event = "over";
+                return written(&Over { report, event });
+            }
+            Self::Plan(line) => Named::Plan(line),
+            Self::Decided(line) => Named::Decided(line),
+            Self::Command(line) => Named::Command(line),
+            Self::Passed(line) => Named::Passed(line),
+            Self::Looked(line) => Named::Looked(line),
+            Self::Observed(line) => Named::Observed(line),
+            Self::Planning(line) => Named::Planning(line),
+            Self::Planned(line) => Named::Planned(line),
+            Self::Interrupted(line) => Named::Interrupted(line),
+        };
+        written(&named)
+    }
+}
+
+fn written(line: &impl Serialize) -> String {
+    serde_json::to_string(line).expect("all keys are texts, and decimals of rationals are finite")
+}

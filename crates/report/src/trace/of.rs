@@ -1,0 +1,335 @@
+//! From the entries of a run's record to the lines of a trace.
+
+use elbowroom_execution::run::{ExecutedStep, Report};
+use elbowroom_execution::{
+    Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned, Reason,
+};
+use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{Bound, ParametrizedPlan};
+use indexmap::IndexMap;
+
+use super::line::{
+    BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine, GivenLine,
+    InstanceLine, InterruptedLine, IntervalLine, Line, LookedLine, NetworkLine, ObservationLine,
+    ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine, PlanningLine,
+    ReasonLine, ReportLine, RunningLine, SituationLine, StepLine, WindowLine,
+};
+use crate::exact::Exact;
+
+impl Line {
+    /// The line of an entry; `task` names facts and fluents.
+    pub fn of(task: &Task, entry: &Entry<'_>) -> Self {
+        let observed = |observations: &[Observation]| {
+            let lines = observations.iter();
+            lines.map(|it| ObservationLine::of(task, it)).collect()
+        };
+        match *entry {
+            Entry::Mission(mission) => Self::Plan(mission_line(mission)),
+            Entry::Decided { now, decided } => Self::Decided(DecidedLine {
+                now: exact(now),
+                decision: decision(&decided.decision),
+                reason: ReasonLine::of(&decided.reason),
+            }),
+            Entry::Command {
+                now,
+                command,
+                planned,
+            } => Self::Command(CommandLine {
+                now: exact(now),
+                command: GivenLine::of(command),
+                planned: window(planned),
+            }),
+            Entry::Passed {
+                until,
+                now,
+                observations,
+            } => Self::Passed(PassedLine {
+                until: exact(until),
+                now: exact(now),
+                observations: observed(observations),
+            }),
+            Entry::Looked { now, observations } => Self::Looked(LookedLine {
+                now: exact(now),
+                observations: observed(observations),
+            }),
+            Entry::Taken {
+                now,
+                observation,
+                planned,
+                remark,
+            } => Self::Observed(ObservedLine {
+                now: exact(now),
+                observation: ObservationLine::of(task, observation),
+                planned: window(planned),
+                remark: remark.map(str::to_owned),
+            }),
+            Entry::Planning {
+                now,
+                reason,
+                situation,
+            } => Self::Planning(PlanningLine {
+                now: exact(now),
+                reason: ReasonLine::of(reason),
+                situation: situation_line(task, situation),
+            }),
+            Entry::Planned {
+                now,
+                took,
+                plan,
+                why_not,
+                is_unsolvable,
+            } => Self::Planned(PlannedLine {
+                now: exact(now),
+                took: exact(took),
+                plan: plan.map(steps),
+                why_not: why_not.map(str::to_owned),
+                is_unsolvable,
+            }),
+            Entry::Interrupted { now } => Self::Interrupted(InterruptedLine { now: exact(now) }),
+            Entry::Over(report) => Self::Over(ReportLine::of(report)),
+        }
+    }
+}
+
+impl ReportLine {
+    /// What came of a run, as a line.
+    pub fn of(report: &Report) -> Self {
+        Self {
+            verdict: report.verdict.name().to_owned(),
+            why: report.verdict.why().map(str::to_owned),
+            time: report.time.clone(),
+            replans: report.replans,
+            reasons: report.reasons.iter().map(ReasonLine::of).collect(),
+            dead_end: report.dead_end.iter().map(ReasonLine::of).collect(),
+            starts: report.starts,
+            executed: report.executed.iter().map(executed).collect(),
+        }
+    }
+}
+
+impl ReasonLine {
+    /// A reason as a line.
+    pub fn of(reason: &Reason) -> Self {
+        Self {
+            cause: reason.cause.name().to_owned(),
+            words: reason.to_string(),
+            action: reason.action.clone(),
+            about: reason.about.as_ref().map(ToString::to_string),
+            observed: optional(reason.observed.as_ref()),
+            allowed: reason.allowed.as_ref().map(interval),
+            behind: reason.behind.clone(),
+            by: optional(reason.by.as_ref()),
+            since: optional(reason.since.as_ref()),
+            promise: reason.promise.map(|promise| promise.name().to_owned()),
+        }
+    }
+}
+
+impl GivenLine {
+    /// A command as a line.
+    pub fn of(command: &Command) -> Self {
+        match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => Self::Start {
+                ticket: ticket.0,
+                action: action.name.clone(),
+                duration: optional(duration.as_ref()),
+            },
+            Command::Cancel { ticket } => Self::Cancel { ticket: ticket.0 },
+        }
+    }
+}
+
+impl ObservationLine {
+    /// An observation as a line.
+    pub fn of(task: &Task, observation: &Observation) -> Self {
+        let time = exact(&observation.time);
+        let amounts = |measured: &[Measured]| {
+            let amounts = measured.iter();
+            let amounts = amounts.map(|it| (task.fluent_name(it.fluent), exact(&it.amount)));
+            amounts.collect::<IndexMap<_, _>>()
+        };
+        match &observation.event {
+            Event::Started { ticket, measured } => Self::Started {
+                ticket: ticket.0,
+                measured: amounts(measured),
+                time,
+            },
+            Event::Ended {
+                ticket,
+                ending,
+                measured,
+            } => Self::Ended {
+                ticket: ticket.0,
+                outcome: ending.name().to_owned(),
+                measured: amounts(measured),
+                why: match ending {
+                    Ending::Failed { why } => Some(why.clone()),
+                    Ending::Succeeded | Ending::Cancelled => None,
+                },
+                time,
+            },
+            Event::Fact { fact, truth } => Self::Fact {
+                fact: task.fact_name(*fact),
+                becomes: *truth,
+                time,
+            },
+            Event::Value { fluent, value } => Self::Value {
+                fluent: task.fluent_name(*fluent),
+                value: exact(value),
+                time,
+            },
+            Event::Unintelligible { said, why } => Self::Unintelligible {
+                said: said.clone(),
+                why: why.clone(),
+                time,
+            },
+        }
+    }
+}
+
+fn exact(number: &Rational) -> Exact {
+    Exact(number.clone())
+}
+
+fn optional(number: Option<&Rational>) -> Option<Exact> {
+    number.map(exact)
+}
+
+fn executed(executed: &ExecutedStep) -> ExecutedLine {
+    ExecutedLine {
+        start: exact(&executed.step.start),
+        action: executed.step.action.name.clone(),
+        duration: optional(executed.step.duration.as_ref()),
+        ticket: executed.ticket.0,
+        outcome: executed.ending.as_ref().map(|it| it.name().to_owned()),
+    }
+}
+
+fn decision(decision: &Decision) -> DecisionLine {
+    match decision {
+        Decision::Start(orders) => DecisionLine::Start {
+            orders: orders.iter().map(order).collect(),
+        },
+        Decision::Wait { until } => DecisionLine::Wait {
+            until: optional(until.as_ref()),
+        },
+        Decision::Cancel(steps) => DecisionLine::Cancel {
+            steps: steps.iter().map(|step| step.0).collect(),
+        },
+        Decision::Replan => DecisionLine::Replan,
+        Decision::GoalReached => DecisionLine::GoalReached,
+    }
+}
+
+fn order(order: &Order) -> OrderLine {
+    OrderLine {
+        step: order.step.0,
+        action: order.action.name.clone(),
+        duration: optional(order.duration.as_ref()),
+        planned: window(&order.planned),
+    }
+}
+
+fn window(planned: &Planned) -> WindowLine {
+    WindowLine {
+        earliest: optional(planned.earliest.as_ref()),
+        latest: optional(planned.latest.as_ref()),
+    }
+}
+
+fn mission_line(mission: &Mission) -> PlanLine {
+    PlanLine {
+        now: exact(&mission.now),
+        origin: exact(&mission.origin),
+        steps: steps(&mission.time_triggered),
+        network: network(&mission.plan),
+        parameters: parameters(mission),
+    }
+}
+
+fn network(plan: &ParametrizedPlan) -> NetworkLine {
+    let label = |node| plan.plan.node_label(node);
+    let bound = |bound: &Bound| match bound {
+        Bound::Infinite => None,
+        Bound::Finite(value) => Some(BoundLine::Number(exact(value))),
+        Bound::Parameter(id) => Some(BoundLine::Parameter {
+            parameter: plan.parameter(*id).name.clone(),
+        }),
+    };
+    let constraints = plan.plan.constraints.iter();
+    let instances = plan.plan.instances.iter();
+    NetworkLine {
+        instances: instances
+            .map(|instance| InstanceLine {
+                label: instance.label.clone(),
+                action: instance.action.name.clone(),
+            })
+            .collect(),
+        constraints: constraints
+            .map(|constraint| ConstraintLine {
+                from: label(constraint.from),
+                to: label(constraint.to),
+                lower: bound(&constraint.lower),
+                upper: bound(&constraint.upper),
+            })
+            .collect(),
+    }
+}
+
+fn parameters(mission: &Mission) -> Vec<ParameterLine> {
+    let numbered = mission.plan.parameters.iter().enumerate();
+    let parameters = numbered.map(|(index, parameter)| {
+        let allowed = mission.envelope.as_ref();
+        let allowed = allowed.and_then(|envelope| envelope.intervals.get(index));
+        ParameterLine {
+            name: parameter.name.clone(),
+            nominal: exact(&parameter.nominal),
+            envelope: allowed.map(interval),
+        }
+    });
+    parameters.collect()
+}
+
+/// An interval: its ends, `None` where infinite.
+fn interval(interval: &Interval) -> IntervalLine {
+    (
+        optional(interval.lower.value()),
+        optional(interval.upper.value()),
+    )
+}
+
+fn steps(plan: &TimeTriggeredPlan) -> Vec<StepLine> {
+    let steps = plan.steps.iter();
+    steps
+        .map(|step| StepLine {
+            start: exact(&step.start),
+            action: step.action.name.clone(),
+            duration: optional(step.duration.as_ref()),
+        })
+        .collect()
+}
+
+fn situation_line(task: &Task, situation: &Situation) -> SituationLine {
+    let facts = situation.state.facts.iter();
+    let values = situation.state.values.iter();
+    let running = situation.running.iter();
+    SituationLine {
+        time: exact(&situation.time),
+        facts: facts.map(|&fact| task.fact_name(fact)).collect(),
+        values: values
+            .map(|(&fluent, value)| (task.fluent_name(fluent), exact(value)))
+            .collect(),
+        running: running
+            .map(|running| RunningLine {
+                action: running.action.name.clone(),
+                start: exact(&running.start),
+                duration: interval(&running.duration),
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,330 @@
+//! Values in a box for which a network has no schedule, found without looking at all corners.
+//!
+//! Bounds of the network depend on quantities, each somewhere in an interval: the durations of
+//! contingent links, or the parameters of a plan. Whether there is a schedule for all their values is
+//! co-NP-complete in general (weak controllability; Vidal & Fargier 1999, Morris & Muscettola 1999), so
+//! nothing avoids branching altogether. But few quantities need it.
+//! Each bound is first taken at its worst, whatever the other bound of its quantity says. If no
+//! cycle is negative even so, all values have a schedule. If one is that takes no quantity at two
+//! different values, some values have none. Only where a negative cycle takes a quantity at both
+//! of its ends, that quantity is set to the one, and then to the other: the values with a schedule
+//! form a convex set.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use elbowroom_num::{Rational, Side};
+
+use crate::NodeId;
+
+/// More branches would be needed than allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooManyBranches;
+
+/// `to - from <= constant + q` for the quantity `q` of the [`Side::Upper`], `constant - q` for that of
+/// the [`Side::Lower`]: it bounds from above, or from below.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenBound<Q> {
+    /// The time point that is subtracted.
+    pub from: NodeId,
+    /// The time point it is subtracted from.
+    pub to: NodeId,
+    /// The part of the bound that depends on nothing.
+    pub constant: Rational,
+    /// The quantity, and on which side it stands.
+    pub quantity: Option<(Q, Side)>,
+}
+
+/// A network whose bounds depend on quantities.
+pub struct Branching<'a, Q> {
+    /// The bounds that lie on cycles; others do no harm, and take time.
+    pub bounds: Vec<OpenBound<Q>>,
+    /// How many time points there are.
+    pub node_count: usize,
+    /// Whether a quantity bounds one difference only, from above and from below: no simple cycle
+    /// takes both bounds.
+    pub is_pair: &'a dyn Fn(Q) -> bool,
+    /// The least and the greatest value of a quantity.
+    pub value: &'a dyn Fn(Q, Side) -> Rational,
+    /// After so many branches the question is given up.
+    pub most_branches: usize,
+}
+
+/// Quantities, and the ends they are set to.
+pub type Corner<Q> = BTreeMap<Q, Side>;
+
+impl<Q: Copy + Ord> Branching<'_, Q> {
+    /// A corner of the box without a schedule: the quantities that matter, and at which end each
+    /// is. `None` if all values have a schedule.
+    ///
+    /// # Errors
+    /// When that takes too many branches to find out.
+    pub fn corner_without_schedule(&self) -> Result<Option<Corner<Q>>, TooManyBranches> {
+        let mut branches: Vec<Corner<Q>> = vec![self.points()];
+        let mut looked_at = 0;
+        while let Some(chosen) = branches.pop() {
+            looked_at += 1;
+            if looked_at > self.most_branches {
+                return Err(TooManyBranches);
+            }
+            let weights: Vec<Rational> = self
+                .bounds
+                .iter()
+                .map(|bound| self.weight(bound, &chosen))
+                .collect();
+            let Some(walk) = Walks::new(self, &weights).negative() else {
+                continue;
+            };
+            let mut torn = None;
+            for cycle in simple_cycles(&self.bounds, &walk) {
+                let weight: Rational = cycle.iter().map(|&edge| &weights[edge]).sum();
+                if !weight.is_negative() {
+                    continue;
+                }
+                match self.sides(&cycle, &chosen) {
+                    Ok(sides) => return Ok(Some(sides)),
+                    Err(quantity) => torn = torn.or(Some(quantity)),
+                }
+            }
+            let torn = torn.expect("a negative walk has a negative cycle");
+            for side in [Side::Upper, Side::Lower] {
+                let mut branch = chosen.clone();
+                branch.insert(torn, side);
+                branches.push(branch);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Quantities of which there is one value only.
+    fn points(&self) -> Corner<Q> {
+        let quantities = self.bounds.iter().filter_map(|bound| bound.quantity);
+        quantities
+            .filter(|&(id, _)| (self.value)(id, Side::Lower) == (self.value)(id, Side::Upper))
+            .map(|(id, _)| (id, Side::Lower))
+            .collect()
+    }
+
+    /// A bound at its worst where nothing is chosen.
+    fn weight(&self, bound: &OpenBound<Q>, chosen: &Corner<Q>) -> Rational {
+        let Some((quantity, own)) = bound.quantity else {
+            return bound.constant.clone();
+        };
+        let side = chosen.get(&quantity).copied();
+        let value = (self.value)(quantity, side.unwrap_or(own.opposite()));
+        match own {
+            Side::Upper => &bound.constant + value,
+            Side::Lower => &bound.constant - value,
+        }
+    }
+
+    /// The ends at which a cycle takes its quantities, beside those chosen before.
+    ///
+    /// # Errors
+    /// A quantity that it takes at both.
+    fn sides(&self, cycle: &[usize], chosen: &Corner<Q>) -> Result<Corner<Q>, Q> {
+        let mut sides = chosen.clone();
+        for &edge in cycle {
+            let Some((quantity, own)) = self.bounds[edge].quantity else {
+                continue;
+            };
+            if chosen.contains_key(&quantity) {
+                continue;
+            }
+            let worst = own.opposite();
+            if *sides.entry(quantity).or_insert(worst) != worst {
+                return Err(quantity);
+            }
+        }
+        Ok(sides)
+    }
+}
+
+/// Takes a closed walk apart.
+fn simple_cycles<Q>(edges: &[OpenBound<Q>], walk: &[usize]) -> Vec<Vec<usize>> {
+    let mut cycles = Vec::new();
+    // Where on the path each time point has been left.
+    let mut path: Vec<usize> = Vec::new();
+    let mut at: BTreeMap<usize, usize> = BTreeMap::new();
+    for &edge in walk {
+        at.insert(edges[edge].from.index(), path.len());
+        path.push(edge);
+        if let Some(&start) = at.get(&edges[edge].to.index()) {
+            let cycle = path.split_off(start);
+            for &edge in &cycle {
+                at.remove(&edges[edge].from.index());
+            }
+            cycles.push(cycle);
+        }
+    }
+    cycles
+}
+
+/// A way to a node.
+struct Label {
+    node: usize,
+    length: Rational,
+    /// The last edge, and the way before it; `None` at the beginning.
+    last: Option<(usize, usize)>,
+    depth: usize,
+}
+
+/// Shortest walks from anywhere that never go over both bounds of a quantity straight after each
+/// other.
+struct Walks<'a, Q> {
+    network: &'a Branching<'a, Q>,
+    weights: &'a [Rational],
+    leaving: Vec<Vec<usize>>,
+    labels: Vec<Label>,
+    /// For each node, the shortest way to it, and, if that one may not go on everywhere, the
+    /// shortest with another last quantity.
+    best: Vec<[Option<usize>; 2]>,
+}
+
+impl<'a, Q: Copy + Ord> Walks<'a, Q> {
+    fn new(network: &'a Branching<'a, Q>, weights: &'a [Rational]) -> Self {
+        let mut leaving = vec![Vec::new(); network.node_count];
+        for (index, edge) in network.bounds.iter().enumerate() {
+            leaving[edge.from.index()].push(index);
+        }
+        let start = |node| Label {
+            node,
+            length: Rational::ZERO,
+            last: None,
+            depth: 0,
+        };
+        Self {
+            network,
+            weights,
+            leaving,
+            labels: (0..network.node_count).map(start).collect(),
+            best: (0..network.node_count)
+                .map(|node| [Some(node), None])
+                .collect(),
+        }
+    }
+
+    /// A closed walk of negative length, as edges.
+    fn negative(mut self) -> Option<Vec<usize>> {
+        // A way over so many edges is at some node three times. Two labels are kept for a node,
+        // so it was shorter the third time than one time before.
+        let enough = 2 * self.network.node_count + 2;
+        let mut look_at = 8.min(enough);
+        let mut waiting: VecDeque<usize> = (0..self.network.node_count).collect();
+        while let Some(label) = waiting.pop_front() {
+            let node = self.labels[label].node;
+            if !self.best[node].contains(&Some(label)) {
+                continue;
+            }
+            for index in 0..self.leaving[node].len() {
+                let edge = self.leaving[node][index];
+                if !self.may_take(label, edge) {
+                    continue;
+                }
+                let Some(next) = self.extend(label, edge) else {
+                    continue;
+                };
+                if self.labels[next].depth >= look_at {
+                    if let Some(walk) = self.closed_walk(next) {
+                        return Some(walk);
+                    }
+                    look_at = (2 * look_at).min(enough);
+                }
+                waiting.push_back(next);
+            }
+        }
+        None
+    }
+
+    /// The quantity whose other bound may not come next.
+    fn pair(&self, edge: usize) -> Option<Q> {
+        let edge = &self.network.bounds[edge];
+        let (quantity, _) = edge.quantity.filter(|_| edge.from != edge.to)?;
+        (self.network.is_pair)(quantity).then_some(quantity)
+    }
+
+    /// Whether the edge may follow, and no better label goes over it.
+    fn may_take(&self, label: usize, edge: usize) -> bool {
+        let Label { node, last, .. } = self.labels[label];
+        let own = self.pair(edge);
+        let is_blocked = |last: Option<(usize, usize)>| {
+            own.is_some() && last.is_some_and(|(last, _)| self.pair(last) == own)
+        };
+        if is_blocked(last) {
+            return false;
+        }
+        let [first, _] = self.best[node];
+        first == Some(label) || first.is_some_and(|first| is_blocked(self.labels[first].last))
+    }
+
+    /// Goes over an edge; the new label, if it is worth keeping.
+    fn extend(&mut self, label: usize, edge: usize) -> Option<usize> {
+        let node = self.network.bounds[edge].to.index();
+        let length = &self.labels[label].length + &self.weights[edge];
+        let pair = self.pair(edge);
+        let last_pair = |walks: &Self, label: usize| {
+            let last = walks.labels[label].last;
+            last.and_then(|(edge, _)| walks.pair(edge))
+        };
+        let [first, second] = self.best[node];
+        let first = first?;
+        let is_first = length < self.labels[first].length;
+        let is_second = || {
+            let other = last_pair(self, first);
+            other.is_some()
+                && other != pair
+                && second.is_none_or(|second| length < self.labels[second].length)
+        };
+        if !is_first && !is_second() {
+            return None;
+        }
+        let new = self.labels.len();
+        let kept = if !is_first {
+            [Some(first), Some(new)]
+        } else if pair.is_none() || last_pair(self, first) != pair {
+            [Some(new), pair.map(|_| first)]
+        } else {
+            [Some(new), second]
+        };
+        self.best[node] = kept;
+        self.labels.push(Label {
+            node,
+            length,
+            last: Some((edge, label)),
+            depth: self.labels[label].depth + 1,
+        });
+        Some(new)
+    }
+
+    /// The part of a way between two times at the same node, if it is shorter at the second.
+    fn closed_walk(&self, end: usize) -> Option<Vec<usize>> {
+        // From the end backwards: for each node, the shortest label after this point.
+        let mut later: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut label = end;
+        loop {
+            let Label { node, last, .. } = self.labels[label];
+            match later.get(&node) {
+                Some(&after) if self.labels[after].length < self.labels[label].length => {
+                    return Some(self.edges_between(label, after));
+                }
+                _ => later.insert(node, label),
+            };
+            label = last?.1;
+        }
+    }
+
+    fn edges_between(&self, start: usize, end: usize) -> Vec<usize> {
+        let mut edges = Vec::new();
+        let mut label = end;
+        while label != start
+            && let Some((edge, before)) = self.labels[label].last
+        {
+            edges.push(edge);
+            label = before;
+        }
+        edges.reverse();
+        edges
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,196 @@
+//! A network as the graph that dynamic controllability is decided on.
+
+use super::conflict::{Ground, Step};
+use super::extended::Extended;
+use super::{LinkId, UncertainNetwork};
+use crate::{ConstraintId, NodeId, Weight};
+
+/// An edge by its place in [`Graph::edges`].
+pub(super) type EdgeId = usize;
+
+/// `to - from <= bound`, or, for a wait, "until the link has ended".
+#[derive(Clone, Debug)]
+pub(super) struct Edge<W> {
+    pub(super) from: NodeId,
+    pub(super) to: NodeId,
+    pub(super) bound: Extended<W>,
+    pub(super) kind: Kind,
+    pub(super) origin: Origin,
+}
+
+/// When an edge holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Always.
+    Plain,
+    /// If the world lets the link end early.
+    Lower(LinkId),
+    /// Until the link has ended.
+    Upper(LinkId),
+}
+
+/// Where an edge comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Origin {
+    Requirement(ConstraintId),
+    Link(LinkId),
+    /// It stands for a way.
+    Way(WayId),
+}
+
+/// A way by its place in [`Graph::ways`].
+pub(super) type WayId = usize;
+
+/// An edge, and the rest of the way behind it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    pub(super) edge: EdgeId,
+    pub(super) rest: Option<WayId>,
+}
+
+/// The network as a graph, with the edges found.
+#[derive(Clone, Debug)]
+pub(super) struct Graph<W> {
+    pub(super) edges: Vec<Edge<W>>,
+    pub(super) ways: Vec<Way>,
+    /// For each node, the edges not negative that end there, upper-case ones excepted: those of the
+    /// network, then those found.
+    pub(super) positive_into: Vec<Vec<EdgeId>>,
+    /// For each node, the negative plain edges of the network that end there.
+    pub(super) negative_into: Vec<Vec<EdgeId>>,
+    /// For each node, the upper-case edges of the network that end there.
+    pub(super) upper_into: Vec<Vec<EdgeId>>,
+    /// How many edges are the network's own: two for each link, after those of the requirements.
+    pub(super) given: usize,
+}
+
+impl<W: Weight> Graph<W> {
+    pub(super) fn new(network: &UncertainNetwork<W>) -> Self {
+        let count = network.requirements.node_count();
+        let mut graph = Self {
+            edges: Vec::with_capacity(network.requirements.constraints().len()),
+            ways: Vec::new(),
+            positive_into: vec![Vec::new(); count],
+            negative_into: vec![Vec::new(); count],
+            upper_into: vec![Vec::new(); count],
+            given: 0,
+        };
+        for id in network.requirements.constraint_ids() {
+            let constraint = network.requirements.constraint(id);
+            graph.add(Edge {
+                from: constraint.from,
+                to: constraint.to,
+                bound: constraint.bound.clone().into(),
+                kind: Kind::Plain,
+                origin: Origin::Requirement(id),
+            });
+        }
+        for id in network.link_ids() {
+            let link = network.link(id);
+            graph.add(Edge {
+                from: link.activation,
+                to: link.end,
+                bound: link.lower.clone().into(),
+                kind: Kind::Lower(id),
+                origin: Origin::Link(id),
+            });
+            let upper = link
+                .upper
+                .clone()
+                .map_or_else(Extended::infinity, Into::into);
+            let is_upper = upper > Extended::zero();
+            graph.add(Edge {
+                from: link.end,
+                to: link.activation,
+                bound: upper.negated(),
+                // A link without any duration has a plain edge back.
+                kind: if is_upper {
+                    Kind::Upper(id)
+                } else {
+                    Kind::Plain
+                },
+                origin: Origin::Link(id),
+            });
+        }
+        graph.given = graph.edges.len();
+        graph
+    }
+
+    /// The lower-case and the upper-case edge of a link.
+    pub(super) fn edges_of(&self, network: &UncertainNetwork<W>, link: LinkId) -> [EdgeId; 2] {
+        let first = self.given - 2 * (network.links.len() - link.index());
+        [first, first + 1]
+    }
+
+    /// The same graph with other numbers.
+    pub(super) fn map<V>(self, number: impl Fn(W) -> V) -> Graph<V> {
+        let edges = self.edges.into_iter().map(|edge| Edge {
+            from: edge.from,
+            to: edge.to,
+            bound: edge.bound.map(&number),
+            kind: edge.kind,
+            origin: edge.origin,
+        });
+        Graph {
+            edges: edges.collect(),
+            ways: self.ways,
+            positive_into: self.positive_into,
+            negative_into: self.negative_into,
+            upper_into: self.upper_into,
+            given: self.given,
+        }
+    }
+
+    pub(super) fn add(&mut self, edge: Edge<W>) -> EdgeId {
+        let id = self.edges.len();
+        let to = edge.to.index();
+        match edge.kind {
+            Kind::Upper(_) => self.upper_into[to].push(id),
+            Kind::Plain if edge.bound.is_negative() => self.negative_into[to].push(id),
+            Kind::Plain | Kind::Lower(_) => self.positive_into[to].push(id),
+        }
+        self.edges.push(edge);
+        id
+    }
+
+    /// The edges of the network behind an edge, from its `from` to its `to`; at most so many.
+    ///
+    /// Whether these are all.
+    pub(super) fn spelt_out(&self, edge: EdgeId, most: usize, into: &mut Vec<EdgeId>) -> bool {
+        let mut stack = vec![edge];
+        while let Some(id) = stack.pop() {
+            let Origin::Way(way) = self.edges[id].origin else {
+                if into.len() >= most {
+                    return false;
+                }
+                into.push(id);
+                continue;
+            };
+            let mut along = Vec::new();
+            let mut next = Some(way);
+            while let Some(way) = next {
+                along.push(self.ways[way].edge);
+                next = self.ways[way].rest;
+            }
+            stack.extend(along.into_iter().rev());
+        }
+        true
+    }
+
+    /// One edge of the network in a conflict.
+    pub(super) fn step(&self, id: EdgeId) -> Step<W> {
+        let edge = &self.edges[id];
+        let ground = match (edge.kind, edge.origin) {
+            (_, Origin::Requirement(id)) => Ground::Requirement(id),
+            (Kind::Lower(link), _) => Ground::Early(link),
+            (Kind::Upper(link), _) | (_, Origin::Link(link)) => Ground::Late(link),
+            (_, Origin::Way(_)) => unreachable!("ways are spelt out"),
+        };
+        Step {
+            from: edge.from,
+            to: edge.to,
+            bound: edge.bound.clone(),
+            ground,
+        }
+    }
+}

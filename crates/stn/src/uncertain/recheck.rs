@@ -1,0 +1,170 @@
+//! Dynamic controllability again, after the bounds of one link have changed.
+
+use super::dynamic::{Search, Stage};
+use super::extended::Extended;
+use super::graph::{EdgeId, Graph};
+use super::{Conflict, LinkId, UncertainNetwork};
+use crate::{NodeId, Weight};
+
+/// What is left behind by earlier searches may become so many times as much as one search finds.
+const MOST_LEFTOVERS: usize = 4;
+
+/// A dynamically controllable network whose links can be given other bounds, one at a time.
+///
+/// What was found for one negative node depends on the nodes by which negative ways lead to it, and
+/// on the edges that end at these. Only what depends on the link is searched again, directly or by
+/// way of other nodes that do; in the networks of plans that is a few nodes of many.
+#[derive(Clone, Debug)]
+pub struct Recheck<W> {
+    network: UncertainNetwork<W>,
+    graph: Graph<W>,
+    /// For each node, those by which negative ways lead to it.
+    regions: Vec<Vec<NodeId>>,
+    /// For each node, how many of the edges that end there and are not negative are the network's.
+    given: Vec<usize>,
+    /// How many edges and ways the last search of the whole network found.
+    fresh: usize,
+}
+
+/// What was known of a node before it was dealt with again.
+struct Before {
+    node: NodeId,
+    found: Vec<EdgeId>,
+    region: Vec<NodeId>,
+}
+
+impl<W: Weight> Recheck<W> {
+    /// Checks the network.
+    ///
+    /// # Errors
+    /// The cycle that shows that it is not dynamically controllable.
+    pub fn new(network: UncertainNetwork<W>) -> Result<Self, Conflict<W>> {
+        let mut graph = Graph::new(&network);
+        let given = graph.positive_into.iter().map(Vec::len).collect();
+        let mut search = Search::new(&network, &mut graph, false);
+        for node in network.requirements.nodes() {
+            search.settle(node)?;
+        }
+        let regions = search.regions;
+        Ok(Self {
+            fresh: graph.edges.len() + graph.ways.len(),
+            network,
+            graph,
+            regions,
+            given,
+        })
+    }
+
+    /// The network, with the bounds accepted last.
+    pub fn network(&self) -> &UncertainNetwork<W> {
+        &self.network
+    }
+
+    /// Gives a link other bounds, if the network stays dynamically controllable.
+    ///
+    /// # Errors
+    /// The cycle that shows that it does not; the network stays as it was.
+    ///
+    /// # Panics
+    /// If the bounds are not in order, or the lower one is negative.
+    pub fn change(&mut self, id: LinkId, lower: W, upper: Option<W>) -> Result<(), Conflict<W>> {
+        let is_in_order = upper.as_ref().is_none_or(|upper| lower <= *upper);
+        assert!(lower >= W::zero() && is_in_order, "the bounds of a link");
+        let link = self.network.links[id.index()].clone();
+        let takes_time = |upper: &Option<W>| *upper != Some(W::zero());
+        if takes_time(&link.upper) != takes_time(&upper) {
+            // The edges of a link that takes no time are of another kind.
+            let mut network = self.network.clone();
+            network.links[id.index()].lower = lower;
+            network.links[id.index()].upper = upper;
+            *self = Self::new(network)?;
+            return Ok(());
+        }
+        let mut first = vec![link.activation];
+        if lower != link.lower {
+            // Whoever comes by the link's end may go on along its lower-case edge.
+            first.extend(self.nodes_by_way_of(link.end));
+        }
+        let dirty = self.depending_on(first);
+        let old = (link.lower, link.upper);
+        self.set(id, lower, upper);
+        let sizes = (self.graph.edges.len(), self.graph.ways.len());
+        let before = self.forget(&dirty);
+
+        let mut search = Search::new(&self.network, &mut self.graph, false);
+        search.stage.fill(Stage::Done);
+        for node in &dirty {
+            search.stage[node.index()] = Stage::New;
+        }
+        let found = dirty.iter().try_for_each(|node| search.settle(*node));
+        let mut regions = search.regions;
+        if let Err(conflict) = found {
+            self.graph.edges.truncate(sizes.0);
+            self.graph.ways.truncate(sizes.1);
+            for Before {
+                node,
+                found,
+                region,
+            } in before
+            {
+                let into = &mut self.graph.positive_into[node.index()];
+                into.truncate(self.given[node.index()]);
+                into.extend(found);
+                self.regions[node.index()] = region;
+            }
+            self.set(id, old.0, old.1);
+            return Err(conflict);
+        }
+        for node in dirty {
+            self.regions[node.index()] = std::mem::take(&mut regions[node.index()]);
+        }
+        if self.graph.edges.len() + self.graph.ways.len() > MOST_LEFTOVERS * self.fresh {
+            *self = Self::new(self.network.clone())?;
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, id: LinkId, lower: W, upper: Option<W>) {
+        let [early, late] = self.graph.edges_of(&self.network, id);
+        self.graph.edges[early].bound = lower.clone().into();
+        let most = upper.clone().map_or_else(Extended::infinity, Into::into);
+        self.graph.edges[late].bound = most.negated();
+        let link = &mut self.network.links[id.index()];
+        (link.lower, link.upper) = (lower, upper);
+    }
+
+    /// Takes away what was found for these nodes.
+    fn forget(&mut self, nodes: &[NodeId]) -> Vec<Before> {
+        let before = nodes.iter().map(|&node| Before {
+            node,
+            found: self.graph.positive_into[node.index()].split_off(self.given[node.index()]),
+            region: std::mem::take(&mut self.regions[node.index()]),
+        });
+        before.collect()
+    }
+
+    /// The nodes to which negative ways lead by way of that one.
+    fn nodes_by_way_of(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
+        let nodes = self.network.requirements.nodes();
+        nodes.filter(move |other| self.regions[other.index()].contains(&node))
+    }
+
+    /// These nodes and all that depend on them, in order.
+    fn depending_on(&self, mut open: Vec<NodeId>) -> Vec<NodeId> {
+        let count = self.network.requirements.node_count();
+        let mut dependants = vec![Vec::new(); count];
+        for node in self.network.requirements.nodes() {
+            for by in &self.regions[node.index()] {
+                dependants[by.index()].push(node);
+            }
+        }
+        let mut depends = vec![false; count];
+        while let Some(node) = open.pop() {
+            if !std::mem::replace(&mut depends[node.index()], true) {
+                open.extend_from_slice(&dependants[node.index()]);
+            }
+        }
+        let nodes = self.network.requirements.nodes();
+        nodes.filter(|node| depends[node.index()]).collect()
+    }
+}

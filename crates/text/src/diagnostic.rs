@@ -1,0 +1,259 @@
+//! What was found wrong, or worth a warning, and where.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::record::Record;
+use crate::render;
+use crate::source::{Source, Span};
+
+/// Whether a text can be used in spite of what was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The text cannot be used.
+    Error,
+    /// The text is used all the same.
+    Warning,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+        })
+    }
+}
+
+/// A place in a text, and a remark about it.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Label {
+    /// The text.
+    pub source: Source,
+    /// The place.
+    pub span: Span,
+    /// The remark; may be empty.
+    pub text: String,
+}
+
+/// `name:line:column: remark`; the text itself would fill the screen.
+impl fmt::Debug for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (line, column) = self.source.position(self.span.start);
+        write!(f, "{}:{line}:{column}: {}", self.source.name(), self.text)
+    }
+}
+
+/// One mistake or warning.
+///
+/// `Debug` prints what `Display` prints: `name:line:column: severity: message; advice`.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Whether the text can be used all the same.
+    pub severity: Severity,
+    /// For programs: the kind of finding, where a reader tells kinds apart.
+    pub code: Option<&'static str>,
+    /// What is wrong, in lower case.
+    pub message: String,
+    /// Where. At least one: the first is the place itself, others explain it.
+    pub labels: Vec<Label>,
+    /// What was expected, or what to do.
+    pub advice: Option<String>,
+}
+
+impl Diagnostic {
+    /// A finding at a place in a text.
+    pub fn new(
+        severity: Severity,
+        source: &Source,
+        span: Span,
+        message: impl Into<String>,
+    ) -> Self {
+        let label = Label {
+            source: source.clone(),
+            span,
+            text: String::new(),
+        };
+        Self {
+            severity,
+            code: None,
+            message: message.into(),
+            labels: vec![label],
+            advice: None,
+        }
+    }
+
+    /// Sets the remark that stands beside the place itself.
+    pub fn label(&mut self, text: impl Into<String>) -> &mut Self {
+        self.labels[0].text = text.into();
+        self
+    }
+
+    /// Sets what was expected, or what to do. An empty text is none.
+    pub fn advise(&mut self, advice: impl Into<String>) -> &mut Self {
+        let advice = advice.into();
+        self.advice = (!advice.is_empty()).then_some(advice);
+        self
+    }
+
+    /// Adds "did you mean", if there is something to suggest.
+    pub fn suggest(&mut self, name: Option<&str>) -> &mut Self {
+        if let Some(name) = name {
+            self.advice = Some(format!("did you mean `{name}`?"));
+        }
+        self
+    }
+
+    /// The text in which it was found.
+    pub fn source(&self) -> &Source {
+        &self.labels[0].source
+    }
+
+    /// The line, from 1.
+    pub fn line(&self) -> usize {
+        self.position().0
+    }
+
+    /// The column, from 1, in characters.
+    pub fn column(&self) -> usize {
+        self.position().1
+    }
+
+    /// How many characters the place spans on its line; 0 where something is missing.
+    pub fn length(&self) -> usize {
+        self.source().length(&self.labels[0].span)
+    }
+
+    fn position(&self) -> (usize, usize) {
+        self.source().position(self.labels[0].span.start)
+    }
+
+    /// The finding with an excerpt of the text, as a terminal shows it.
+    pub fn render(&self, colored: bool) -> String {
+        render::render(self, colored)
+    }
+
+    /// The finding as plain data, for programs.
+    pub fn record(&self) -> Record {
+        Record::from(self)
+    }
+}
+
+/// `name:line:column: severity: message; advice`
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (line, column) = self.position();
+        let (name, severity) = (self.source().name(), self.severity);
+        write!(f, "{name}:{line}:{column}: {severity}: {}", self.message)?;
+        match &self.advice {
+            Some(advice) => write!(f, "; {advice}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Debug for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Why a text cannot be used: at least one error, and the warnings met on the way.
+///
+/// `Debug` prints what `Display` prints, so that `main` may return it.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Diagnostics(Vec<Diagnostic>);
+
+impl Diagnostics {
+    /// A value with warnings, unless there is no value or one of the findings is an error.
+    ///
+    /// # Errors
+    /// All findings. A reader that gives no value has to note why.
+    pub fn outcome<T>(
+        value: Option<T>,
+        found: Vec<Diagnostic>,
+    ) -> Result<(T, Vec<Diagnostic>), Self> {
+        let is_error = |d: &Diagnostic| d.severity == Severity::Error;
+        match value {
+            Some(value) if !found.iter().any(is_error) => Ok((value, found)),
+            _ => Err(Self(found)),
+        }
+    }
+
+    /// All of them, in the order in which they were found.
+    pub fn iter(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.0.iter()
+    }
+
+    /// The errors among them.
+    pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.iter().filter(|d| d.severity == Severity::Error)
+    }
+
+    /// All of them with excerpts, as a terminal shows them.
+    pub fn render(&self, colored: bool) -> String {
+        self.iter()
+            .map(|diagnostic| diagnostic.render(colored))
+            .collect::<Vec<_>>()
+            .join("\n\n")
+    }
+
+    /// All of them as plain data, for programs.
+    pub fn records(&self) -> Vec<Record> {
+        self.iter().map(Diagnostic::record).collect()
+    }
+}
+
+impl From<Diagnostic> for Diagnostics {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self(vec![diagnostic])
+    }
+}
+
+impl From<Diagnostics> for Vec<Diagnostic> {
+    fn from(diagnostics: Diagnostics) -> Self {
+        diagnostics.0
+    }
+}
+
+/// One line each.
+impl fmt::Display for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, diagnostic) in self.iter().enumerate() {
+            if index > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{diagnostic}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::error::Error for Diagnostics {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn debug_prints_what_display_prints_and_not_the_text() {
+        let source = Source::new("f", "a secret");
+        let mut found = Diagnostic::new(Severity::Error, &source, 2..8, "this is wrong");
+        found.advise("leave it out");
+        let found = Diagnostics::from(found);
+        assert_eq!(
+            format!("{found:?}"),
+            "f:1:3: error: this is wrong; leave it out"
+        );
+        assert_eq!(format!("{found:?}"), found.to_string());
+        assert!(!format!("{:?}", found.iter().next()).contains("secret"));
+    }
+}

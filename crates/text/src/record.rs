@@ -1,0 +1,101 @@
+//! Diagnostics as plain data, for programs.
+
+use serde::{Deserialize, Serialize};
+
+use crate::diagnostic::{Diagnostic, Label, Severity};
+
+/// A [`Diagnostic`] as plain data: what `--json` prints, and what an editor needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Record {
+    /// Whether the text can be used all the same.
+    pub severity: Severity,
+    /// The kind of finding, where a reader tells kinds apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<String>,
+    /// What is wrong, in lower case.
+    pub message: String,
+    /// What was expected, or what to do; `null` if there is nothing to say.
+    pub advice: Option<String>,
+    /// The name of the text, usually a path.
+    pub file: String,
+    /// The line, from 1.
+    pub line: usize,
+    /// The column, from 1, in characters.
+    pub column: usize,
+    /// How many characters the place spans on its line; 0 where something is missing.
+    pub length: usize,
+    /// Remarks about this and other places.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<RecordLabel>,
+}
+
+/// A remark about a place.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecordLabel {
+    /// The remark.
+    pub text: String,
+    /// The name of the text, usually a path.
+    pub file: String,
+    /// The line, from 1.
+    pub line: usize,
+    /// The column, from 1, in characters.
+    pub column: usize,
+    /// How many characters the place spans on its line.
+    pub length: usize,
+}
+
+impl From<&Diagnostic> for Record {
+    fn from(diagnostic: &Diagnostic) -> Self {
+        let remarks = diagnostic
+            .labels
+            .iter()
+            .filter(|label| !label.text.is_empty());
+        Self {
+            severity: diagnostic.severity,
+            code: diagnostic.code.map(str::to_owned),
+            message: diagnostic.message.clone(),
+            advice: diagnostic.advice.clone(),
+            file: diagnostic.source().name().to_owned(),
+            line: diagnostic.line(),
+            column: diagnostic.column(),
+            length: diagnostic.length(),
+            labels: remarks.map(RecordLabel::from).collect(),
+        }
+    }
+}
+
+impl From<&Label> for RecordLabel {
+    fn from(label: &Label) -> Self {
+        let (line, column) = label.source.position(label.span.start);
+        Self {
+            text: label.text.clone(),
+            file: label.source.name().to_owned(),
+            line,
+            column,
+            length: label.source.length(&label.span),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::Source;
+
+    #[test]
+    fn a_record_says_where_and_what_to_do() {
+        let source = Source::new("a.txt", "one\ntwö three\n");
+        let mut found = Diagnostic::new(Severity::Warning, &source, 9..14, "odd");
+        found.label("here").advise("write 3");
+        let json = serde_json::to_string(&found.record()).unwrap();
+        assert_eq!(
+            json,
+            "{\"severity\":\"warning\",\"message\":\"odd\",\"advice\":\"write 3\",\
+             \"file\":\"a.txt\",\"line\":2,\"column\":5,\"length\":5,\
+             \"labels\":[{\"text\":\"here\",\"file\":\"a.txt\",\"line\":2,\"column\":5,\
+             \"length\":5}]}"
+        );
+        let read: Record = serde_json::from_str(&json).unwrap();
+        assert_eq!(read, found.record());
+    }
+}

@@ -1,0 +1,141 @@
+//! Collects findings while a text is read.
+
+use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
+use crate::source::{Source, Span};
+use crate::suggest::nearest;
+
+/// The text being read, and what was found in it so far.
+#[derive(Debug)]
+pub struct Report {
+    source: Source,
+    found: Vec<Diagnostic>,
+    /// Takes the place of findings beyond the last that is kept.
+    surplus: Option<Diagnostic>,
+    is_failed: bool,
+}
+
+impl Report {
+    /// More findings than this are not kept: they would help nobody.
+    pub const MOST: usize = 100;
+
+    /// Nothing was found yet.
+    pub fn new(source: &Source) -> Self {
+        Self {
+            source: source.clone(),
+            found: Vec::new(),
+            surplus: None,
+            is_failed: false,
+        }
+    }
+
+    /// The text being read.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Notes a mistake.
+    pub fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.is_failed = true;
+        self.add(Severity::Error, span, message.into())
+    }
+
+    /// Notes a mistake, and what to do about it if there is something to say.
+    pub fn mistake(
+        &mut self,
+        span: impl Into<Span>,
+        message: impl Into<String>,
+        advice: impl Into<Option<String>>,
+    ) {
+        self.error(span.into(), message).advice = advice.into();
+    }
+
+    /// Notes something that is used all the same, and may be meant otherwise.
+    pub fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Diagnostic {
+        self.add(Severity::Warning, span, message.into())
+    }
+
+    /// Notes a warning, unless one with this message is there already.
+    pub fn warn_once(&mut self, span: Span, message: &str) -> &mut Diagnostic {
+        match self.found.iter().position(|d| d.message == message) {
+            Some(position) => &mut self.found[position],
+            None => self.warning(span, message),
+        }
+    }
+
+    /// The candidate most like `name`, unless there are so many findings that none is needed.
+    pub fn nearest<'a>(
+        &self,
+        name: &str,
+        candidates: impl IntoIterator<Item = &'a str>,
+    ) -> Option<&'a str> {
+        if self.found.len() < Self::MOST {
+            nearest(name, candidates)
+        } else {
+            None
+        }
+    }
+
+    /// Whether there was an error.
+    pub fn is_failed(&self) -> bool {
+        self.is_failed
+    }
+
+    /// The value with the warnings, or all that was found, by position.
+    ///
+    /// # Errors
+    /// When there was an error. A reader without a value has to note why.
+    pub fn finish<T>(mut self, value: Option<T>) -> Result<(T, Vec<Diagnostic>), Diagnostics> {
+        self.found.sort_by_key(|found| found.labels[0].span.start);
+        Diagnostics::outcome(value, self.found)
+    }
+
+    fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Diagnostic {
+        let diagnostic = Diagnostic::new(severity, &self.source, span, message);
+        // An error that is not kept must not turn the outcome into a success: the first error
+        // is kept even when warnings have used up the room.
+        let is_error = |d: &Diagnostic| d.severity == Severity::Error;
+        let is_first_error = severity == Severity::Error && !self.found.iter().any(is_error);
+        if self.found.len() < Self::MOST || is_first_error {
+            self.found.push(diagnostic);
+            self.found.last_mut().expect("just pushed")
+        } else {
+            self.surplus.insert(diagnostic)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn findings_come_by_position() {
+        let mut report = Report::new(&Source::from("abc"));
+        report.error(2..3, "c");
+        report.warning(0..1, "a");
+        let found = report.finish(Some(())).unwrap_err();
+        let columns: Vec<_> = found.iter().map(Diagnostic::column).collect();
+        assert_eq!(columns, [1, 3]);
+    }
+
+    #[test]
+    fn an_error_after_many_warnings_is_an_error() {
+        let mut report = Report::new(&Source::from("abc"));
+        for _ in 0..2 * Report::MOST {
+            report.warning(0..1, "odd");
+        }
+        report.error(1..2, "wrong");
+        let found = report.finish(Some(())).unwrap_err();
+        assert_eq!(found.iter().count(), Report::MOST + 1);
+        assert_eq!(found.errors().count(), 1);
+    }
+
+    #[test]
+    fn a_warning_is_given_once() {
+        let mut report = Report::new(&Source::from("abc"));
+        report.warn_once(0..1, "odd");
+        report.warn_once(1..2, "odd");
+        let ((), warnings) = report.finish(Some(())).unwrap();
+        assert_eq!(warnings.len(), 1);
+    }
+}

@@ -1,0 +1,182 @@
+//! Texts to read, and places in them.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A place in a text, in bytes: `start..end`.
+pub type Span = Range<usize>;
+
+/// A text with the name it is reported under. Cheap to clone.
+///
+/// `Source::from("…")` makes one whose name is `text`, for texts that come from no file.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Source(Arc<Inner>);
+
+/// Some editors put it before a text.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// What a text without a name is reported as.
+const NAMELESS: &str = "text";
+
+#[derive(PartialEq, Eq)]
+struct Inner {
+    name: String,
+    text: String,
+    /// Where each line begins.
+    lines: Vec<usize>,
+}
+
+impl Source {
+    /// A text under a name, usually the path of the file it comes from.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
+        let mut text = text.into();
+        if text.starts_with(BYTE_ORDER_MARK) {
+            text.remove(0);
+        }
+        let lines = std::iter::once(0)
+            .chain(text.match_indices('\n').map(|(at, _)| at + 1))
+            .collect();
+        Self(Arc::new(Inner {
+            name: name.into(),
+            text,
+            lines,
+        }))
+    }
+
+    /// The same from bytes. What is not UTF-8 becomes U+FFFD, which the readers report unless it
+    /// stands in a comment.
+    pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
+        Self::new(name, String::from_utf8_lossy(bytes))
+    }
+
+    /// The name it is reported under.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.0.text
+    }
+
+    /// Line and column, both from 1, of a byte position. Columns count characters.
+    pub fn position(&self, at: usize) -> (usize, usize) {
+        let at = self.boundary(at);
+        let line = self.0.lines.partition_point(|&start| start <= at);
+        let start = self.0.lines[line - 1];
+        (line, self.text()[start..at].chars().count() + 1)
+    }
+
+    /// How many characters a place spans on the line on which it begins.
+    pub fn length(&self, span: &Span) -> usize {
+        let start = self.boundary(span.start);
+        let (line, _) = self.position(start);
+        let end = self.boundary(span.end).min(self.line(line).end).max(start);
+        self.text()[start..end].chars().count()
+    }
+
+    /// Where a line (from 1) lies, without its line break. Empty past the end.
+    pub fn line(&self, line: usize) -> Span {
+        let end_of_text = self.text().len();
+        let Some(&start) = self.0.lines.get(line.wrapping_sub(1)) else {
+            return end_of_text..end_of_text;
+        };
+        let end = self.0.lines.get(line).map_or(end_of_text, |&next| next - 1);
+        let line = &self.text()[start..end];
+        start..start + line.trim_end_matches('\r').len()
+    }
+
+    /// The last position not after `at` that lies between two characters of the text.
+    pub(crate) fn boundary(&self, at: usize) -> usize {
+        let mut at = at.min(self.text().len());
+        while !self.text().is_char_boundary(at) {
+            at -= 1;
+        }
+        at
+    }
+}
+
+/// The name and the text.
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Source")
+            .field("name", &self.name())
+            .field("text", &self.text())
+            .finish()
+    }
+}
+
+impl From<&str> for Source {
+    fn from(text: &str) -> Self {
+        Self::new(NAMELESS, text)
+    }
+}
+
+impl From<&String> for Source {
+    fn from(text: &String) -> Self {
+        Self::new(NAMELESS, text.as_str())
+    }
+}
+
+impl From<&[u8]> for Source {
+    fn from(bytes: &[u8]) -> Self {
+        Self::from_bytes(NAMELESS, bytes)
+    }
+}
+
+impl<const LENGTH: usize> From<&[u8; LENGTH]> for Source {
+    fn from(bytes: &[u8; LENGTH]) -> Self {
+        Self::from_bytes(NAMELESS, bytes)
+    }
+}
+
+impl From<&Vec<u8>> for Source {
+    fn from(bytes: &Vec<u8>) -> Self {
+        Self::from_bytes(NAMELESS, bytes)
+    }
+}
+
+impl From<&Source> for Source {
+    fn from(source: &Source) -> Self {
+        source.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_count_lines_and_characters_from_one() {
+        let source = Source::new("f", "ab\nçd\r\n");
+        assert_eq!(source.position(0), (1, 1));
+        assert_eq!(source.position(3), (2, 1));
+        assert_eq!(source.position(5), (2, 2));
+        assert_eq!(source.position(99), (3, 1));
+    }
+
+    #[test]
+    fn a_line_ends_before_its_break() {
+        let source = Source::new("f", "ab\ncd\r\ne");
+        assert_eq!(source.line(1), 0..2);
+        assert_eq!(source.line(2), 3..5);
+        assert_eq!(source.line(3), 7..8);
+        assert_eq!(source.line(4), 8..8);
+        assert_eq!(source.line(0), 8..8);
+    }
+
+    #[test]
+    fn a_length_counts_characters_up_to_the_end_of_the_line() {
+        let source = Source::new("f", "açb\r\ncd");
+        assert_eq!(source.length(&(1..3)), 1);
+        assert_eq!(source.length(&(1..8)), 2);
+        assert_eq!(source.length(&(2..2)), 0);
+        assert_eq!(source.length(&(99..105)), 0);
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_not_part_of_the_text() {
+        assert_eq!(Source::from_bytes("f", b"\xef\xbb\xbf(a)").text(), "(a)");
+    }
+}
