@@ -10,12 +10,14 @@ use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, valid
 /// that makes true what another one, perhaps under way before, makes true anyway.
 ///
 /// Only steps are tried that add no fact which no other step adds, and change no number: there are few
-/// of them, and whether the plan works without one is for the judge to say.
+/// of them, and whether the plan works without one is for the judge to say. `goes_on` is asked before
+/// each trial; once it says no, the other steps stay.
 pub(super) fn without_needless(
     task: &Task,
     situation: &Situation,
     plan: TimeTriggeredPlan,
     report: Report,
+    goes_on: &mut dyn FnMut() -> bool,
 ) -> (TimeTriggeredPlan, Report) {
     let mut added: Vec<Added> = plan
         .steps
@@ -33,6 +35,9 @@ pub(super) fn without_needless(
             !added[index].changes_numbers && added[index].facts.iter().all(|fact| adders[fact] > 1);
         if !may_be_needless {
             continue;
+        }
+        if !goes_on() {
+            break;
         }
         let mut fewer = left.0.clone();
         fewer.steps.remove(index);

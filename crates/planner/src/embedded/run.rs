@@ -249,6 +249,9 @@ impl Planner<'_> {
             turn += 1;
             let result = search.turn();
             spent += search.price();
+            // To schedule and to judge a candidate takes longer than many turns, and one that is no
+            // better than the best plan may be followed by any number of others.
+            let mut is_report_due = false;
             match result {
                 Turn::Over => {
                     self.count(&before, search);
@@ -260,10 +263,13 @@ impl Planner<'_> {
                     if let Some(outcome) = self.consider(&steps, search) {
                         return outcome;
                     }
+                    spent += steps.len() as u64;
+                    is_report_due = true;
                 }
             }
             let lookups = search.lookups() - reported.1;
-            if turn - reported.0 >= report_every || lookups >= REPORT_LOOKUPS {
+            is_report_due |= turn - reported.0 >= report_every || lookups >= REPORT_LOOKUPS;
+            if is_report_due {
                 reported = (turn, search.lookups());
                 self.count(&before, search);
                 if (self.observe)(&self.progress).is_break() {
@@ -295,7 +301,13 @@ impl Planner<'_> {
         };
         let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
         let whole = self.value(plan.clone(), &report);
-        let (plan, report) = without_needless(self.task, self.situation, plan, report);
+        let (task, situation) = (self.task, self.situation);
+        let mut is_interrupted = false;
+        let mut goes_on = || {
+            is_interrupted = (self.observe)(&self.progress).is_break();
+            !is_interrupted
+        };
+        let (plan, report) = without_needless(task, situation, plan, report, &mut goes_on);
         // A metric can prefer what nothing needs, such as one that rewards time.
         let fewer = self.value(plan, &report);
         let found = if worth(&fewer) <= worth(&whole) {
@@ -308,14 +320,14 @@ impl Planner<'_> {
             .as_ref()
             .is_some_and(|best| worth(best) <= worth(&found))
         {
-            return None;
+            return is_interrupted.then_some(Outcome::Stop(Stopped::Interrupted));
         }
         self.progress.best = Some(found.value.clone());
         self.progress.plan = Some(found.clone());
         self.best = Some(found);
         let flow = (self.observe)(&self.progress);
         self.progress.plan = None;
-        if flow.is_break() {
+        if flow.is_break() || is_interrupted {
             return Some(Outcome::Stop(Stopped::Interrupted));
         }
         if self.settings.first_plan_only {
