@@ -19,6 +19,9 @@ pub(crate) struct RunArgs {
     #[arg(value_name = "PROBLEM", required_unless_present = "replay")]
     pub(crate) problem: Option<PathBuf>,
     /// The plan to begin with; without it, the planner makes one
+    #[arg(value_name = "PLAN", conflicts_with = "plan")]
+    pub(crate) first_plan: Option<PathBuf>,
+    /// The same as PLAN
     #[arg(long, value_name = "FILE")]
     pub(crate) plan: Option<PathBuf>,
     /// The planner: `embedded`, another one as in `elbowroom plan`, or `none`: the run ends when the
@@ -114,6 +117,11 @@ pub(crate) struct RunArgs {
 }
 
 impl RunArgs {
+    /// The plan to begin with, if one is given.
+    pub(crate) fn plan(&self) -> Option<&PathBuf> {
+        self.first_plan.as_ref().or(self.plan.as_ref())
+    }
+
     /// Whether the world is the spoiler.
     pub(crate) fn is_spoiled(&self) -> bool {
         self.world.as_deref() == Some(std::path::Path::new("spoiler"))
@@ -130,6 +138,7 @@ impl RunArgs {
 const IN_THE_TRACE: &[&str] = &[
     "domain",
     "problem",
+    "first_plan",
     "plan",
     "planner",
     "planner_time",

@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     };
     let (spec, world) = spec::of(arguments, domain, problem)?;
     let task = task(&spec)?;
-    let first = match &arguments.plan {
+    let first = match arguments.plan() {
         Some(path) => Some(time_triggered(&task, path)?),
         None => None,
     };

@@ -12,8 +12,10 @@ pub(crate) struct Options {
     pub(crate) planning: Planning,
     /// Only plans whose family or name has this in it.
     pub(crate) only: Vec<String>,
-    /// How many runs altogether.
+    /// The most runs of one plan.
     pub(crate) runs: u64,
+    /// Time for the runs of one plan.
+    pub(crate) each: Duration,
     /// For how long to widen a box at most.
     pub(crate) widening: Duration,
     /// Threads.
@@ -30,7 +32,8 @@ impl Options {
                 time: Some(Duration::from_secs(5)),
             },
             only: Vec::new(),
-            runs: 1_000_000,
+            runs: 3_000,
+            each: Duration::from_secs(10),
             widening: Duration::from_secs(20),
             jobs: 2,
         };
@@ -53,6 +56,7 @@ impl Options {
                 }
                 "--only" => options.only.push(value.clone()),
                 "--runs" => options.runs = number()?,
+                "--each" => options.each = Duration::from_secs(number()?),
                 "--widening" => options.widening = Duration::from_secs(number()?),
                 "--jobs" => options.jobs = usize::try_from(number()?.max(1)).unwrap_or(1),
                 _ => return Err(format!("unknown option {option}")),

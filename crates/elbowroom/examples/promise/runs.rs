@@ -2,8 +2,7 @@
 //! no failure, no new plan, and the judge accepts what was done.
 
 use std::fmt::Write as _;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::options::Options;
 use super::sources::Source;
@@ -12,14 +11,12 @@ use super::tally::{Tally, run};
 use super::trial::{Ready, Search};
 
 use super::worlds::{Kind, Worlds};
-use super::{counted, not_counted, wanted};
+use super::{counted, not_counted};
 
 #[allow(clippy::disallowed_methods, reason = "runs are timed")]
 pub(crate) fn main(options: &Options) {
     let begin = Instant::now();
-    let total = AtomicU64::new(0);
-    let most = 4 * options.runs.div_ceil(wanted(options).len().max(1) as u64);
-    let (families, skipped) = counted(options, &|source| tally(source, options, &total, most));
+    let (families, skipped) = counted(options, &|source| tally(source, options));
     let kinds = Kind::ALL.map(Kind::name).join(" | ");
     println!("| family | plans | {kinds} | failures |\n|---|--:|--:|--:|--:|--:|");
     for (family, tallies) in &families {
@@ -54,14 +51,7 @@ fn line(tallies: &[&Tally]) -> String {
     clippy::disallowed_methods,
     reason = "boxes and runs have a limited time"
 )]
-fn tally(
-    source: &Source,
-    options: &Options,
-    total: &AtomicU64,
-    most: u64,
-) -> Result<(String, Tally), String> {
-    /// For the runs of one plan.
-    const TIME: Duration = Duration::from_secs(10);
+fn tally(source: &Source, options: &Options) -> Result<(String, Tally), String> {
     let subject = Subject::of_source(source, &options.planning)?;
     let begin = Instant::now();
     let goes_on = || begin.elapsed() < options.widening;
@@ -73,8 +63,8 @@ fn tally(
     let worlds = Worlds::new(&subject.task, &ready.open, ready.envelope());
     let mut tally = Tally::default();
     let begin = Instant::now();
-    for number in 0..most {
-        if begin.elapsed() > TIME || total.fetch_add(1, Ordering::Relaxed) >= options.runs {
+    for number in 0..options.runs {
+        if begin.elapsed() > options.each {
             break;
         }
         run(&ready, &worlds, number, &mut tally);

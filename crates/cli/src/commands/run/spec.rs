@@ -27,7 +27,7 @@ pub(super) fn of(
         planner: arguments.planner.clone(),
         planner_time: arguments.planner_time.clone(),
         world_process: arguments.world_process.clone(),
-        has_plan: arguments.plan.is_some(),
+        has_plan: arguments.plan().is_some(),
         seed: arguments.seed,
         planner_states: arguments.planner_states,
         improve_states: arguments.improve_states,
