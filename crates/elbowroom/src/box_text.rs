@@ -101,7 +101,7 @@ pub fn parse_box(text: &str, plan: &ParametrizedPlan) -> Result<DecoupledEnvelop
                 let name = parameter.name.clone();
                 return Err(BoxTextError::Empty { name });
             }
-            envelope.intervals[index] = interval;
+            envelope = envelope.with_interval(index.into(), interval);
         }
     }
     Ok(envelope)
@@ -112,7 +112,7 @@ pub fn write_box(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Strin
     let items: Vec<String> = plan
         .parameters
         .iter()
-        .zip(&envelope.intervals)
+        .zip(envelope.intervals())
         .map(|(parameter, interval)| {
             let lower = interval
                 .lower

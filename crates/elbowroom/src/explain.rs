@@ -95,14 +95,14 @@ impl<'a> Explainer<'a> {
     }
 
     /// Why the plan has no schedule at these values. If it has one, the explanation is empty.
-    pub fn no_schedule(&self, valuation: &[Rational]) -> Explanation {
+    pub fn no_schedule(&self, valuation: &Valuation) -> Explanation {
         let conflict = conflict::find(self, valuation);
         Explanation {
             reason: conflict
                 .as_ref()
                 .map_or_else(String::new, |c| c.reason.clone()),
             shortfall: conflict.map(|conflict| Shortfall::Time(conflict.excess)),
-            valuation: valuation.to_vec(),
+            valuation: valuation.clone(),
             schedule: None,
             verdict: None,
             plays: Vec::new(),
@@ -179,7 +179,7 @@ impl<'a> Explainer<'a> {
             .add(Constraint::at_least(second, first, late))
             .ok()?;
         let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
-        example.schedule = schedule.times().to_vec();
+        example.schedule = schedule.into();
         Some(most.map_or(Shortfall::Boundless, |most| {
             Shortfall::Time(&most + self.task.epsilon())
         }))
@@ -284,8 +284,8 @@ fn shortfall(broken: &Broken, example: &Counterexample) -> Option<Shortfall> {
     let [inequality] = broken.case.inequalities.as_slice() else {
         return None;
     };
-    let mut times = example.schedule.clone();
-    times.extend(example.moment.clone());
+    let times = example.schedule.iter().chain(&example.moment);
+    let times = times.cloned().collect();
     let value = inequality.expression.value(&times, &example.valuation);
     (!value.is_zero()).then(|| Shortfall::Amount(value.abs()))
 }

@@ -154,7 +154,7 @@ pub fn open_more(
         return Ok(plan);
     };
     let schedule = network.earliest_schedule(elbowroom_plan::network_node(NodeId::ZERO));
-    vary(task, plan, schedule.times(), specs)
+    vary(task, plan, &schedule.into(), specs)
 }
 
 /// What the judge says of a plan.

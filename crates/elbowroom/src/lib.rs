@@ -65,8 +65,8 @@
 //! let robust = robust_plan(&Arc::new(task), &plan, &Settings::default())?;
 //! let envelope = robust.envelope.expect("the plan works as it is");
 //! // The office closes at 30, and delivering may not take longer than that.
-//! assert!(envelope.intervals[0].contains(&28.into()));
-//! assert!(!envelope.intervals[0].contains(&30.into()));
+//! assert!(envelope.intervals()[0].contains(&28.into()));
+//! assert!(!envelope.intervals()[0].contains(&30.into()));
 //! # Ok(())
 //! # }
 //! ```

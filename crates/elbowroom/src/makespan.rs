@@ -1,12 +1,12 @@
 //! How long a plan takes.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Node, ParametrizedPlan};
+use elbowroom_plan::{Node, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
 /// When the last action ends if everything starts as early as it can and the parameters have
 /// these values; `None` if the plan has no schedule then.
-pub fn earliest_end(plan: &ParametrizedPlan, valuation: &[Rational]) -> Option<Rational> {
+pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Rational> {
     let network = ConsistentNetwork::try_from(plan.plan.network(valuation)).ok()?;
     let schedule = network.earliest_schedule(NodeId(0));
     plan.plan

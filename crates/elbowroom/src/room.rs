@@ -15,17 +15,13 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::deorder::{pin_until_sound, with_all_sides, with_sides_one_way, without_sides};
 use elbowroom_plan::{
     Bound, BoxEnd, Constraint, DecoupledEnvelope, InstanceId, Node, NodeId, Parameter, ParameterId,
-    ParameterKind, ParametrizedPlan, Reason, Side, StnPlan,
+    ParameterKind, ParametrizedPlan, Reason, Schedule, Side, StnPlan,
 };
 
 /// The plan with as few differences fixed, and as loosely, as it takes for every nominal schedule
 /// to work. If even fixing all of them does not help, the plan as it is: the box check will say
 /// what is wrong with it.
-pub(crate) fn sound(
-    task: &Task,
-    plan: &ParametrizedPlan,
-    nominal: &[Rational],
-) -> ParametrizedPlan {
+pub(crate) fn sound(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> ParametrizedPlan {
     let sided = |sided: fn(StnPlan) -> StnPlan| ParametrizedPlan {
         plan: sided(plan.plan.clone()),
         ..plan.clone()
@@ -56,7 +52,7 @@ fn most_sides(plan: &StnPlan) -> usize {
 }
 
 /// The plan with pins, none of them needless, as loose as can be; `None` if nothing can be told.
-fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &[Rational]) -> Option<ParametrizedPlan> {
+fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> Option<ParametrizedPlan> {
     let mut free = plan.clone();
     free.plan = without_sides(free.plan).0;
     let given = free.plan.constraints.len();
@@ -82,10 +78,10 @@ fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &[Rational]) -> Option<
 }
 
 /// How long the longest action takes.
-fn longest(plan: &StnPlan, nominal: &[Rational]) -> Rational {
+fn longest(plan: &StnPlan, nominal: &Schedule) -> Rational {
     let durations = plan.instances.iter().enumerate().map(|(index, _)| {
         let id = InstanceId::from(index);
-        &nominal[plan.end(id).index()] - &nominal[plan.start(id).index()]
+        &nominal[plan.end(id)] - &nominal[plan.start(id)]
     });
     durations.max().unwrap_or_default()
 }

@@ -78,9 +78,7 @@ fn envelope_of(plan: &ParametrizedPlan, recorded: &Recorded) -> DecoupledEnvelop
         let (lower, upper) = recorded[&parameter.name].clone();
         Interval::closed(lower, upper)
     });
-    DecoupledEnvelope {
-        intervals: intervals.collect(),
-    }
+    DecoupledEnvelope::new(plan, intervals.collect()).expect("one for each")
 }
 
 /// The only recorded ends that may move further: `senddata` takes exactly 1 in its domain, which
@@ -191,7 +189,7 @@ fn search(case: &Case) -> Recorded {
     })
     .expect("within reach");
     let envelope = run.envelope.expect("the start point is inside");
-    let named = case.plan.parameters.iter().zip(&envelope.intervals);
+    let named = case.plan.parameters.iter().zip(envelope.intervals());
     named
         .filter_map(|(parameter, interval)| {
             let ends = (

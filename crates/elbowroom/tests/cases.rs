@@ -13,7 +13,7 @@ use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{self, Source};
 use elbowroom::plan::parametrize::VarySpec;
-use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 use elbowroom::{flow, plan};
 
 fn folder(case: &str) -> PathBuf {
@@ -72,7 +72,7 @@ fn alone(task: &Arc<Task>, time_triggered: &TimeTriggeredPlan, instance: usize) 
         .expect("few cases")
         .expect("what was found is inside");
     assert!(sharp.includes(&found));
-    sharp.intervals[0].clone()
+    sharp.intervals()[0].clone()
 }
 
 /// Compares a case with what was worked out by hand: for each duration, in the order of the
@@ -85,7 +85,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
         assert_eq!(found, *expected, "{case}: duration n{instance}");
     }
     let opened = Arc::new(opened(&task, &plan, &[]));
-    let nominal = opened.nominal();
+    let nominal: Vec<Rational> = opened.nominal().into_iter().collect();
     assert!(region(&nominal), "{case}: the nominal point");
     let mut oracle = Oracle::new(&task, &opened, Guarantee::Weak).expect("within exact reasoning");
     // All points whose coordinates are these shares of the nominal ones, and just beyond zero.
@@ -107,7 +107,7 @@ fn agrees(case: &str, intervals: &[&str], region: impl Fn(&[Rational]) -> bool) 
             .collect();
         let expected = region(&point);
         let found = oracle
-            .objection(&DecoupledEnvelope::point(&point))
+            .objection(&DecoupledEnvelope::point(&Valuation::new(point.clone())))
             .expect("few cases");
         assert_eq!(found.is_none(), expected, "{case} at {point:?}: {found:?}");
         if expected {
@@ -218,8 +218,9 @@ fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
     for case in ["hatchery", "lamp"] {
         let (task, plan) = read(case);
         let (task, plan) = (Arc::new(task.clone()), opened(&task, &plan, &[]));
-        let mut oracle = Oracle::new(&task, &Arc::new(plan), Guarantee::Dynamic)
-            .expect("within exact reasoning");
+        let plan = Arc::new(plan);
+        let mut oracle =
+            Oracle::new(&task, &plan, Guarantee::Dynamic).expect("within exact reasoning");
         for (lower, width, least, expected) in [
             ("7.501", "4.998", "5", true),
             ("7.501", "4.999", "5", false),
@@ -228,12 +229,11 @@ fn in_the_hatchery_and_under_the_lamp_only_so_much_may_be_left_open() {
             ("20", "0", "0.002", true),
         ] {
             let (lower, width) = (number(lower), number(width));
-            let envelope = DecoupledEnvelope {
-                intervals: vec![
-                    Interval::closed(lower.clone(), lower + width),
-                    Interval::at_least(number(least)),
-                ],
-            };
+            let intervals = vec![
+                Interval::closed(lower.clone(), lower + width),
+                Interval::at_least(number(least)),
+            ];
+            let envelope = DecoupledEnvelope::new(&plan, intervals).expect("two durations");
             let objection = oracle.objection(&envelope).expect("few cases");
             assert_eq!(objection.is_none(), expected, "{case}: {envelope:?}");
         }
@@ -248,9 +248,8 @@ fn the_paintshop_is_as_worked_by_hand() {
         assert_eq!(alone(&task, &plan, instance).to_string(), "[0, inf)");
     }
     let opened = Arc::new(opened(&task, &plan, &[]));
-    let everything = DecoupledEnvelope {
-        intervals: vec![Interval::at_least(Rational::ZERO); 3],
-    };
+    let intervals = vec![Interval::at_least(Rational::ZERO); 3];
+    let everything = DecoupledEnvelope::new(&opened, intervals).expect("three durations");
     for guarantee in [Guarantee::Weak, Guarantee::Dynamic] {
         let mut oracle = Oracle::new(&task, &opened, guarantee).expect("within exact reasoning");
         assert_eq!(oracle.objection(&everything), Ok(None), "{guarantee:?}");
@@ -276,7 +275,7 @@ fn the_stn_file_of_the_delivery_means_the_same_as_its_plan() {
         (1, 1, 40, 25),
     ] {
         let box_of = |values: &[i64]| {
-            let values: Vec<Rational> = values.iter().map(|&v| Rational::from(v)).collect();
+            let values: Valuation = values.iter().map(|&v| Rational::from(v)).collect();
             DecoupledEnvelope::point(&values)
         };
         let in_file = of_file

@@ -19,7 +19,7 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::read_plan;
 use elbowroom_plan::deorder::{Deordered, pinned_to};
 use elbowroom_plan::parametrize::parametrize;
-use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, network_node};
+use elbowroom_plan::{DecoupledEnvelope, NodeId, Schedule, StnPlan, Valuation, network_node};
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{Rng, SeedableRng};
@@ -31,7 +31,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     /// Looking up windows takes time; of large plans, not all nodes need it.
     const MOST: usize = 40;
     let zero = network_node(NodeId::ZERO);
-    let network = ConsistentNetwork::try_from(plan.network(&[]));
+    let network = ConsistentNetwork::try_from(plan.network(&Valuation::default()));
     let mut network = network.expect("the plan has schedules");
     let mut nodes: Vec<NodeId> = plan.nodes().map(|(node, _)| node).skip(1).collect();
     nodes.shuffle(rng);
@@ -60,11 +60,11 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     } else {
         network.latest_schedule(zero)
     };
-    schedule.times().to_vec()
+    schedule.into()
 }
 
 /// What the judge objects to in a schedule of the plan.
-fn objection(task: &Task, plan: &StnPlan, schedule: &[Rational]) -> Option<String> {
+fn objection(task: &Task, plan: &StnPlan, schedule: &Schedule) -> Option<String> {
     let fixed: TimeTriggeredPlan = plan.scheduled(schedule);
     match validate(task, &fixed, &Settings::default()) {
         Verdict::Valid(_) => None,
@@ -78,7 +78,7 @@ fn assert_parametrized(task: &Task, deordered: &Deordered) {
     let Deordered { plan, nominal, .. } = deordered.clone();
     let open = parametrize(task, plan, &nominal, &[]).unwrap_or_else(|error| panic!("{error}"));
     let network = open.plan.network(&open.nominal());
-    assert!(elbowroom_stn::Schedule::new(nominal).holds_in(&network));
+    assert!(elbowroom_stn::Schedule::from(nominal).holds_in(&network));
 }
 
 /// Domain, problem and plan of each line of `plans.csv` whose plan is valid when VAL is called with
@@ -163,12 +163,16 @@ fn examine([domain, problem, plan_file]: &[PathBuf; 3], rng: &mut ChaCha8Rng, co
     assert_parametrized(&task, &freed.deordered);
     let nominal = freed.deordered.nominal.clone();
     let closed = flow::closed(&task, freed);
-    let network = closed.plan.network(&[]);
+    let network = closed.plan.network(&Valuation::default());
     assert!(
-        elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&network),
+        elbowroom_stn::Schedule::from(nominal.clone()).holds_in(&network),
         "{name}"
     );
-    let sound = match broken_in(&task, &closed, &DecoupledEnvelope::point(&[])) {
+    let sound = match broken_in(
+        &task,
+        &closed,
+        &DecoupledEnvelope::point(&Valuation::default()),
+    ) {
         Ok(None) => {
             count.told += 1;
             closed.plan

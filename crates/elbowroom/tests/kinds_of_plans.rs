@@ -9,7 +9,9 @@ use std::sync::Arc;
 use elbowroom::envelope::{self, Guarantee, Oracle, StopReason, irr};
 use elbowroom::model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom::num::Rational;
-use elbowroom::plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, format, network_node};
+use elbowroom::plan::{
+    BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation, format, network_node,
+};
 use elbowroom::stn::ConsistentNetwork;
 use elbowroom::{flow, parse_box};
 use kinds::{Kind, kinds};
@@ -22,7 +24,7 @@ fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
 }
 
 /// The plan with all durations left open, and its nominal schedule.
-fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Vec<Rational>) {
+fn opened(task: &Task, plan: &TimeTriggeredPlan) -> (Arc<ParametrizedPlan>, Schedule) {
     let freed = flow::free(task, plan).expect("a valid plan");
     assert!(freed.repaired.is_none());
     let nominal = freed.deordered.nominal.clone();
@@ -49,8 +51,8 @@ fn schedules(
     let draw = |rng: &mut ChaCha8Rng| {
         let shares = [0, 0, 1, 3, 6, 6];
         let share = |rng: &mut ChaCha8Rng| Rational::new(shares[rng.random_range(0..6)], 6);
-        let intervals = envelope.intervals.iter();
-        let values: Vec<Rational> = intervals
+        let intervals = envelope.intervals().iter();
+        let values: Valuation = intervals
             .map(|interval| {
                 let lower = interval.lower.value().expect("a finite box");
                 let upper = interval.upper.value().expect("a finite box");
@@ -73,7 +75,7 @@ fn schedules(
                 network.add(constraint).expect("in its window");
             }
         }
-        let schedule = network.earliest_schedule(zero).times().to_vec();
+        let schedule = network.earliest_schedule(zero).into();
         open.plan.at(&values).scheduled(&schedule)
     };
     (0..40).map(|_| draw(rng)).collect()
@@ -87,14 +89,14 @@ fn the_plans_are_valid_and_so_is_their_nominal_schedule() {
         let freed = flow::free(&task, &plan).expect("a valid plan");
         let nominal = freed.deordered.nominal.clone();
         let closed = Arc::new(flow::closed(&task, freed));
-        let schedule = elbowroom::stn::Schedule::new(nominal);
+        let schedule = elbowroom::stn::Schedule::from(nominal);
         assert!(
-            schedule.holds_in(&closed.plan.network(&[])),
+            schedule.holds_in(&closed.plan.network(&Valuation::default())),
             "{}",
             kind.name
         );
         let mut oracle = Oracle::new(&task, &closed, Guarantee::Weak).expect("within reach");
-        let objection = oracle.objection(&DecoupledEnvelope::point(&[]));
+        let objection = oracle.objection(&DecoupledEnvelope::point(&Valuation::default()));
         assert_eq!(objection, Ok(None), "{}", kind.name);
     }
 }
@@ -148,15 +150,16 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
         let (task, plan) = kind.read();
         let (open, nominal) = opened(&task, &plan);
         let at_nominal = open.plan.network(&open.nominal());
-        assert!(elbowroom::stn::Schedule::new(nominal).holds_in(&at_nominal));
+        assert!(elbowroom::stn::Schedule::from(nominal).holds_in(&at_nominal));
         let mut oracle = Oracle::new(&task, &open, Guarantee::Weak).expect("within reach");
         let go_on = &mut |_: Option<&envelope::Widening<'_>>| ControlFlow::Continue(());
         let run = irr(&mut oracle, &envelope::Settings::default(), go_on).expect("few cases");
         assert_eq!(run.stop, StopReason::Converged, "{}", kind.name);
         let mut found = run.envelope.expect("it works as planned");
-        for interval in &mut found.intervals {
+        for (index, interval) in found.clone().intervals().iter().enumerate() {
             let far = &interval.lower.value().cloned().unwrap_or_default() + Rational::from(60);
-            *interval = interval.intersection(&elbowroom::num::Interval::at_most(far));
+            let near = interval.intersection(&elbowroom::num::Interval::at_most(far));
+            found = found.with_interval(index.into(), near);
         }
         for schedule in schedules(&open, &found, &mut rng) {
             assert!(
@@ -362,7 +365,7 @@ fn a_number_in_a_continuous_decrease_is_left_open_as_it_is_written() {
         flow::open(&task, freed, &[spec])
     };
     let open = Arc::new(opened("constant work charge shared").expect("a number"));
-    assert_eq!(open.nominal(), [Rational::ONE]);
+    assert_eq!(open.nominal(), Valuation::new(vec![Rational::ONE]));
     assert!(opened("constant work charge 1 shared").is_ok());
     assert!(opened("constant work charge -1 shared").is_err());
     // Three jobs of 10 each, and 39 to spend.

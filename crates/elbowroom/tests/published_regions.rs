@@ -208,7 +208,7 @@ fn compared(case: &Case, formula: &Formula<'_>) -> [usize; 2] {
             let id = case.plan.find(name).expect("a parameter of the plan");
             point[id.index()].clone()
         });
-        let envelope = DecoupledEnvelope::point(&point);
+        let envelope = DecoupledEnvelope::point(&point.iter().cloned().collect());
         let objection = oracle.objection(&envelope).expect("within reach");
         assert_eq!(objection.is_none(), expected, "{point:?}: {objection:?}");
         counts[usize::from(!expected)] += 1;

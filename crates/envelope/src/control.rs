@@ -121,7 +121,7 @@ impl Kept {
     /// Checks a box that differs from the kept one in the interval of one link alone; if nothing
     /// stands against it, it is the kept one from now on.
     fn recheck(&mut self, envelope: &DecoupledEnvelope) -> Rechecked {
-        let pairs = self.envelope.intervals.iter().zip(&envelope.intervals);
+        let pairs = self.envelope.intervals().iter().zip(envelope.intervals());
         let mut moved = pairs.enumerate().filter(|(_, (old, new))| old != new);
         let Some((index, (_, interval))) = moved.next() else {
             return Rechecked::Controllable;

@@ -26,13 +26,7 @@ pub fn enforced(
     let nominal = plan.nominal();
     let schedule = earliest_schedule(&reduction, &nominal).ok_or(Refusal::NoNominalSchedule)?;
     let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
-    let ranges = DecoupledEnvelope {
-        intervals: plan
-            .parameters
-            .iter()
-            .map(|parameter| parameter.range.clone())
-            .collect(),
-    };
+    let ranges = DecoupledEnvelope::ranges(plan);
     let network = ConsistentNetwork::try_from(reduction.network(&ranges).network).ok();
     let is_implied = |wanted: &Difference| {
         let Some(network) = &network else {

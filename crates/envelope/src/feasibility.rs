@@ -102,7 +102,7 @@ impl Feasibility {
     ) -> Result<Option<Infeasible>, TooManyBranches> {
         let ends = match moved {
             Some(end) => vec![end],
-            None => BoxEnd::all(envelope.intervals.len()).collect(),
+            None => BoxEnd::all(envelope.intervals().len()).collect(),
         };
         for end in ends {
             match (end.reach(envelope), self.own_limits.get(&end)) {
@@ -204,14 +204,14 @@ impl Feasibility {
     /// Values without a schedule, with the parameter so far out on that side as it takes.
     fn far_out(&self, envelope: &DecoupledEnvelope, end: BoxEnd) -> Valuation {
         let mut values: Valuation = envelope
-            .intervals
+            .intervals()
             .iter()
             .map(|interval| any_value(interval, Side::Lower))
             .collect();
         let base = any_value(envelope.interval(end.parameter), end.side.opposite());
         let mut step = Rational::ONE;
         loop {
-            values[end.parameter.index()] = match end.side {
+            values[end.parameter] = match end.side {
                 Side::Lower => &base - &step,
                 Side::Upper => &base + &step,
             };
@@ -374,7 +374,7 @@ impl Feasibility {
 /// The values at a corner; parameters that do not matter at some value.
 fn valuation(sides: &BTreeMap<ParameterId, Side>, envelope: &DecoupledEnvelope) -> Valuation {
     envelope
-        .intervals
+        .intervals()
         .iter()
         .enumerate()
         .map(|(index, interval)| {

@@ -48,8 +48,8 @@
 //! let run = irr(&mut oracle, &Settings::default(), &mut |_| ControlFlow::Continue(()))?;
 //! let envelope = run.envelope.map_err(|objection| objection.to_string())?;
 //! // The office closes at 30.
-//! assert!(envelope.intervals[0].contains(&28.into()));
-//! assert!(!envelope.intervals[0].contains(&30.into()));
+//! assert!(envelope.intervals()[0].contains(&28.into()));
+//! assert!(!envelope.intervals()[0].contains(&30.into()));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-use elbowroom_plan::{NodeId, ParameterId, Valuation};
+use elbowroom_plan::{NodeId, ParameterId, Schedule, Valuation};
 
 /// A factor by which a parameter can be multiplied in a [`Linear`] expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -200,20 +200,20 @@ impl Linear {
     }
 
     /// The value for these times (by node) and parameters.
-    pub fn value(&self, times: &[Rational], parameters: &Valuation) -> Rational {
+    pub fn value(&self, times: &Schedule, parameters: &Valuation) -> Rational {
         let mut value = self.constant.clone();
         for (node, coefficient) in &self.times {
-            value += coefficient * &times[node.index()];
+            value += coefficient * &times[*node];
         }
         for (id, coefficient) in &self.parameters {
-            value += coefficient * &parameters[id.index()];
+            value += coefficient * &parameters[*id];
         }
         for ((id, factor), coefficient) in &self.products {
             let factor = match factor {
-                Factor::Time(node) => &times[node.index()],
-                Factor::Parameter(second) => &parameters[second.index()],
+                Factor::Time(node) => &times[*node],
+                Factor::Parameter(second) => &parameters[*second],
             };
-            value += &(coefficient * &parameters[id.index()]) * factor;
+            value += &(coefficient * &parameters[*id]) * factor;
         }
         value
     }
@@ -258,7 +258,7 @@ fn add_term<K: Ord>(terms: &mut BTreeMap<K, Rational>, key: K, coefficient: &Rat
 
 #[cfg(test)]
 mod tests {
-    use super::{Linear, NodeId, ParameterId, Rational};
+    use super::{Linear, NodeId, ParameterId, Rational, Valuation};
 
     #[test]
     fn a_rate_times_a_duration_is_bilinear_and_a_duration_squared_is_refused() {
@@ -266,9 +266,9 @@ mod tests {
         let duration = Linear::difference(NodeId(1), NodeId(2));
         let product = rate.times(&duration).expect("bilinear");
         // (3 + 2) * (10 - 4)
-        let times = [0, 4, 10].map(Rational::from);
+        let times = [0, 4, 10].map(Rational::from).into_iter().collect();
         assert_eq!(
-            product.value(&times, &vec![Rational::from(3)]),
+            product.value(&times, &Valuation::new(vec![Rational::from(3)])),
             Rational::from(30)
         );
         assert!(duration.times(&duration).is_none());

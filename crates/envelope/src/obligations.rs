@@ -22,7 +22,7 @@ use elbowroom_model::ground::{Condition, FluentId};
 use elbowroom_num::Rational;
 
 use crate::linear::Linear;
-use elbowroom_plan::{InstanceId, NodeId, ParameterId, StnPlan, Valuation};
+use elbowroom_plan::{InstanceId, NodeId, ParameterId, Schedule, StnPlan, Valuation};
 
 pub use over_all::OverAll;
 
@@ -72,7 +72,7 @@ pub struct Inequality {
 
 impl Inequality {
     /// Whether it holds for these times (by node) and parameters.
-    pub fn holds(&self, times: &[Rational], parameters: &Valuation) -> bool {
+    pub fn holds(&self, times: &Schedule, parameters: &Valuation) -> bool {
         let value = self.expression.value(times, parameters);
         value.is_negative() || (value.is_zero() && !self.is_strict)
     }

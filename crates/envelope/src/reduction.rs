@@ -10,7 +10,7 @@ use elbowroom_stn::{
 
 use crate::obligations::{BadCase, Substitution};
 use elbowroom_plan::{
-    Bound, BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side,
+    Bound, BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Schedule, Side,
 };
 
 /// `t_to - t_from <= constant + reach(end)`, over classes.
@@ -106,13 +106,7 @@ impl Reduction {
     /// Besides being less work, this shows what parameters really bear on: a constraint "the end
     /// comes after time 0" would put the duration before it on a cycle of constraints.
     fn drop_implied(&mut self, plan: &ParametrizedPlan) {
-        let ranges = DecoupledEnvelope {
-            intervals: plan
-                .parameters
-                .iter()
-                .map(|parameter| parameter.range.clone())
-                .collect(),
-        };
+        let ranges = DecoupledEnvelope::ranges(plan);
         let BoxNetwork { network, edges } = self.network(&ranges);
         let has_parameter = |id: ConstraintId| self.edges[edges[id.index()]].end.is_some();
         // Whole numbers are several times faster; sums of paths must stay far from overflow.
@@ -266,7 +260,7 @@ impl Reduction {
     }
 
     /// The times of all nodes, from those of the classes; class 0 holds time zero.
-    pub fn times(&self, class_times: &[Rational]) -> Vec<Rational> {
+    pub fn times(&self, class_times: &[Rational]) -> Schedule {
         self.places
             .iter()
             .map(|(class, offset)| &class_times[class.index()] - &class_times[0] + offset)

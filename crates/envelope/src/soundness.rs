@@ -26,7 +26,7 @@ use crate::obligations::{BadCase, Difference, Obligations, OverAll, Refusal, Req
 use crate::reduction::Reduction;
 use bad_case::Outcome;
 use certificate::Certificate;
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Valuation};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, Valuation};
 use lazy::{Lazy, numbers};
 use proof::Proof;
 use scale::Numbers;
@@ -74,7 +74,7 @@ pub struct Counterexample {
     /// The parameters' values.
     pub valuation: Valuation,
     /// A time for each node.
-    pub schedule: Vec<Rational>,
+    pub schedule: Schedule,
     /// For an over-all condition, the moment at which it is false.
     pub moment: Option<Rational>,
 }
@@ -136,7 +136,7 @@ impl Soundness {
     pub(crate) fn around(
         task: &Task,
         plan: &ParametrizedPlan,
-        valuation: &[Rational],
+        valuation: &Valuation,
     ) -> Result<Self, Refusal> {
         let reduction = Reduction::new(plan);
         let schedule =
@@ -321,10 +321,7 @@ impl DirectCase {
 }
 
 /// The earliest schedule at these values, by node.
-pub(crate) fn earliest_schedule(
-    reduction: &Reduction,
-    valuation: &[Rational],
-) -> Option<Vec<Rational>> {
+pub(crate) fn earliest_schedule(reduction: &Reduction, valuation: &Valuation) -> Option<Schedule> {
     let point = DecoupledEnvelope::point(valuation);
     let network = reduction.network(&point).network;
     let consistent = ConsistentNetwork::try_from(network).ok()?;
@@ -359,22 +356,19 @@ fn check_over_all(
     plan: &ParametrizedPlan,
     reduction: &Reduction,
     over_all: &OverAll,
-    nominal: &[Rational],
+    nominal: &Schedule,
 ) -> Result<(), Refusal> {
-    let (start, end) = (
-        &nominal[over_all.start.index()],
-        &nominal[over_all.end.index()],
-    );
+    let (start, end) = (&nominal[over_all.start], &nominal[over_all.end]);
     let mut moments = vec![start];
     moments.extend(
         over_all
             .events
             .iter()
-            .map(|event| &nominal[event.index()])
+            .map(|event| &nominal[*event])
             .filter(|&time| time > start && time < end),
     );
     for moment in moments {
-        let cut = |node: NodeId| nominal[node.index()] <= *moment;
+        let cut = |node: NodeId| nominal[node] <= *moment;
         for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
             inequalities.extend(over_all.assumptions.iter().cloned());
             let case = BadCase {

@@ -5,7 +5,7 @@ mod given;
 
 use elbowroom_envelope::obligations::Refusal;
 use elbowroom_num::Rational;
-use elbowroom_plan::{BoxEnd, Side};
+use elbowroom_plan::{BoxEnd, NodeId, ParameterId, Side};
 
 use given::{Given, envelope, oracle};
 
@@ -65,7 +65,7 @@ fn a_counterexample_to_separation_has_the_happenings_close_together() {
         ..Given::default()
     };
     let found = given.counterexample("");
-    assert!((&found.schedule[1] - &found.schedule[2]).abs() < Rational::new(1, 4));
+    assert!((&found.schedule[NodeId(1)] - &found.schedule[NodeId(2)]).abs() < Rational::new(1, 4));
 }
 
 #[test]
@@ -79,8 +79,8 @@ fn a_counterexample_at_an_infinite_end_has_a_value_far_enough_out() {
         ..Given::default()
     };
     let found = given.counterexample("[1, inf]");
-    let duration = &found.moment.unwrap() - &found.schedule[1];
-    assert!(Rational::from(5) + &found.valuation[0] * duration > Rational::from(8));
+    let duration = &found.moment.unwrap() - &found.schedule[NodeId(1)];
+    assert!(Rational::from(5) + &found.valuation[ParameterId(0)] * duration > Rational::from(8));
 }
 
 #[test]
@@ -317,7 +317,7 @@ fn a_counterexample_to_separation_has_the_happenings_in_order() {
         ..Given::default()
     };
     let found = given.counterexample("[8, 9]");
-    let gap = &found.schedule[1] - Rational::new(17, 2);
+    let gap = &found.schedule[NodeId(1)] - Rational::new(17, 2);
     assert!(!gap.is_negative() && gap < Rational::new(1, 4));
 }
 

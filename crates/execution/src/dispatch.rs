@@ -20,7 +20,9 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Body};
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::{Impossible, Reading};
-use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
+use elbowroom_plan::{
+    Bound, Constraint, InstanceId, Node, NodeId, Schedule, StnPlan, network_node,
+};
 use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::executor::{Mission, Planned, StepId};
@@ -75,7 +77,7 @@ pub(crate) struct Dispatch {
     plan: StnPlan,
     /// The actions, with nominal values for what is left open.
     actions: Vec<Arc<Action>>,
-    nominal: Vec<Rational>,
+    nominal: Schedule,
     /// What the world's clock reads when the plan's reads 0.
     origin: Rational,
     epsilon: Rational,
@@ -260,7 +262,7 @@ impl Dispatch {
             .nodes()
             .filter(|(_, what)| matches!(what, Node::Timed(_)));
         let mut timed: Vec<_> = timed
-            .map(|(node, _)| (mission.nominal[node.index()].clone(), node))
+            .map(|(node, _)| (mission.nominal[node].clone(), node))
             .collect();
         timed.sort_by(|one, other| other.cmp(one));
         let mut dispatch = Self {
@@ -335,7 +337,7 @@ impl Dispatch {
     /// How long an instance is planned to take.
     pub(crate) fn nominal_duration(&self, id: InstanceId) -> Rational {
         let [start, end] = self.ends[id.index()];
-        &self.nominal[end.index()] - &self.nominal[start.index()]
+        &self.nominal[end] - &self.nominal[start]
     }
 
     /// Start and end of an instance.
@@ -364,7 +366,7 @@ impl Dispatch {
 
     /// When a node happens if nothing deviates, on the plan's clock.
     pub(crate) fn nominal_time(&self, node: NodeId) -> &Rational {
-        &self.nominal[node.index()]
+        &self.nominal[node]
     }
 
     /// The window of a node, by the world's clock.

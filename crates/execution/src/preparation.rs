@@ -5,8 +5,7 @@
 use std::sync::Arc;
 
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, PartialOrderPlan, Schedule};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, PartialOrderPlan, Schedule, Valuation};
 
 use crate::forms::Forms;
 
@@ -75,6 +74,6 @@ pub trait Region: Send {
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
-        values: &[Rational],
+        values: &Valuation,
     ) -> Option<String>;
 }

@@ -2,7 +2,7 @@
 
 use elbowroom_num::{End, Interval, Rational, Side};
 
-use crate::parameter::{ParameterId, Valuation};
+use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
 
 /// An interval for each parameter, by position (ρ in paper 1, definition 3).
 ///
@@ -12,20 +12,48 @@ use crate::parameter::{ParameterId, Valuation};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DecoupledEnvelope {
     /// One interval for each parameter; ends are closed or infinite.
-    pub intervals: Vec<Interval>,
+    intervals: Vec<Interval>,
 }
 
 impl DecoupledEnvelope {
+    /// The box with these intervals for the plan's parameters, by position; `None` if there are not
+    /// as many. Open ends become closed ones.
+    pub fn new(plan: &ParametrizedPlan, intervals: Vec<Interval>) -> Option<Self> {
+        let fits = intervals.len() == plan.parameters.len();
+        let intervals = intervals.into_iter().map(closed).collect();
+        fits.then_some(Self { intervals })
+    }
+
+    /// The box of all values that the plan's parameters can take at all.
+    pub fn ranges(plan: &ParametrizedPlan) -> Self {
+        let ranges = plan.parameters.iter().map(|own| closed(own.range.clone()));
+        Self {
+            intervals: ranges.collect(),
+        }
+    }
+
     /// The box that holds one valuation only.
-    pub fn point(valuation: &[Rational]) -> Self {
+    pub fn point(valuation: &Valuation) -> Self {
         Self {
             intervals: valuation.iter().cloned().map(Interval::point).collect(),
         }
     }
 
+    /// One interval for each parameter, by position; ends are closed or infinite.
+    pub fn intervals(&self) -> &[Interval] {
+        &self.intervals
+    }
+
     /// The interval of a parameter.
     pub fn interval(&self, id: ParameterId) -> &Interval {
         &self.intervals[id.index()]
+    }
+
+    /// The same box with another interval for that parameter. Open ends become closed ones.
+    #[must_use]
+    pub fn with_interval(mut self, id: ParameterId, interval: Interval) -> Self {
+        self.intervals[id.index()] = closed(interval);
+        self
     }
 
     /// Whether the valuation lies in the box.
@@ -38,7 +66,7 @@ impl DecoupledEnvelope {
 
     /// The valuation in this box (not empty) that is closest to another one.
     #[must_use]
-    pub fn nearest(&self, valuation: &[Rational]) -> Valuation {
+    pub fn nearest(&self, valuation: &Valuation) -> Valuation {
         let clamped = |(interval, value): (&Interval, &Rational)| {
             let value = match interval.lower.value() {
                 Some(lower) => value.max(lower),
@@ -59,6 +87,18 @@ impl DecoupledEnvelope {
             .iter()
             .zip(&other.intervals)
             .all(|(mine, theirs)| mine.intersection(theirs) == *theirs)
+    }
+}
+
+/// The interval with its ends, where it has any.
+fn closed(interval: Interval) -> Interval {
+    let closed = |end| match end {
+        End::Open(value) => End::Closed(value),
+        End::Closed(_) | End::Infinite => end,
+    };
+    Interval {
+        lower: closed(interval.lower),
+        upper: closed(interval.upper),
     }
 }
 

@@ -40,6 +40,7 @@ pub use implied::without_implied;
 pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};
+use crate::parameter::Valuation;
 use crate::stn_plan::{Instance, InstanceId, Node, NodeId, StnPlan};
 use order::{Order, Timeline};
 
@@ -103,7 +104,7 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
         .map_err(|(first, second)| DeorderError::Simultaneous {
             first: stn_plan.node_words(task, first),
             second: stn_plan.node_words(task, second),
-            time: times[first.index()].to_decimal(6),
+            time: times[first].to_decimal(6),
         })?;
     let mut sides = Order::default();
     over_all::order(task, &stn_plan, &timeline, &mut order, &mut sides);
@@ -171,10 +172,10 @@ pub(crate) fn labelled(task: &Task, plan: &TimeTriggeredPlan) -> Labelled {
 /// The original times, or the earliest that start nothing sooner than the original does, as far
 /// as that is possible.
 fn nominal(task: &Task, plan: &StnPlan, times: Schedule) -> Result<Schedule, DeorderError> {
-    let network = plan.network(&[]);
-    let original = elbowroom_stn::Schedule::new(times);
+    let network = plan.network(&Valuation::default());
+    let original = elbowroom_stn::Schedule::from(times);
     if original.holds_in(&network) {
-        return Ok(original.times().to_vec());
+        return Ok(original.into());
     }
     let mut network =
         ConsistentNetwork::try_from(network.clone()).map_err(|cycle| DeorderError::NoSchedule {
@@ -196,7 +197,7 @@ fn nominal(task: &Task, plan: &StnPlan, times: Schedule) -> Result<Schedule, Deo
             let _ = network.add(start);
         }
     }
-    Ok(network.earliest_schedule(zero).times().to_vec())
+    Ok(network.earliest_schedule(zero).into())
 }
 
 #[cfg(test)]

@@ -47,6 +47,7 @@ pub mod deorder;
 mod durations;
 pub mod format;
 mod network;
+mod numbers;
 mod parameter;
 pub mod parametrize;
 pub mod partial_order;

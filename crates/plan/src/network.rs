@@ -6,10 +6,45 @@ use elbowroom_model::{Step, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_stn::Network;
 
+use crate::numbers::numbers_by_id;
+use crate::parameter::{ParameterId, Valuation};
 use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
 
 /// A time for each node of an [`StnPlan`], by position.
-pub type Schedule = Vec<Rational>;
+///
+/// A [`Valuation`] is another type, so that neither is taken for the other:
+///
+/// ```compile_fail
+/// # fn times(plan: &elbowroom_plan::StnPlan, schedule: &elbowroom_plan::Schedule) {
+/// plan.network(schedule);
+/// # }
+/// ```
+///
+/// ```
+/// # fn times(plan: &elbowroom_plan::StnPlan, schedule: &elbowroom_plan::Schedule) {
+/// plan.scheduled(schedule);
+/// # }
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Schedule {
+    numbers: Vec<Rational>,
+}
+
+numbers_by_id!(Schedule, NodeId);
+
+/// Nodes keep their positions in [`StnPlan::network`].
+impl From<elbowroom_stn::Schedule> for Schedule {
+    fn from(schedule: elbowroom_stn::Schedule) -> Self {
+        Self::new(schedule.into_times())
+    }
+}
+
+/// Nodes keep their positions in [`StnPlan::network`].
+impl From<Schedule> for elbowroom_stn::Schedule {
+    fn from(schedule: Schedule) -> Self {
+        Self::new(schedule.numbers)
+    }
+}
 
 /// The node's namesake in [`StnPlan::network`].
 pub fn network_node(node: NodeId) -> elbowroom_stn::NodeId {
@@ -29,18 +64,13 @@ pub enum Origin {
 
 impl StnPlan {
     /// The plan as a network, when the parameters have these values. Nodes keep their positions.
-    pub fn network(&self, valuation: &[Rational]) -> Network {
+    pub fn network(&self, valuation: &Valuation) -> Network {
         self.network_with_origins(valuation).0
     }
 
     /// The same, with where each of the network's constraints comes from, by
     /// [`ConstraintId`](elbowroom_stn::ConstraintId).
-    pub fn network_with_origins(&self, valuation: &[Rational]) -> (Network, Vec<Origin>) {
-        let value = |bound: &Bound| match bound {
-            Bound::Infinite => None,
-            Bound::Finite(value) => Some(value.clone()),
-            Bound::Parameter(id) => Some(valuation[id.index()].clone()),
-        };
+    pub fn network_with_origins(&self, valuation: &Valuation) -> (Network, Vec<Origin>) {
         let mut network = Network::with_nodes(self.nodes.len());
         let mut origins = Vec::with_capacity(self.nodes.len() + 2 * self.constraints.len());
         let zero = network_node(NodeId::ZERO);
@@ -54,11 +84,11 @@ impl StnPlan {
         }
         for (index, constraint) in self.constraints.iter().enumerate() {
             let (from, to) = (network_node(constraint.from), network_node(constraint.to));
-            if let Some(lower) = value(&constraint.lower) {
+            if let Some(lower) = constraint.lower.at(valuation) {
                 network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
                 origins.push(Origin::AtLeast(index));
             }
-            if let Some(upper) = value(&constraint.upper) {
+            if let Some(upper) = constraint.upper.at(valuation) {
                 network.add(elbowroom_stn::Constraint::at_most(from, to, upper));
                 origins.push(Origin::AtMost(index));
             }
@@ -68,12 +98,12 @@ impl StnPlan {
 
     /// The plan with these values in place of its parameters.
     #[must_use]
-    pub fn at(&self, valuation: &[Rational]) -> Self {
+    pub fn at(&self, valuation: &Valuation) -> Self {
         let mut plan = self.clone();
         for instance in &mut plan.instances {
             instance.action = instance.action.map_leaves(&mut |leaf| match leaf {
                 Expression::Unknown(Unknown::Parameter(index)) => {
-                    Some(Expression::Constant(valuation[*index as usize].clone()))
+                    Some(Expression::Constant(valuation[ParameterId(*index)].clone()))
                 }
                 _ => None,
             });
@@ -81,7 +111,7 @@ impl StnPlan {
         for constraint in &mut plan.constraints {
             for bound in [&mut constraint.lower, &mut constraint.upper] {
                 if let Bound::Parameter(id) = bound {
-                    *bound = Bound::Finite(valuation[id.index()].clone());
+                    *bound = Bound::Finite(valuation[*id].clone());
                 }
             }
         }
@@ -89,19 +119,19 @@ impl StnPlan {
     }
 
     /// The plan with fixed times that a schedule makes of it, steps in order of start.
-    pub fn scheduled(&self, schedule: &[Rational]) -> TimeTriggeredPlan {
+    pub fn scheduled(&self, schedule: &Schedule) -> TimeTriggeredPlan {
         let mut steps = Vec::with_capacity(self.instances.len());
         let mut ends = vec![None; self.instances.len()];
         for (node, what) in self.nodes() {
             if let Node::End(id) = what {
-                ends[id.index()] = Some(schedule[node.index()].clone());
+                ends[id.index()] = Some(schedule[node].clone());
             }
         }
         for (node, what) in self.nodes() {
             let (Node::Start(id) | Node::Instant(id)) = what else {
                 continue;
             };
-            let start = schedule[node.index()].clone();
+            let start = schedule[node].clone();
             let action = self.instance(id).action.clone();
             let duration = match action.body {
                 Body::Instantaneous(_) => None,

@@ -7,6 +7,7 @@ use elbowroom_model::ground::{Body, Condition, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::{Interval, Rational};
 
+use crate::numbers::numbers_by_id;
 use crate::stn_plan::{InstanceId, StnPlan};
 
 /// A parameter of a [`ParametrizedPlan`], by position in its list.
@@ -75,8 +76,13 @@ pub struct ParametrizedPlan {
     pub goal: Condition,
 }
 
-/// A value for each parameter, by position.
-pub type Valuation = Vec<Rational>;
+/// A value for each parameter, by position; the default is for a plan that has none.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Valuation {
+    numbers: Vec<Rational>,
+}
+
+numbers_by_id!(Valuation, ParameterId);
 
 impl ParameterKind {
     /// The values such a quantity can take when nobody says otherwise, given its nominal value:

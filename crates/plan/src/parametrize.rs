@@ -39,11 +39,11 @@ mod select;
 mod spec;
 
 use elbowroom_model::Task;
-use elbowroom_num::Rational;
 
 pub use error::ParametrizeError;
 pub use spec::{ConstantTarget, Selection, Target, VarySpec};
 
+use crate::network::Schedule;
 use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::StnPlan;
 use opening::Opening;
@@ -58,7 +58,7 @@ use opening::Opening;
 pub fn parametrize(
     task: &Task,
     plan: StnPlan,
-    nominal: &[Rational],
+    nominal: &Schedule,
     specs: &[VarySpec],
 ) -> Result<ParametrizedPlan, ParametrizeError> {
     let plan = ParametrizedPlan::closed(task, plan);
@@ -87,7 +87,7 @@ pub fn parametrize(
 pub fn vary(
     task: &Task,
     plan: ParametrizedPlan,
-    nominal: &[Rational],
+    nominal: &Schedule,
     specs: &[VarySpec],
 ) -> Result<ParametrizedPlan, ParametrizeError> {
     let mut opening = Opening::new(task, plan, nominal)?;

@@ -148,9 +148,7 @@ pub fn partial_order(task: &Task, plan: &TimeTriggeredPlan) -> PartialOrderPlan 
         .collect();
     for &from in &happenings {
         for &to in &happenings {
-            if times[from.index()] < times[to.index()]
-                && uses[to.index()].spoils(&uses[from.index()])
-            {
+            if times[from] < times[to] && uses[to.index()].spoils(&uses[from.index()]) {
                 links.push(Link {
                     from,
                     to,

@@ -4,7 +4,7 @@ use elbowroom_model::ground::{Action, Body};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
-use crate::parameter::ParameterId;
+use crate::parameter::{ParameterId, Valuation};
 
 /// A time point of an [`StnPlan`], by position in [`StnPlan::nodes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -84,6 +84,15 @@ impl Bound {
         match self {
             Self::Parameter(id) => Some(*id),
             Self::Infinite | Self::Finite(_) => None,
+        }
+    }
+
+    /// The limit when the parameters have these values; `None` if there is none.
+    pub fn at(&self, valuation: &Valuation) -> Option<Rational> {
+        match self {
+            Self::Infinite => None,
+            Self::Finite(value) => Some(value.clone()),
+            Self::Parameter(id) => Some(valuation[*id].clone()),
         }
     }
 }

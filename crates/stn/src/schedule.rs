@@ -23,6 +23,11 @@ impl<W: Weight> Schedule<W> {
         &self.times
     }
 
+    /// The times, by node.
+    pub fn into_times(self) -> Vec<W> {
+        self.times
+    }
+
     /// Whether every constraint of `network` holds.
     pub fn holds_in(&self, network: &Network<W>) -> bool {
         self.times.len() == network.node_count()

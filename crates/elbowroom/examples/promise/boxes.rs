@@ -138,7 +138,7 @@ fn timed(
 /// The sum of the widths, upper ends cut at ten times the nominal value.
 fn width(envelope: &DecoupledEnvelope, plan: &ParametrizedPlan) -> Rational {
     let mut sum = Rational::ZERO;
-    for (interval, parameter) in envelope.intervals.iter().zip(&plan.parameters) {
+    for (interval, parameter) in envelope.intervals().iter().zip(&plan.parameters) {
         let lower = interval.lower.value().cloned().unwrap_or_default();
         let most = &parameter.nominal * Rational::from(10);
         let upper = interval.upper.value().min(Some(&most));

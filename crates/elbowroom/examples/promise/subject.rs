@@ -9,7 +9,7 @@ use elbowroom::flow::{self, Freed};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, read_problem};
 use elbowroom::plan::format;
-use elbowroom::plan::{NodeId, network_node};
+use elbowroom::plan::{NodeId, Valuation, network_node};
 use elbowroom::{PlanKind, stn};
 
 use super::planning;
@@ -120,10 +120,10 @@ impl Subject {
 fn scheduled(bytes: &[u8], task: &Task) -> Result<TimeTriggeredPlan, String> {
     let plan = format::read(bytes, task).map_err(|_| "refused by the reader of STN plans")?;
     let plan = plan.plan.at(&plan.nominal());
-    let network = stn::ConsistentNetwork::try_from(plan.network(&[]));
+    let network = stn::ConsistentNetwork::try_from(plan.network(&Valuation::default()));
     let network = network.map_err(|_| "an STN plan without a schedule")?;
     let schedule = network.earliest_schedule(network_node(NodeId::ZERO));
-    Ok(plan.scheduled(schedule.times()))
+    Ok(plan.scheduled(&schedule.into()))
 }
 
 /// The task of two files.

@@ -62,7 +62,7 @@ impl<'a> Worlds<'a> {
             }
         }
         let mut order: Vec<InstanceId> = (0..plan.instances.len()).map(InstanceId::from).collect();
-        order.sort_by_key(|id| (&prepared.nominal[plan.start(*id).index()], *id));
+        order.sort_by_key(|id| (&prepared.nominal[plan.start(*id)], *id));
         let mut instances: BTreeMap<String, Vec<_>> = BTreeMap::new();
         for id in order {
             let name = plan.instance(id).action.name.clone();
@@ -104,7 +104,7 @@ impl<'a> Worlds<'a> {
 
     fn nominal(&self, id: InstanceId) -> Rational {
         let plan = &self.prepared.plan.plan;
-        let time = |node: elbowroom::plan::NodeId| &self.prepared.nominal[node.index()];
+        let time = |node: elbowroom::plan::NodeId| &self.prepared.nominal[node];
         time(plan.end(id)) - time(plan.start(id))
     }
 

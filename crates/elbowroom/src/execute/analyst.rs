@@ -7,11 +7,10 @@ use std::sync::Arc;
 use elbowroom_envelope::{Guarantee, Oracle, irr};
 use elbowroom_execution::{Forms, Need, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
 use elbowroom_plan::partial_order::partial_order;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
@@ -163,7 +162,7 @@ impl Region for WholeRegion {
         &mut self,
         task: &Arc<Task>,
         plan: &ParametrizedPlan,
-        values: &[Rational],
+        values: &Valuation,
     ) -> Option<String> {
         if !plan.reads_numbers(task) {
             // What facts need is in the network, whatever the durations; the executor has it.

@@ -11,7 +11,7 @@ use elbowroom_model::validate::{self, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::deorder;
-use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan};
+use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan, Valuation};
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, WorldModel};
 use elbowroom_stn::ConsistentNetwork;
@@ -335,7 +335,7 @@ impl Rest {
             plan.constraints[*index].lower = Bound::Finite(duration.clone());
             plan.constraints[*index].upper = Bound::Finite(duration);
         }
-        ConsistentNetwork::try_from(plan.network(&[])).is_ok()
+        ConsistentNetwork::try_from(plan.network(&Valuation::default())).is_ok()
     }
 }
 

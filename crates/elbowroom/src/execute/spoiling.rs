@@ -37,7 +37,7 @@ impl Spoiling {
     /// ([`ParametrizedPlan::uncertain_network`](elbowroom_plan::ParametrizedPlan::uncertain_network)).
     /// `nominal` says when everything happens if nothing deviates.
     pub fn new(plan: &StnPlan, network: &PlanNetwork, nominal: &Schedule) -> Self {
-        let time = |node: NodeId| &nominal[node.index()];
+        let time = |node: NodeId| &nominal[node];
         let mut order: Vec<InstanceId> = (0..plan.instances.len()).map(InstanceId::from).collect();
         order.sort_by_key(|id| (time(plan.start(*id)), *id));
         let mut instances: BTreeMap<String, Vec<InstanceId>> = BTreeMap::new();

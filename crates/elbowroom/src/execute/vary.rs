@@ -2,8 +2,8 @@
 
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
-use elbowroom_plan::StnPlan;
 use elbowroom_plan::parametrize::{ParametrizeError, Target, VarySpec, parametrize};
+use elbowroom_plan::{Schedule, StnPlan};
 
 /// Whether each specification names something that the problem has, or a plan may have.
 ///
@@ -15,7 +15,7 @@ use elbowroom_plan::parametrize::{ParametrizeError, Target, VarySpec, parametriz
 pub fn check_vary(task: &Task, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
     let plan = StnPlan::unconstrained(task, Vec::new());
     let timed = task.timed().iter().map(|timed| timed.time.clone());
-    let nominal: Vec<Rational> = [Rational::ZERO].into_iter().chain(timed).collect();
+    let nominal: Schedule = [Rational::ZERO].into_iter().chain(timed).collect();
     for spec in specs {
         let is_about_the_problem = matches!(spec.target, Target::Initial(_) | Target::Timed { .. });
         match parametrize(task, plan.clone(), &nominal, std::slice::from_ref(spec)) {

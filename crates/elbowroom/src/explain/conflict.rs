@@ -1,7 +1,7 @@
 //! Why a plan has no schedule: what takes too long, and what it must fit into.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint, NodeId, Origin, Reason, StnPlan};
+use elbowroom_plan::{Constraint, NodeId, Origin, Reason, StnPlan, Valuation};
 
 use super::Explainer;
 
@@ -35,7 +35,7 @@ impl<'a> Edge<'a> {
 }
 
 /// The contradiction in the plan's constraints at these values; `None` if there is none.
-pub(super) fn find(explainer: &Explainer<'_>, valuation: &[Rational]) -> Option<Conflict> {
+pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<Conflict> {
     let plan = &explainer.plan.plan;
     let (network, origins) = plan.network_with_origins(valuation);
     let cycle = network.consistency().err()?;
@@ -120,12 +120,12 @@ fn is_own_separation(explainer: &Explainer<'_>, origin: Edge<'_>) -> bool {
 fn need(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
-    valuation: &[Rational],
+    valuation: &Valuation,
 ) -> Option<String> {
     if let Some(id) = explainer.plan.plan.duration_of(constraint) {
         return Some(explainer.action_name(id).to_owned());
     }
-    let least = value(&constraint.lower, valuation)?;
+    let least = constraint.lower.at(valuation)?;
     if least <= *explainer.task.epsilon() {
         return None;
     }
@@ -151,7 +151,7 @@ fn room(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
     next: Edge<'_>,
-    valuation: &[Rational],
+    valuation: &Valuation,
 ) -> Room {
     let plan = &explainer.plan.plan;
     if let Reason::Timed(index) = constraint.reason {
@@ -164,7 +164,7 @@ fn room(
     if let Some(id) = explainer.plan.plan.duration_of(constraint) {
         return Room::Action(explainer.action_name(id).to_owned());
     }
-    let most = value(&constraint.upper, valuation).unwrap_or_default();
+    let most = constraint.upper.at(valuation).unwrap_or_default();
     let to = plan.node_words(explainer.task, constraint.to);
     Room::Limit(if constraint.from == NodeId::ZERO {
         let deadline = explainer.deadline_behind(constraint.to, &most);
@@ -173,12 +173,4 @@ fn room(
         let from = plan.node_words(explainer.task, constraint.from);
         format!("at most {} from {from} to {to}", most.to_decimal(6))
     })
-}
-
-fn value(bound: &Bound, valuation: &[Rational]) -> Option<Rational> {
-    match bound {
-        Bound::Infinite => None,
-        Bound::Finite(value) => Some(value.clone()),
-        Bound::Parameter(id) => Some(valuation[id.index()].clone()),
-    }
 }

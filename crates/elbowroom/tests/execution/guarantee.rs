@@ -121,7 +121,7 @@ fn world_of_the_envelope(scene: &Scene) -> WorldModel {
     let envelope = prepared.envelope.as_ref().expect("a correct test");
     let mut sections = String::new();
     for (index, parameter) in prepared.plan.parameters.iter().enumerate() {
-        let (from, to) = ends(&envelope.intervals[index], &parameter.nominal);
+        let (from, to) = ends(&envelope.intervals()[index], &parameter.nominal);
         let uniform = format!("uniform = {{ from = {from}, to = {to} }}");
         let action = |id| &prepared.plan.plan.instance(id).action;
         match parameter.kind {

@@ -62,7 +62,7 @@ impl Preparer for AsItIs {
     ) -> Result<Prepared, String> {
         let plan = StnPlan::unconstrained(task, Vec::new());
         Ok(Prepared {
-            nominal: vec![Rational::ZERO; plan.nodes.len()],
+            nominal: plan.nodes.iter().map(|_| Rational::ZERO).collect(),
             plan: ParametrizedPlan {
                 told: std::collections::BTreeMap::default(),
                 plan,

@@ -35,7 +35,7 @@ fn a_promise_does_not_rest_on_a_duration_that_is_chosen_later() {
             .collect();
         let prepared = scene.prepared("guarded");
         let envelope = prepared.envelope.expect("a dynamic box");
-        let [interval] = envelope.intervals.as_slice() else {
+        let [interval] = envelope.intervals() else {
             panic!("one duration is open: {envelope:?}");
         };
         let End::Closed(most) = interval.upper.clone() else {

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 /// thousand away from its other end.
 pub(crate) fn valuation(envelope: &DecoupledEnvelope, rng: &mut ChaCha8Rng) -> Valuation {
     envelope
-        .intervals
+        .intervals()
         .iter()
         .map(|interval| value(interval, rng))
         .collect()
@@ -42,7 +42,7 @@ fn share(rng: &mut ChaCha8Rng) -> Rational {
 /// random order, often one of the window's ends. `None` if the plan has no schedule there.
 pub(crate) fn schedule(
     plan: &StnPlan,
-    valuation: &[Rational],
+    valuation: &Valuation,
     rng: &mut ChaCha8Rng,
 ) -> Option<Schedule> {
     let zero = network_node(NodeId::ZERO);
@@ -71,5 +71,5 @@ pub(crate) fn schedule(
             .add(Constraint::at_most(zero, node, time))
             .expect("in its window");
     }
-    Some(network.earliest_schedule(zero).times().to_vec())
+    Some(network.earliest_schedule(zero).into())
 }

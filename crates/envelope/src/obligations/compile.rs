@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::{Body, Condition, Expression, SnapAction};
-use elbowroom_num::Rational;
 
 use changes::record;
 use guards::{GuardId, GuardPart, effects};
@@ -23,7 +22,7 @@ use super::{
     BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
 };
 use crate::linear::Linear;
-use elbowroom_plan::{InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan};
+use elbowroom_plan::{InstanceId, Node, NodeId, ParameterKind, ParametrizedPlan, Schedule};
 
 /// How many combinations of outcomes of conditional effects are followed.
 const MOST_RUNS: usize = 256;
@@ -39,11 +38,11 @@ impl Obligations {
     pub(crate) fn compile(
         task: &Task,
         plan: &ParametrizedPlan,
-        nominal: &[Rational],
+        nominal: &Schedule,
         substitution: &Substitution,
     ) -> Result<Self, Refusal> {
         let mut order: Vec<NodeId> = plan.plan.nodes().map(|(id, _)| id).collect();
-        order.sort_by(|a, b| nominal[a.index()].cmp(&nominal[b.index()]).then(a.cmp(b)));
+        order.sort_by(|a, b| nominal[*a].cmp(&nominal[*b]).then(a.cmp(b)));
         let mut obligations = Self {
             direct: separations(task, &plan.plan, &order),
             over_all: Vec::new(),

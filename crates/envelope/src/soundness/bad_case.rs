@@ -56,7 +56,7 @@ impl<'a, S: Scale> Schedules<'a, S> {
         envelope: &'a DecoupledEnvelope,
         scale: S,
     ) -> Option<Self> {
-        let parameters = (0..envelope.intervals.len()).map(ParameterId::from);
+        let parameters = (0..envelope.intervals().len()).map(ParameterId::from);
         let reaches: Vec<[Option<S::Weight>; 2]> = parameters
             .map(|parameter| {
                 Side::BOTH.map(|side| {
@@ -368,17 +368,19 @@ pub(crate) fn witness(
                 least(&fixed).as_ref(),
             )?;
             for (&parameter, value) in &corner.values {
-                valuation[parameter.index()] = value.clone();
+                valuation[parameter] = value.clone();
             }
             let moment = &class_times[reduction.class_count()] - &class_times[0];
-            let mut times = reduction.times(&class_times);
-            times.push(moment.clone());
+            let schedule = reduction.times(&class_times);
+            let with_moment = schedule.iter().chain([&moment]).cloned().collect();
             let comes_about = |valuation: &Valuation| {
                 envelope.contains(valuation)
-                    && case.inequalities.iter().all(|i| i.holds(&times, valuation))
+                    && case
+                        .inequalities
+                        .iter()
+                        .all(|i| i.holds(&with_moment, valuation))
             };
             let valuation = corner.far_out(valuation, &comes_about)?;
-            times.pop();
             let reads_moment = case
                 .differences
                 .iter()
@@ -386,7 +388,7 @@ pub(crate) fn witness(
                 .any(|node| node.index() == reduction.node_count());
             Some(Counterexample {
                 valuation,
-                schedule: times,
+                schedule,
                 moment: reads_moment.then_some(moment),
             })
         })

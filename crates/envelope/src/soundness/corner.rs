@@ -85,7 +85,7 @@ impl Corner {
         for _ in 0..MOST_DOUBLINGS {
             let mut reach = step.clone();
             for &(parameter, is_upper) in self.infinite.iter().rev() {
-                valuation[parameter.index()] = if is_upper { reach.clone() } else { -&reach };
+                valuation[parameter] = if is_upper { reach.clone() } else { -&reach };
                 reach *= &step;
             }
             if will_do(&valuation) {

@@ -76,7 +76,7 @@ pub(crate) fn witness(
         .iter()
         .map(|variable| model[variable.index()].clone())
         .collect();
-    let count = envelope.intervals.len();
+    let count = envelope.intervals().len();
     let values = (0..count).map(ParameterId::from).map(|id| {
         program
             .parameters
@@ -107,7 +107,7 @@ impl<'a> Program<'a> {
             meanings: Vec::new(),
         };
         program.fix_zero();
-        for index in 0..envelope.intervals.len() {
+        for index in 0..envelope.intervals().len() {
             program.add_parameter(ParameterId::from(index), envelope);
         }
         for index in 0..reduction.edges().len() {

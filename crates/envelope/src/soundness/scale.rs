@@ -71,7 +71,7 @@ impl Whole {
         numbers: &Numbers,
     ) -> Option<Self> {
         let mut all = numbers.clone();
-        for interval in &envelope.intervals {
+        for interval in envelope.intervals() {
             for end in [&interval.lower, &interval.upper] {
                 if let Some(value) = end.value() {
                     all.include(value)?;
@@ -137,7 +137,11 @@ mod tests {
         inside
             .iter()
             .try_for_each(|number| numbers.include(number))?;
-        Whole::fitting(&reduction, &DecoupledEnvelope::point(ends), &numbers)
+        Whole::fitting(
+            &reduction,
+            &DecoupledEnvelope::point(&ends.iter().cloned().collect()),
+            &numbers,
+        )
     }
 
     #[test]

@@ -12,7 +12,7 @@ use elbowroom_model::{Task, TimeTriggeredPlan, Verdict, validate};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::{Deordered, deorder, pin_until_sound, pinned_to};
 use elbowroom_plan::{
-    DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, network_node,
+    DecoupledEnvelope, NodeId, ParametrizedPlan, Schedule, StnPlan, Valuation, network_node,
 };
 use elbowroom_stn::{ConsistentNetwork, Constraint};
 use rand::SeedableRng;
@@ -24,8 +24,8 @@ use scenario::{scenario, time};
 /// A schedule whose nodes, in random order, take an end or a random point of their windows.
 fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
     let zero = network_node(NodeId::ZERO);
-    let mut network =
-        ConsistentNetwork::try_from(plan.network(&[])).expect("a plan with a schedule");
+    let mut network = ConsistentNetwork::try_from(plan.network(&Valuation::default()))
+        .expect("a plan with a schedule");
     let mut nodes: Vec<_> = network.network().nodes().skip(1).collect();
     nodes.shuffle(rng);
     for node in nodes {
@@ -45,7 +45,7 @@ fn draw(plan: &StnPlan, rng: &mut ChaCha8Rng) -> Schedule {
             .add(Constraint::at_most(zero, node, at))
             .expect("inside its window");
     }
-    network.schedule().relative_to(zero).times().to_vec()
+    network.schedule().relative_to(zero).into()
 }
 
 /// Steps with what they need and do, and what is left of their order.
@@ -75,7 +75,7 @@ fn shown(task: &Task, plan: &StnPlan, fixed: &TimeTriggeredPlan) -> String {
 /// What some schedule of the plan breaks.
 fn broken(task: &Task, plan: &StnPlan) -> Result<Option<Broken>, Refusal> {
     let closed = ParametrizedPlan::closed(task, plan.clone());
-    let everything = DecoupledEnvelope::point(&[]);
+    let everything = DecoupledEnvelope::point(&Valuation::default());
     broken_in(task, &closed, &everything)
 }
 

@@ -57,7 +57,7 @@ impl Given<'_> {
             .iter()
             .map(|spec| spec.parse().expect("a quantity"))
             .collect();
-        let nominal = vec![Rational::ZERO; plan.plan.nodes.len()];
+        let nominal = plan.plan.nodes.iter().map(|_| Rational::ZERO).collect();
         let plan = vary(&task, plan, &nominal, &specs).expect("quantities of the plan");
         (Arc::new(task), Arc::new(plan))
     }
@@ -116,7 +116,11 @@ pub(crate) fn envelope(text: &str) -> DecoupledEnvelope {
             upper: end(upper),
         })
     });
-    DecoupledEnvelope {
-        intervals: intervals.collect(),
-    }
+    let intervals: Vec<_> = intervals.collect();
+    let zeros = intervals.iter().map(|_| Rational::ZERO).collect();
+    let given = intervals.into_iter().enumerate();
+    given.fold(
+        DecoupledEnvelope::point(&zeros),
+        |all, (index, interval)| all.with_interval(index.into(), interval),
+    )
 }

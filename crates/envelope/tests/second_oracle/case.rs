@@ -7,10 +7,10 @@ use elbowroom_model::ground::{Action, Body, Expression};
 use elbowroom_model::problem::{FunctionId, SchemaId, Unknown};
 use elbowroom_model::validate::{Settings, Verdict, validate};
 use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
-use elbowroom_num::Rational;
+use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{
     Bound, Constraint, DecoupledEnvelope, Instance, InstanceId, Node, NodeId, Parameter,
-    ParameterId, ParameterKind, ParametrizedPlan, Reason, StnPlan,
+    ParameterId, ParameterKind, ParametrizedPlan, Reason, Schedule, StnPlan, Valuation,
 };
 
 use crate::numbers;
@@ -101,26 +101,26 @@ impl Case {
     }
 
     /// The problem with these values in place of its parameters: what the judge knows.
-    pub(crate) fn task_at(&self, valuation: &[Rational]) -> Task {
+    pub(crate) fn task_at(&self, valuation: &Valuation) -> Task {
         let mut problem = self.problem.clone();
-        numbers::fill(&mut problem, &|index| Some(valuation[index].clone()));
+        numbers::fill(&mut problem, &|index| Some(valuation[index.into()].clone()));
         for (function, arguments, value) in &mut problem.initial_values {
             if let (Some(id), true) = (self.initial.get(function), arguments.is_empty()) {
-                *value = valuation[id.index()].clone();
+                *value = valuation[*id].clone();
             }
         }
         let times = self.timed_times();
         for timed in &mut problem.timed {
             let group = times.iter().position(|time| *time == timed.time);
             if let Some(id) = group.and_then(|group| self.timed.get(&group)) {
-                timed.time = valuation[id.index()].clone();
+                timed.time = valuation[*id].clone();
             }
         }
         Task::new(problem).with_epsilon(self.epsilon.clone())
     }
 
     /// What the judge says of a schedule of the plan for these values.
-    pub(crate) fn judge(&self, valuation: &[Rational], schedule: &[Rational]) -> Verdict {
+    pub(crate) fn judge(&self, valuation: &Valuation, schedule: &Schedule) -> Verdict {
         let (_, plan) = self.build();
         let scheduled = plan.plan.at(valuation).scheduled(schedule);
         let task = self.task_at(valuation);
@@ -259,6 +259,20 @@ fn write_action(f: &mut fmt::Formatter<'_>, task: &Task, instance: &Instance) ->
 
 /// For error messages.
 pub(crate) fn show(envelope: &DecoupledEnvelope) -> String {
-    let parts: Vec<_> = envelope.intervals.iter().map(ToString::to_string).collect();
+    let parts: Vec<_> = envelope
+        .intervals()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     parts.join(" x ")
+}
+
+/// The box with these intervals.
+pub(crate) fn box_of(intervals: Vec<Interval>) -> DecoupledEnvelope {
+    let zeros = intervals.iter().map(|_| Rational::ZERO).collect();
+    let given = intervals.into_iter().enumerate();
+    given.fold(
+        DecoupledEnvelope::point(&zeros),
+        |all, (index, interval)| all.with_interval(index.into(), interval),
+    )
 }

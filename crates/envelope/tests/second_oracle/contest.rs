@@ -11,8 +11,8 @@ use elbowroom_model::Task;
 use elbowroom_model::validate::Verdict;
 use elbowroom_num::Rational;
 use elbowroom_plan::{
-    BoxEnd, DecoupledEnvelope, Node, NodeId, Parameter, ParameterId, ParametrizedPlan, Side,
-    Valuation,
+    BoxEnd, DecoupledEnvelope, Node, NodeId, Parameter, ParameterId, ParametrizedPlan, Schedule,
+    Side, Valuation,
 };
 
 use crate::case::{Case, show};
@@ -187,14 +187,10 @@ pub(crate) fn steps(dice: &mut Dice, parameters: &[Parameter], length: usize) ->
 }
 
 /// A box near the nominal point, mostly with that point in it.
-fn random_box(
-    dice: &mut Dice,
-    nominal: &[Rational],
-    parameters: &[Parameter],
-) -> DecoupledEnvelope {
+fn random_box(dice: &mut Dice, nominal: &Valuation, parameters: &[Parameter]) -> DecoupledEnvelope {
     let mut envelope = DecoupledEnvelope::point(nominal);
     let is_around = dice.chance(75);
-    for (interval, parameter) in envelope.intervals.iter_mut().zip(parameters) {
+    for (index, parameter) in parameters.iter().enumerate() {
         let width = *dice.pick(&[0, 0, 1, 2, 4, 8]);
         let below = dice.between(if is_around { 0 } else { -width }, width);
         let above = dice.between(if is_around { 0 } else { -below }, width);
@@ -211,7 +207,7 @@ fn random_box(
             wide.upper = parameter.range.upper.clone();
         }
         if !wide.is_empty() {
-            *interval = wide;
+            envelope = envelope.with_interval(index.into(), wide);
         }
     }
     envelope
@@ -294,11 +290,11 @@ impl Contest<'_> {
         Ok(())
     }
 
-    fn timed_change_places(&self, schedule: &[Rational]) -> bool {
+    fn timed_change_places(&self, schedule: &Schedule) -> bool {
         let nodes = self.plan.plan.nodes();
         let times: Vec<_> = nodes
             .filter(|(_, node)| matches!(node, Node::Timed(_)))
-            .map(|(id, _)| &schedule[id.index()])
+            .map(|(id, _)| &schedule[id])
             .collect();
         times.windows(2).any(|pair| pair[0] >= pair[1])
     }
@@ -358,21 +354,21 @@ impl Contest<'_> {
 
     /// The judge does not mind how near a timed initial is to another one, or to the last action
     /// before it.
-    fn is_only_timed(&self, first: NodeId, second: NodeId, schedule: &[Rational]) -> bool {
+    fn is_only_timed(&self, first: NodeId, second: NodeId, schedule: &Schedule) -> bool {
         let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
         let nodes = self.plan.plan.nodes().skip(1);
         let last = nodes
             .filter(|(id, _)| !is_timed(*id))
-            .map(|(id, _)| &schedule[id.index()])
+            .map(|(id, _)| &schedule[id])
             .max();
         (is_timed(first) && is_timed(second))
-            || (is_timed(second) && last < Some(&schedule[second.index()]))
+            || (is_timed(second) && last < Some(&schedule[second]))
     }
 
-    fn is_schedule(&self, valuation: &[Rational], schedule: &[Rational]) -> bool {
+    fn is_schedule(&self, valuation: &Valuation, schedule: &Schedule) -> bool {
         let plan = self.plan.plan.at(valuation);
         let gaps = plan.constraints.iter().all(|constraint| {
-            let gap = &schedule[constraint.to.index()] - &schedule[constraint.from.index()];
+            let gap = &schedule[constraint.to] - &schedule[constraint.from];
             let lower = match &constraint.lower {
                 elbowroom_plan::Bound::Finite(lower) => gap >= *lower,
                 _ => true,
@@ -383,7 +379,7 @@ impl Contest<'_> {
             };
             lower && upper
         });
-        gaps && schedule.iter().all(|time| !time.is_negative()) && schedule[0].is_zero()
+        gaps && schedule.iter().all(|time| !time.is_negative()) && schedule[NodeId::ZERO].is_zero()
     }
 
     fn compare_with_plain(

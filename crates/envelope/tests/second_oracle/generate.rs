@@ -7,7 +7,7 @@ mod skeleton;
 
 use elbowroom_model::problem::Body;
 use elbowroom_num::Rational;
-use elbowroom_plan::{InstanceId, Node};
+use elbowroom_plan::{InstanceId, Node, Schedule, Valuation};
 
 use crate::case::Case;
 use crate::dice::Dice;
@@ -70,7 +70,9 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
     };
     let schedule = (0..8).find_map(|_| {
         let schedule = times(dice, &case);
-        case.judge(&[], &schedule).is_valid().then_some(schedule)
+        case.judge(&Valuation::default(), &schedule)
+            .is_valid()
+            .then_some(schedule)
     })?;
     let mut nominal = Nominal {
         case,
@@ -92,7 +94,7 @@ fn attempt(dice: &mut Dice) -> Option<Case> {
 }
 
 /// Times for all nodes, on a grid of halves.
-fn times(dice: &mut Dice, case: &Case) -> Vec<Rational> {
+fn times(dice: &mut Dice, case: &Case) -> Schedule {
     let mut schedule = vec![Rational::ZERO];
     for schema in &case.problem.schemas {
         let start = dice.half(0, 9);
@@ -110,19 +112,19 @@ fn times(dice: &mut Dice, case: &Case) -> Vec<Rational> {
         }
     }
     schedule.extend(case.timed_times());
-    schedule
+    Schedule::new(schedule)
 }
 
 struct Nominal<'d> {
     case: Case,
-    schedule: Vec<Rational>,
+    schedule: Schedule,
     theme: Theme,
     dice: &'d mut Dice,
 }
 
 impl Nominal<'_> {
     fn works(&self, case: &Case) -> bool {
-        let valuation: Vec<_> = case.parameters.iter().map(|p| p.nominal.clone()).collect();
+        let valuation = case.parameters.iter().map(|p| p.nominal.clone()).collect();
         case.judge(&valuation, &self.schedule).is_valid()
     }
 
@@ -145,15 +147,12 @@ impl Nominal<'_> {
 
     fn time(&self, node: Node) -> Rational {
         let position = self.nodes().iter().position(|&other| other == node);
-        self.schedule[position.expect("a node of the plan")].clone()
+        self.schedule[position.expect("a node of the plan").into()].clone()
     }
 }
 
 /// Some schedule for some values: far out in a random direction, or halfway between two such.
-pub(crate) fn sample(
-    system: &mut System,
-    dice: &mut Dice,
-) -> Option<(Vec<Rational>, Vec<Rational>)> {
+pub(crate) fn sample(system: &mut System, dice: &mut Dice) -> Option<(Valuation, Schedule)> {
     let mut weights = || (0..20).map(|_| dice.between(-1, 1)).collect::<Vec<_>>();
     let (first, second) = (weights(), weights());
     let (values, times) = system.extreme(&first, HORIZON)?;
@@ -161,11 +160,10 @@ pub(crate) fn sample(
         return Some((values, times));
     }
     let (other_values, other_times) = system.extreme(&second, HORIZON)?;
-    let middle = |a: Vec<Rational>, b: Vec<Rational>| {
-        let pairs = a.into_iter().zip(b);
-        pairs.map(|(a, b)| (a + b) * Rational::new(1, 2)).collect()
-    };
-    Some((middle(values, other_values), middle(times, other_times)))
+    let middle = |(a, b): (Rational, Rational)| (a + b) * Rational::new(1, 2);
+    let values = values.into_iter().zip(other_values).map(middle);
+    let times = times.into_iter().zip(other_times).map(middle);
+    Some((values.collect(), times.collect()))
 }
 
 /// No sampled schedule is longer.

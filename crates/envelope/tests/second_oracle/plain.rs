@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::Task;
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Schedule, Valuation};
 
 use crate::polynomial::{Polynomial, Symbol};
 use crate::system::System;
@@ -37,7 +37,7 @@ pub(crate) enum Answer {
 pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
-    pub(crate) schedule: Vec<Rational>,
+    pub(crate) schedule: Schedule,
     /// It is only that a timed initial is too near to another one, or to an action from after the
     /// end of the plan. The judge does not mind.
     pub(crate) is_only_timed: bool,
@@ -99,7 +99,7 @@ pub(crate) fn without_schedule(
 
 /// All combinations of ends.
 pub(crate) fn corners(envelope: &DecoupledEnvelope) -> Vec<Valuation> {
-    combinations(&envelope.intervals, &|interval| {
+    combinations(envelope.intervals(), &|interval| {
         let mut ends = vec![lower(interval), upper(interval)];
         ends.dedup();
         ends
@@ -110,12 +110,12 @@ fn combinations(
     intervals: &[Interval],
     values: &dyn Fn(&Interval) -> Vec<Rational>,
 ) -> Vec<Valuation> {
-    let mut combinations = vec![Vec::new()];
+    let mut combinations: Vec<Vec<Rational>> = vec![Vec::new()];
     for interval in intervals {
         let values = values(interval);
         combinations = combinations
             .iter()
-            .flat_map(|so_far: &Valuation| {
+            .flat_map(|so_far| {
                 values.iter().map(move |value| {
                     let mut longer = so_far.clone();
                     longer.push(value.clone());
@@ -124,7 +124,7 @@ fn combinations(
             })
             .collect();
     }
-    combinations
+    combinations.into_iter().map(Valuation::new).collect()
 }
 
 /// Farther than any sum of the numbers in a case.
@@ -186,13 +186,13 @@ fn all_combinations(
 ) -> Result<Option<Break>, Trouble> {
     let intervals: Vec<_> = multiplied
         .iter()
-        .map(|&index| envelope.intervals[index].clone())
+        .map(|&index| envelope.intervals()[index].clone())
         .collect();
     for values in combinations(&intervals, &samples) {
         let fixed: BTreeMap<_, _> = multiplied.iter().copied().zip(values).collect();
         let mut part = envelope.clone();
         for (&index, value) in &fixed {
-            part.intervals[index] = Interval::point(value.clone());
+            part = part.with_interval(index.into(), Interval::point(value.clone()));
         }
         let mut search = Search {
             task,

@@ -43,7 +43,7 @@ pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope)
             Limit::Number(value) => (0, value.clone()),
             Limit::Parameter(index, sign) => match chosen.get(index) {
                 Some(value) => times(value, *sign),
-                None => least(&envelope.intervals[*index], *sign),
+                None => least(&envelope.intervals()[*index], *sign),
             },
         };
         let Some(cycle) = negative_cycle(&edges, &worst) else {
@@ -60,7 +60,7 @@ pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope)
         for (index, multiple) in multiples {
             let share = match chosen.get(&index) {
                 Some(value) => times(value, multiple),
-                None => least(&envelope.intervals[index], multiple),
+                None => least(&envelope.intervals()[index], multiple),
             };
             weight = plus(&weight, &share);
         }
@@ -77,7 +77,7 @@ pub(crate) fn are_missing(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope)
         });
         let index = torn.expect("else the cycle has the weight for which it was found");
         for sign in [1, -1] {
-            let end = times(&least(&envelope.intervals[index], sign), sign);
+            let end = times(&least(&envelope.intervals()[index], sign), sign);
             let mut branch = chosen.clone();
             branch.insert(index, end);
             branches.push(branch);

@@ -3,7 +3,7 @@
 use elbowroom_model::problem::{Body, Condition, Effect, Expression, Unknown};
 use elbowroom_plan::{Bound, BoxEnd, InstanceId, Node, ParameterId, ParameterKind};
 
-use crate::case::{Case, instance_of};
+use crate::case::{Case, box_of, instance_of};
 use crate::contest::{Script, Step};
 use crate::numbers;
 
@@ -160,7 +160,9 @@ fn without_parameter(script: &Script, removed: usize) -> Script {
     }
     script.steps.retain_mut(|step| match step {
         Step::Jump(envelope) | Step::Look(envelope) => {
-            envelope.intervals.remove(removed);
+            let mut intervals = envelope.intervals().to_vec();
+            intervals.remove(removed);
+            *envelope = box_of(intervals);
             true
         }
         Step::Widen { end, .. } | Step::LookWider { end, .. } => {

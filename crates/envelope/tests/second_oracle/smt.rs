@@ -120,7 +120,7 @@ pub(crate) fn contained(
 
 fn in_box(envelope: &DecoupledEnvelope) -> String {
     let mut text = String::new();
-    for (index, interval) in envelope.intervals.iter().enumerate() {
+    for (index, interval) in envelope.intervals().iter().enumerate() {
         if let Some(lower) = interval.lower.value() {
             let _ = writeln!(text, "(assert (<= {} g{index}))", number(lower));
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
-use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan, Valuation};
+use elbowroom_plan::{Bound, DecoupledEnvelope, ParametrizedPlan, Schedule, Valuation};
 
 use crate::polynomial::{Polynomial, Symbol};
 
@@ -48,7 +48,7 @@ impl System {
             system.variables.insert(symbol, variable);
         }
         system.network(plan);
-        for (index, interval) in envelope.intervals.iter().enumerate() {
+        for (index, interval) in envelope.intervals().iter().enumerate() {
             let value = Polynomial::symbol(Symbol::Parameter(index));
             if let Some(lower) = interval.lower.value() {
                 system.at_most(&Polynomial::constant(lower), &value);
@@ -153,7 +153,7 @@ impl System {
     }
 
     /// Values and a schedule that satisfy everything, after a successful check.
-    pub(crate) fn model(&self) -> (Valuation, Vec<Rational>) {
+    pub(crate) fn model(&self) -> (Valuation, Schedule) {
         let model = self.simplex.model();
         let value = |symbol: Symbol| model[self.variables[&symbol].index()].clone();
         (
@@ -171,7 +171,7 @@ impl System {
         &mut self,
         weights: &[i64],
         horizon: i64,
-    ) -> Option<(Valuation, Vec<Rational>)> {
+    ) -> Option<(Valuation, Schedule)> {
         self.push();
         for node in 0..self.nodes {
             let latest = Polynomial::constant(&Rational::from(horizon));

@@ -15,7 +15,7 @@ use elbowroom_model::{Problem, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{
     Bound, Constraint, DecoupledEnvelope, Instance, InstanceId, NodeId, Parameter, ParameterId,
-    ParameterKind, ParametrizedPlan, Reason, StnPlan,
+    ParameterKind, ParametrizedPlan, Reason, Schedule, StnPlan, Valuation,
 };
 
 /// An executor that goes by the plan.
@@ -95,7 +95,7 @@ impl Events {
 struct Everywhere;
 
 impl Region for Everywhere {
-    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
+    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
         None
     }
 }
@@ -122,12 +122,12 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
         });
     };
     let epsilon = Rational::new(1, 1000);
-    let mut nominal = vec![Rational::ZERO; 1 + 2 * count];
+    let mut nominal = Schedule::new(vec![Rational::ZERO; 1 + 2 * count]);
     for index in 0..count {
         let duration = Rational::from(i64::try_from(5 + index % 7).expect("small"));
         let mut begin = Rational::ZERO;
         let after = |earlier: usize, begin: &mut Rational| {
-            let time = &nominal[end(earlier).index()] + &epsilon;
+            let time = &nominal[end(earlier)] + &epsilon;
             *begin = time.max(begin.clone());
         };
         if let Some(earlier) = index.checked_sub(ROBOTS) {
@@ -164,8 +164,8 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
         let id = Reason::Duration(InstanceId::from(index));
         let longest = &duration * Rational::from(2);
         add(start(index), end(index), Some(duration), Some(longest), id);
-        nominal[start(index).index()] = begin;
-        nominal[end(index).index()] = finish;
+        nominal[start(index)] = begin;
+        nominal[end(index)] = finish;
     }
     let mut plan = ParametrizedPlan::closed(&task, plan);
     if is_open {
@@ -175,16 +175,15 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
         let nominal = &parameter.nominal;
         Interval::closed(nominal.clone(), nominal * Rational::from(2))
     };
-    let envelope = DecoupledEnvelope {
-        intervals: plan.parameters.iter().map(twice).collect(),
-    };
+    let intervals = plan.parameters.iter().map(twice).collect();
+    let envelope = DecoupledEnvelope::new(&plan, intervals);
     Mission {
         origin: Rational::ZERO,
         now: Rational::ZERO,
         time_triggered: TimeTriggeredPlan::default(),
         plan,
         nominal,
-        envelope: Some(envelope),
+        envelope,
         forms: Forms::default(),
         order: None,
         running: BTreeMap::new(),

@@ -1,7 +1,7 @@
 //! `fixed:X`: paper 1's baseline BLEX(X).
 
 use elbowroom_num::{Interval, Rational};
-use elbowroom_plan::{Bound, Constraint, Node, NodeId, StnPlan};
+use elbowroom_plan::{Bound, Constraint, Node, NodeId, Schedule, StnPlan};
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, given, replan};
@@ -47,7 +47,7 @@ impl Fixed {
 
 /// When timed initials happen is known from the beginning: what keeps its distance from one of
 /// them, keeps it from time 0, which is one hop away.
-fn place_timed(plan: &mut StnPlan, nominal: &[Rational]) {
+fn place_timed(plan: &mut StnPlan, nominal: &Schedule) {
     let is_timed = |node: NodeId| matches!(plan.nodes[node.index()], Node::Timed(_));
     let shifted = |bound: &Bound, by: &Rational| match bound {
         Bound::Finite(value) => Some(Bound::Finite(value + by)),
@@ -71,7 +71,7 @@ fn place_timed(plan: &mut StnPlan, nominal: &[Rational]) {
             ),
             _ => return constraint.clone(),
         };
-        let time = &nominal[timed.index()];
+        let time = &nominal[timed];
         match (shifted(&lower, time), shifted(&upper, time)) {
             (Some(lower), Some(upper)) if other != NodeId::ZERO => Constraint {
                 from: NodeId::ZERO,
@@ -100,7 +100,7 @@ impl Executor for Fixed {
             let Some(instance) = plan.duration_of(constraint) else {
                 return given(constraint);
             };
-            let time = |node: elbowroom_plan::NodeId| &mission.nominal[node.index()];
+            let time = |node: elbowroom_plan::NodeId| &mission.nominal[node];
             let room = self.around(&(time(constraint.to) - time(constraint.from)));
             // What is left of a running action is a guess; it may well end sooner.
             let is_rest = mission.running.contains_key(&StepId::from(instance));

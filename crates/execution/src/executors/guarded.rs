@@ -116,7 +116,7 @@ impl Guard {
             let [start, end] = self.dispatch.nodes_of(instance);
             let happened = |node| self.dispatch.happened(node);
             if let (Some(start), Some(end)) = (happened(start), happened(end)) {
-                self.values[parameter.index()] = end - start;
+                self.values[parameter] = end - start;
             }
         }
         let stays_inside = self.envelope.contains(&self.values);

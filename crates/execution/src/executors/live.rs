@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::Rational;
 use elbowroom_plan::{
-    Bound, Constraint, InstanceId, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
+    Bound, Constraint, InstanceId, NodeId, ParameterId, ParametrizedPlan, Valuation,
 };
 
 use super::{Registered, promise};
@@ -223,7 +223,7 @@ impl Rest {
             let [start, end] = self.dispatch.nodes_of(instance);
             let happened = |node| self.dispatch.happened(node);
             if let (Some(start), Some(end)) = (happened(start), happened(end)) {
-                self.values[parameter.index()] = end - start;
+                self.values[*parameter] = end - start;
             }
         }
         for place in places(moment.news) {
@@ -236,9 +236,9 @@ impl Rest {
             if let Some((parameter, value)) = reading.value() {
                 let bound = Bound::Parameter(parameter);
                 let mut constraints = self.mission.plan.plan.constraints.iter();
-                moves_times |= self.values[parameter.index()] != value
+                moves_times |= self.values[parameter] != value
                     && constraints.any(|own| own.lower == bound || own.upper == bound);
-                self.values[parameter.index()] = value;
+                self.values[parameter] = value;
             }
         }
         moves_times
@@ -269,16 +269,13 @@ impl Rest {
                 reason: elbowroom_plan::Reason::Given,
             });
         }
-        for (index, parameter) in self.mission.plan.parameters.iter().enumerate() {
-            let ParameterKind::Duration(instance) = parameter.kind else {
-                continue;
-            };
+        for (parameter, instance) in duration_parameters(&self.mission.plan) {
             let [start, end] = self.dispatch.nodes_of(instance);
             if let (Some(start), None) =
                 (self.dispatch.happened(start), self.dispatch.happened(end))
             {
                 let elapsed = &now - start;
-                values[index] = elapsed.max(values[index].clone());
+                values[parameter] = elapsed.max(values[parameter].clone());
             }
         }
         (plan, values)

@@ -2,7 +2,9 @@
 
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::Reading;
-use elbowroom_plan::{Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
+use elbowroom_plan::{
+    Bound, Constraint, InstanceId, ParameterId, ParameterKind, ParametrizedPlan, Valuation,
+};
 
 use crate::dispatch::Dispatch;
 use crate::executor::{Mission, StepId};
@@ -62,7 +64,7 @@ pub(super) fn is_about_time(reason: &Reason) -> bool {
 pub(super) fn weaken(
     dispatch: &mut Dispatch,
     mission: &Mission,
-    values: &[Rational],
+    values: &Valuation,
     now: &Rational,
     reason: Reason,
 ) -> Result<Promise, Box<Reason>> {
@@ -142,7 +144,7 @@ fn most<T, E>(
 struct Room<'a> {
     mission: &'a Mission,
     /// What was observed, and for the rest what is planned.
-    values: &'a [Rational],
+    values: &'a Valuation,
     /// How much of the room around what is planned; 1 is all of it.
     share: &'a Rational,
     overrun: Overrun,
@@ -160,14 +162,9 @@ impl Room<'_> {
             return Reading::exactly(planned);
         }
         let Some(parameter) = duration(plan, constraint) else {
-            let value = |bound: &Bound| match bound {
-                Bound::Infinite => None,
-                Bound::Finite(value) => Some(value.clone()),
-                Bound::Parameter(id) => Some(self.values[id.index()].clone()),
-            };
             return Reading::Requirement {
-                lower: value(&constraint.lower),
-                upper: value(&constraint.upper),
+                lower: constraint.lower.at(self.values),
+                upper: constraint.upper.at(self.values),
             };
         };
         let (lower, upper) = self.interval(parameter);
@@ -200,7 +197,7 @@ impl Room<'_> {
 
     /// The share of the envelope around what is planned.
     fn interval(&self, id: ParameterId) -> (Rational, Option<Rational>) {
-        let planned = &self.values[id.index()];
+        let planned = &self.values[id];
         if self.share.is_zero() {
             return (planned.clone(), Some(planned.clone()));
         }

@@ -91,7 +91,7 @@ fn reading(mission: &Mission, constraint: &Constraint, open: Open) -> Reading {
             }
         }
         (Open::Planned, _) if is_duration && is_open => {
-            let time = |node: NodeId| &mission.nominal[node.index()];
+            let time = |node: NodeId| &mission.nominal[node];
             let planned = time(constraint.to) - time(constraint.from);
             Reading::Requirement {
                 lower: Some(planned.clone()),

@@ -14,7 +14,7 @@ use elbowroom_pddl::{Source, read_plan, read_problem};
 use elbowroom_plan::deorder::deorder;
 use elbowroom_plan::parametrize::parametrize;
 use elbowroom_plan::partial_order::partial_order;
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 use elbowroom_probability::Likelihoods;
 
 const DOMAIN: &str = "(define (domain kitchen) (:requirements :durative-actions)
@@ -98,13 +98,12 @@ impl Preparer for ByHand {
             let longest = &parameter.nominal * Rational::from(2);
             Interval::closed(parameter.nominal.clone(), longest)
         });
-        let envelope = is_open.then(|| DecoupledEnvelope {
-            intervals: twice.collect(),
-        });
+        let twice = twice.collect();
+        let envelope = is_open.then(|| DecoupledEnvelope::new(&prepared, twice));
         Ok(Prepared {
             plan: prepared,
             nominal,
-            envelope,
+            envelope: envelope.flatten(),
             forms: Forms::default(),
             order,
         })
@@ -115,7 +114,7 @@ impl Preparer for ByHand {
 struct Everywhere;
 
 impl Region for Everywhere {
-    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &[Rational]) -> Option<String> {
+    fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {
         None
     }
 }

@@ -15,11 +15,12 @@ use elbowroom_num::{End, Interval, Rational};
 
 use super::over_all;
 use crate::durations::allowed;
+use crate::network::Schedule;
 use crate::stn_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan};
 
 /// A constraint for the duration of each durative instance: the domain's bounds, or the original
 /// duration where these depend on the schedule.
-pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &[Rational]) -> Vec<Constraint> {
+pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Constraint> {
     let intervals = intervals(task, plan, times);
     let mut nodes = vec![(NodeId::ZERO, NodeId::ZERO); plan.instances.len()];
     for (node, what) in plan.nodes() {
@@ -33,7 +34,7 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &[Rational]) -> Ve
         let id = InstanceId::from(index);
         plan.instance(id).action.durative()?;
         let (from, to) = nodes[index];
-        let original = &times[to.index()] - &times[from.index()];
+        let original = &times[to] - &times[from];
         // Nobody has checked an over-all condition that had no time to hold.
         let is_unchecked = original.is_zero() && over_all::has_any(plan, id);
         let bounds = interval.filter(|_| !is_unchecked).and_then(bounds);
@@ -67,12 +68,12 @@ fn bounds(interval: Interval) -> Option<(Bound, Bound)> {
 }
 
 /// The durations that each instance may have, `None` where that depends on the schedule.
-fn intervals(task: &Task, plan: &StnPlan, times: &[Rational]) -> Vec<Option<Interval>> {
+fn intervals(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<Option<Interval>> {
     let mut nodes: Vec<(NodeId, Node)> = plan.nodes().collect();
-    nodes.sort_by(|(a, _), (b, _)| times[a.index()].cmp(&times[b.index()]));
+    nodes.sort_by(|(a, _), (b, _)| times[*a].cmp(&times[*b]));
     let mut values = Values::new(task.initial());
     let mut intervals = vec![Some(Interval::at_least(Rational::ZERO)); plan.instances.len()];
-    for group in nodes.chunk_by(|(a, _), (b, _)| times[a.index()] == times[b.index()]) {
+    for group in nodes.chunk_by(|(a, _), (b, _)| times[*a] == times[*b]) {
         let arrival = values.clone();
         for &(_, what) in group {
             read_bounds(plan, what, &arrival, &mut intervals);

@@ -8,17 +8,18 @@ use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
 use super::order::Order;
+use crate::network::Schedule;
 use crate::stn_plan::{Node, NodeId, Reason, StnPlan};
 
 /// The goal is read after the last happening of the plan's actions, whichever that is.
-pub(super) fn order(task: &Task, plan: &StnPlan, times: &[Rational], order: &mut Order) {
+pub(super) fn order(task: &Task, plan: &StnPlan, times: &Schedule, order: &mut Order) {
     let goal = Footprint::of_condition(task, task.goal());
     let finals: Vec<NodeId> = plan
         .nodes()
         .filter(|(_, what)| matches!(what, Node::End(_) | Node::Instant(_)))
         .map(|(node, _)| node)
         .collect();
-    let time = |node: NodeId| &times[node.index()];
+    let time = |node: NodeId| &times[node];
     let Some(&last) = finals.iter().max_by_key(|&&node| time(node)) else {
         return;
     };

@@ -11,6 +11,7 @@ use elbowroom_model::Footprint;
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_num::Rational;
 
+use crate::network::Schedule;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
 /// Constraints `to - from >= distance`, the strongest for each pair.
@@ -83,15 +84,15 @@ impl Use {
 
 /// The uses of each quantity in order of time.
 pub(super) struct Timeline<'a> {
-    times: &'a [Rational],
+    times: &'a Schedule,
     uses: BTreeMap<Quantity, Vec<(NodeId, Use)>>,
 }
 
 impl<'a> Timeline<'a> {
     /// `times` and `footprints` are by node.
-    pub(super) fn new(times: &'a [Rational], footprints: &[Footprint]) -> Self {
+    pub(super) fn new(times: &'a Schedule, footprints: &[Footprint]) -> Self {
         let mut nodes: Vec<NodeId> = (0..times.len()).map(NodeId::from).collect();
-        nodes.sort_by(|a, b| times[a.index()].cmp(&times[b.index()]));
+        nodes.sort_by(|a, b| times[*a].cmp(&times[*b]));
         let mut uses: BTreeMap<Quantity, Vec<(NodeId, Use)>> = BTreeMap::new();
         for node in nodes {
             for (quantity, bits) in uses_of(&footprints[node.index()]) {
@@ -103,7 +104,7 @@ impl<'a> Timeline<'a> {
 
     /// The time of a node.
     pub(super) fn time(&self, node: NodeId) -> &Rational {
-        &self.times[node.index()]
+        &self.times[node]
     }
 
     /// Demands that interfering happenings keep their order.

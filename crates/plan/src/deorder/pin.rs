@@ -3,7 +3,8 @@
 use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
-use crate::network::network_node;
+use crate::network::{Schedule, network_node};
+use crate::parameter::Valuation;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
 /// Adds constraints that hold in the nominal schedule until the oracle finds nothing wrong.
@@ -17,11 +18,11 @@ use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 /// `None` when the oracle is not content even with the nominal schedule alone.
 pub fn pin_until_sound(
     plan: StnPlan,
-    nominal: &[Rational],
+    nominal: &Schedule,
     oracle: &mut dyn FnMut(&StnPlan) -> Option<Vec<NodeId>>,
 ) -> Option<StnPlan> {
     let (mut plan, mut sides) = without_sides(plan);
-    sides.sort_by_key(|side| &nominal[side.from.index()] - &nominal[side.to.index()]);
+    sides.sort_by_key(|side| &nominal[side.from] - &nominal[side.to]);
     let given = plan.constraints.len();
     while let Some(nodes) = oracle(&plan) {
         let all: Vec<NodeId> = plan.nodes().map(|(node, _)| node).collect();
@@ -87,12 +88,12 @@ pub fn with_sides_one_way(plan: StnPlan) -> StnPlan {
 /// The plan with every time point where it is in the nominal schedule: for plans about whose other
 /// schedules nothing can be told.
 #[must_use]
-pub fn pinned_to(mut plan: StnPlan, nominal: &[Rational]) -> StnPlan {
+pub fn pinned_to(mut plan: StnPlan, nominal: &Schedule) -> StnPlan {
     let pins = plan.nodes().skip(1).map(|(node, _)| Constraint {
         from: NodeId::ZERO,
         to: node,
-        lower: Bound::Finite(nominal[node.index()].clone()),
-        upper: Bound::Finite(nominal[node.index()].clone()),
+        lower: Bound::Finite(nominal[node].clone()),
+        upper: Bound::Finite(nominal[node].clone()),
         reason: Reason::Pinned,
     });
     let pins: Vec<_> = pins.collect();
@@ -101,9 +102,9 @@ pub fn pinned_to(mut plan: StnPlan, nominal: &[Rational]) -> StnPlan {
 }
 
 /// The gentlest constraint about these nodes that is not implied yet.
-fn next_pin(plan: &StnPlan, nominal: &[Rational], nodes: &[NodeId]) -> Option<Constraint> {
-    let network = ConsistentNetwork::try_from(plan.network(&[])).ok()?;
-    let time = |node: NodeId| &nominal[node.index()];
+fn next_pin(plan: &StnPlan, nominal: &Schedule, nodes: &[NodeId]) -> Option<Constraint> {
+    let network = ConsistentNetwork::try_from(plan.network(&Valuation::default())).ok()?;
+    let time = |node: NodeId| &nominal[node];
     let mut nodes = nodes.to_vec();
     nodes.sort_by(|&a, &b| time(a).cmp(time(b)).then(a.cmp(&b)));
     nodes.dedup();

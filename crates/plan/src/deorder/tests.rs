@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use super::{DeorderError, Deordered, deorder, pin_until_sound, pinned_to};
 use crate::format;
-use crate::parameter::ParametrizedPlan;
+use crate::parameter::{ParametrizedPlan, Valuation};
 use crate::stn_plan::{Bound, NodeId, Reason};
 use crate::testing::{number, rover};
 
@@ -123,8 +123,8 @@ fn rounded_times_are_mended_in_the_nominal_schedule() {
     let text = "0: refuel s1 [10.0001]
                 10.0005: refuel s2 [10]";
     let Deordered { plan, nominal, .. } = deordered(text);
-    let schedule = elbowroom_stn::Schedule::new(nominal);
-    assert!(schedule.holds_in(&plan.network(&[])));
+    let schedule = elbowroom_stn::Schedule::from(nominal);
+    assert!(schedule.holds_in(&plan.network(&Valuation::default())));
     assert_eq!(schedule.times()[2], number("10"));
     assert_eq!(schedule.times()[3], number("10.001"));
 }
@@ -163,7 +163,9 @@ fn pins_are_as_few_as_the_oracle_needs() {
     let (first, second) = (NodeId(1), NodeId(3));
     // Content once the second start is known to come no sooner than the first.
     let mut oracle = |plan: &crate::StnPlan| {
-        let network = elbowroom_stn::ConsistentNetwork::try_from(plan.network(&[])).unwrap();
+        let network =
+            elbowroom_stn::ConsistentNetwork::try_from(plan.network(&Valuation::default()))
+                .unwrap();
         let node = crate::network_node;
         let back = network.distance(node(second), node(first));
         let is_ordered = back.is_some_and(|back| !back.is_positive());
@@ -186,8 +188,8 @@ fn pins_are_as_few_as_the_oracle_needs() {
 #[test]
 fn an_oracle_that_is_never_content_gets_the_nominal_schedule_and_then_nothing() {
     let Deordered { plan, nominal, .. } = deordered("0: collect s1 [15]\n3: navigate [7]");
-    let rigid = pinned_to(plan.clone(), &nominal).network(&[]);
-    assert!(elbowroom_stn::Schedule::new(nominal.clone()).holds_in(&rigid));
+    let rigid = pinned_to(plan.clone(), &nominal).network(&Valuation::default());
+    assert!(elbowroom_stn::Schedule::from(nominal.clone()).holds_in(&rigid));
     let mut asked = 0;
     let nothing = pin_until_sound(plan, &nominal, &mut |_| {
         asked += 1;

@@ -6,7 +6,7 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::durations;
-use crate::network::network_node;
+use crate::network::{Schedule, network_node};
 use crate::parameter::{ParameterId, ParameterKind};
 use crate::stn_plan::{Bound, InstanceId, NodeId, StnPlan};
 
@@ -66,7 +66,7 @@ fn domain_durations(task: &Task, plan: &StnPlan, id: InstanceId) -> Option<Inter
 }
 
 /// The earliest schedule when each parameter may have any value of its range, wherever it occurs.
-fn earliest(plan: &StnPlan, ranges: &[Interval]) -> Option<Vec<Rational>> {
+fn earliest(plan: &StnPlan, ranges: &[Interval]) -> Option<Schedule> {
     let mut network = Network::with_nodes(plan.nodes.len());
     let zero = network_node(NodeId::ZERO);
     for (node, _) in plan.nodes().skip(1) {
@@ -92,15 +92,15 @@ fn earliest(plan: &StnPlan, ranges: &[Interval]) -> Option<Vec<Rational>> {
         }
     }
     let network = ConsistentNetwork::try_from(network).ok()?;
-    Some(network.earliest_schedule(zero).times().to_vec())
+    Some(network.earliest_schedule(zero).into())
 }
 
 /// A value with which all constraints that mention the parameter hold in the schedule.
-fn value_in(plan: &StnPlan, id: ParameterId, schedule: &[Rational]) -> Option<Rational> {
+fn value_in(plan: &StnPlan, id: ParameterId, schedule: &Schedule) -> Option<Rational> {
     let mut least = None;
     let mut greatest = None;
     for constraint in &plan.constraints {
-        let difference = &schedule[constraint.to.index()] - &schedule[constraint.from.index()];
+        let difference = &schedule[constraint.to] - &schedule[constraint.from];
         // A lower bound must not exceed the difference, an upper one not fall short of it.
         if constraint.lower == Bound::Parameter(id) {
             greatest = Some(match greatest {

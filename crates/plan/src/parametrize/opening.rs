@@ -8,6 +8,7 @@ use elbowroom_num::{End, Interval, Rational};
 
 use super::constants::Place;
 use super::{ParametrizeError, Target, VarySpec, select};
+use crate::network::Schedule;
 use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, InstanceId, NodeId, Reason};
 use crate::unknowns::{self, OpenNumber};
@@ -26,7 +27,7 @@ pub(super) enum Quantity {
 /// A plan whose quantities are being opened.
 pub(super) struct Opening<'a> {
     pub(super) task: &'a Task,
-    pub(super) nominal: &'a [Rational],
+    pub(super) nominal: &'a Schedule,
     pub(super) plan: ParametrizedPlan,
     pub(super) opened: BTreeMap<Quantity, ParameterId>,
     open_numbers: BTreeMap<OpenNumber, ParameterId>,
@@ -39,7 +40,7 @@ impl<'a> Opening<'a> {
     pub(super) fn new(
         task: &'a Task,
         plan: ParametrizedPlan,
-        nominal: &'a [Rational],
+        nominal: &'a Schedule,
     ) -> Result<Self, ParametrizeError> {
         if unknowns::occur_in_rules(task) {
             return Err(ParametrizeError::OpenRule);
@@ -200,7 +201,7 @@ impl<'a> Opening<'a> {
             if !is_left_open || is_parameter(&constraint.lower) || is_parameter(&constraint.upper) {
                 return None;
             }
-            let time = |node: NodeId| &self.nominal[node.index()];
+            let time = |node: NodeId| &self.nominal[node];
             Some((id, time(plan.end(id)) - time(plan.start(id))))
         });
         told.collect()

@@ -36,7 +36,7 @@ impl Opening<'_> {
             let is_new = !self.opened.contains_key(&Quantity::Duration(id));
             let number = instance.label.strip_prefix('n').unwrap_or(&instance.label);
             let name = format!("dur_{number}");
-            let nominal = &self.nominal[end.index()] - &self.nominal[start.index()];
+            let nominal = &self.nominal[end] - &self.nominal[start];
             let kind = ParameterKind::Duration(id);
             let parameter = self.parameter(spec, Quantity::Duration(id), name, kind, nominal)?;
             if is_new {

@@ -1,13 +1,12 @@
-use elbowroom_num::Rational;
-
 use super::{ParametrizeError, VarySpec, parametrize};
 use crate::format;
+use crate::network::Schedule;
 use crate::parameter::{ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, InstanceId, Reason, StnPlan};
 use crate::testing::{number, rover};
 
 /// Two collections, a refuelling and a beep, with a nominal schedule.
-fn plan() -> (StnPlan, Vec<Rational>) {
+fn plan() -> (StnPlan, Schedule) {
     let text = "
         durative-action instance n0 : (collect S1);
         durative-action instance n1 : (collect s2);

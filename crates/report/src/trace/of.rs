@@ -285,7 +285,7 @@ fn parameters(mission: &Mission) -> Vec<ParameterLine> {
     let numbered = mission.plan.parameters.iter().enumerate();
     let parameters = numbered.map(|(index, parameter)| {
         let allowed = mission.envelope.as_ref();
-        let allowed = allowed.and_then(|envelope| envelope.intervals.get(index));
+        let allowed = allowed.and_then(|envelope| envelope.intervals().get(index));
         ParameterLine {
             name: parameter.name.clone(),
             nominal: exact(&parameter.nominal),

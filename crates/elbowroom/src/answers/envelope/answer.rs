@@ -3,7 +3,8 @@
 use elbowroom_envelope::{Growth, Guarantee, Method, Widening};
 use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{
-    DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Side, Valuation,
+    DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Schedule, Side,
+    Valuation,
 };
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -392,7 +393,7 @@ impl Widened {
 impl Makespans {
     pub(super) fn of(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let at = |side: Side| {
-            let ends = envelope.intervals.iter();
+            let ends = envelope.intervals().iter();
             let values: Option<Valuation> = ends.map(|i| side.of(i).value().cloned()).collect();
             earliest_end(plan, &values?)
         };
@@ -421,7 +422,7 @@ impl Subject<'_> {
 
     /// What is left open, with its interval in a box.
     pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
-        let quantities = self.quantities().into_iter().zip(&envelope.intervals);
+        let quantities = self.quantities().into_iter().zip(envelope.intervals());
         quantities
             .map(|(quantity, interval)| Range {
                 quantity,
@@ -463,9 +464,9 @@ impl Subject<'_> {
         }
     }
 
-    fn happenings(&self, times: &[Rational]) -> Vec<Happening> {
+    fn happenings(&self, times: &Schedule) -> Vec<Happening> {
         let plan = &self.plan.plan;
-        let at = |node: NodeId| Exact(times[node.index()].clone());
+        let at = |node: NodeId| Exact(times[node].clone());
         let mut happenings: Vec<Happening> = plan
             .instances
             .iter()

@@ -115,7 +115,7 @@ fn unknown(
 /// The sum of the widths of all intervals.
 fn width(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Rational {
     let cap = Rational::from(CAP);
-    let widths = plan.parameters.iter().zip(&envelope.intervals);
+    let widths = plan.parameters.iter().zip(envelope.intervals());
     let widths = widths.map(|(parameter, interval)| {
         let most = parameter.nominal.abs() * &cap;
         let upper = interval

@@ -4,6 +4,7 @@ use elbowroom_model::Problem;
 use elbowroom_model::problem::{Body, Comparison, Condition, DurationConstraint, Expression};
 use elbowroom_model::validate::Verdict;
 use elbowroom_num::Rational;
+use elbowroom_plan::Valuation;
 
 use super::skeleton::{constant, fact, fluent};
 use super::{Nominal, Theme};
@@ -120,7 +121,7 @@ impl Nominal<'_> {
         let mut probe = self.case.clone();
         let condition = Condition::Compare(asked, left.clone(), constant(far.clone()));
         add(&mut probe.problem, place, condition);
-        let valuation = Vec::new();
+        let valuation = Valuation::default();
         let Verdict::Valid(report) = probe.judge(&valuation, &self.schedule) else {
             return (comparison, self.dice.half(0, 10));
         };

@@ -2,7 +2,7 @@
 
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, DecoupledEnvelope, InstanceId, Node};
+use elbowroom_plan::{Bound, DecoupledEnvelope, InstanceId, Node, Schedule, Valuation};
 
 use super::{Nominal, sample};
 use crate::case::{Gap, instance_of};
@@ -21,7 +21,8 @@ impl Nominal<'_> {
         }
         for (later, &second) in nodes.iter().enumerate() {
             for (earlier, &first) in nodes.iter().enumerate() {
-                let ordered = (&self.schedule[earlier], earlier) < (&self.schedule[later], later);
+                let ordered = (&self.schedule[earlier.into()], earlier)
+                    < (&self.schedule[later.into()], later);
                 let is_timed = matches!((first, second), (Node::Timed(_), Node::Timed(_)));
                 let is_own = instance_of(first) == instance_of(second);
                 if !ordered || earlier == 0 || is_timed || is_own {
@@ -34,7 +35,7 @@ impl Nominal<'_> {
                 let must = footprint(earlier).interferes_with(&footprint(later));
                 let watch = over_all_reads(&task, &plan, first, second, &footprint(earlier))
                     || over_all_reads(&task, &plan, second, first, &footprint(later));
-                let gap = &self.schedule[later] - &self.schedule[earlier];
+                let gap = &self.schedule[later.into()] - &self.schedule[earlier.into()];
                 if must && self.dice.chance(94) {
                     let least = self.case.epsilon.clone().min(gap);
                     let width = *self.dice.pick(&[0, 1, 2, 4, 40, 40]);
@@ -103,8 +104,10 @@ impl Nominal<'_> {
                 return;
             };
             let nodes = self.nodes();
-            let differs =
-                |a: usize, b: usize| &bad[b] - &bad[a] != &self.schedule[b] - &self.schedule[a];
+            let differs = |a: usize, b: usize| {
+                &bad[b.into()] - &bad[a.into()]
+                    != &self.schedule[b.into()] - &self.schedule[a.into()]
+            };
             let mut pairs = Vec::new();
             for a in 0..nodes.len() {
                 for b in a + 1..nodes.len() {
@@ -122,11 +125,7 @@ impl Nominal<'_> {
         }
     }
 
-    fn bad_schedule(
-        &mut self,
-        mut system: System,
-        valuation: &[Rational],
-    ) -> Option<Vec<Rational>> {
+    fn bad_schedule(&mut self, mut system: System, valuation: &Valuation) -> Option<Schedule> {
         (0..8).find_map(|_| {
             let schedule = sample(&mut system, self.dice)?.1;
             let is_valid = self.case.judge(valuation, &schedule).is_valid();

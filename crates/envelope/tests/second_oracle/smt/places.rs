@@ -95,12 +95,12 @@ fn farthest(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Vec<Vec<Op
         let upper = match &constraint.upper {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
-            Bound::Parameter(id) => envelope.intervals[id.index()].upper.value().cloned(),
+            Bound::Parameter(id) => envelope.intervals()[id.index()].upper.value().cloned(),
         };
         let lower = match &constraint.lower {
             Bound::Infinite => None,
             Bound::Finite(value) => Some(value.clone()),
-            Bound::Parameter(id) => envelope.intervals[id.index()].lower.value().cloned(),
+            Bound::Parameter(id) => envelope.intervals()[id.index()].lower.value().cloned(),
         };
         if let Some(upper) = upper {
             limit(from, to, upper);

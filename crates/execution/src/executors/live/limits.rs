@@ -23,12 +23,12 @@ impl Rest {
             }
             let mut tried = values.clone();
             let mut does = |duration: &Rational| {
-                tried[parameter.index()].clone_from(duration);
+                tried[parameter].clone_from(duration);
                 region
                     .objection(&self.mission.task, &plan, &tried)
                     .is_none()
             };
-            let least = &values[parameter.index()];
+            let least = &values[parameter];
             let (_, most) = range(&self.mission.plan, parameter);
             let limit = greatest(least, most.as_ref(), self.mission.task.epsilon(), &mut does);
             if let Some(limit) = limit {
