@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use elbowroom::text::{Diagnostics, Record};
 use serde::Serialize;
 
-use crate::output::counted;
+use crate::words::counted;
 
 /// The meaning of an exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,24 +16,30 @@ pub(crate) use elbowroom::AnyPlan;
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
 use crate::look::{HINT, styled};
-use crate::output::{self, plain};
+use crate::output::{self, Output};
+use crate::words::plain;
 
 /// Larger than any plan or problem, smaller than memory.
 const LARGEST_FILE: u64 = 256 << 20;
 
 /// Reads domain and problem. Warnings go to standard error.
-pub(crate) fn task(arguments: &ProblemArgs, epsilon: &Rational) -> Result<Task, Failure> {
-    Ok(task_with_sources(arguments, epsilon)?.0)
+pub(crate) fn task(
+    arguments: &ProblemArgs,
+    epsilon: &Rational,
+    output: &mut Output,
+) -> Result<Task, Failure> {
+    Ok(task_with_sources(arguments, epsilon, output)?.0)
 }
 
 /// The same, with the texts of domain and problem.
 pub(crate) fn task_with_sources(
     arguments: &ProblemArgs,
     epsilon: &Rational,
+    output: &mut Output,
 ) -> Result<(Task, Source, Source), Failure> {
     let domain = source(&arguments.domain, "domain")?;
     let problem = source(&arguments.problem, "problem")?;
-    let read: Problem = with_warnings(pddl::read_problem(&domain, &problem))?;
+    let read: Problem = with_warnings(pddl::read_problem(&domain, &problem), output)?;
     Ok((
         Task::new(read).with_epsilon(epsilon.clone()),
         domain,
@@ -42,7 +48,7 @@ pub(crate) fn task_with_sources(
 }
 
 /// Reads a plan of either kind: told by its content, or by a name that ends in `.stn`.
-pub(crate) fn any_plan(task: &Task, path: &Path) -> Result<AnyPlan, Failure> {
+pub(crate) fn any_plan(task: &Task, path: &Path, output: &mut Output) -> Result<AnyPlan, Failure> {
     let text = source(path, "plan")?;
     let is_stn_name = path
         .extension()
@@ -50,7 +56,7 @@ pub(crate) fn any_plan(task: &Task, path: &Path) -> Result<AnyPlan, Failure> {
     if is_stn_name || PlanKind::of_text(text.text()) == PlanKind::Stn {
         return Ok(AnyPlan::Stn(format::read(&text, task)?));
     }
-    let plan = with_warnings(pddl::read_plan(&text, task))?;
+    let plan = with_warnings(pddl::read_plan(&text, task), output)?;
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
@@ -161,10 +167,11 @@ fn similar_file(path: &Path) -> Option<String> {
 /// The value read; its warnings go to standard error, errors become a failure.
 pub(crate) fn with_warnings<T>(
     outcome: Result<(T, Vec<Diagnostic>), Diagnostics>,
+    output: &mut Output,
 ) -> Result<T, Failure> {
     let (value, warnings) = outcome?;
     for warning in &warnings {
-        output::warn_about(warning);
+        output.warn_about(warning);
     }
     Ok(value)
 }

@@ -16,7 +16,9 @@ mod look;
 mod number;
 mod output;
 mod progress;
+mod stopwatch;
 mod table;
+mod words;
 mod wrap;
 
 use std::process::ExitCode;
@@ -25,25 +27,27 @@ use clap::Parser;
 
 use args::{Command, CommandLine};
 use exit::Exit;
+use output::Output;
 
 fn main() -> ExitCode {
     bug::install_hook();
     let CommandLine { color, command } = CommandLine::parse();
     anstream::ColorChoice::from(color).write_global();
     let as_json = command.is_json();
+    let mut output = Output::default();
     let answer = match command {
-        Command::Check(arguments) => commands::check::run(&arguments),
-        Command::Plan(arguments) => commands::plan::run(&arguments),
-        Command::Stn(arguments) => commands::stn::run(&arguments),
-        Command::Envelope(arguments) => commands::envelope::run(&arguments),
-        Command::Compare(arguments) => commands::compare::run(&arguments),
-        Command::Network(arguments) => commands::network::run(&arguments),
+        Command::Check(arguments) => commands::check::run(&arguments, &mut output),
+        Command::Plan(arguments) => commands::plan::run(&arguments, &mut output),
+        Command::Stn(arguments) => commands::stn::run(&arguments, &mut output),
+        Command::Envelope(arguments) => commands::envelope::run(&arguments, &mut output),
+        Command::Compare(arguments) => commands::compare::run(&arguments, &mut output),
+        Command::Network(arguments) => commands::network::run(&arguments, &mut output),
         Command::Completions(arguments) => commands::shell::completions(&arguments),
         Command::Man(arguments) => commands::shell::man(&arguments),
-        Command::Run(arguments) => commands::run::run(&arguments),
+        Command::Run(arguments) => commands::run::run(&arguments, &mut output),
     };
     let exit = answer.unwrap_or_else(|failure| {
-        output::fail(&failure, as_json);
+        output.fail(&failure, as_json);
         Exit::BadInput
     });
     exit.into()

@@ -15,11 +15,6 @@ use std::path::{Path, PathBuf};
 /// Crate, modules, and why they stay together.
 const KNOWN: &[(&str, &[&str], &str)] = &[
     (
-        "cli",
-        &["exit", "output"],
-        "printing may fail, and a failure is printed",
-    ),
-    (
         "elbowroom",
         &["answers", "execute", "flow"],
         "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps; \

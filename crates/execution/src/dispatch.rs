@@ -26,8 +26,8 @@ use elbowroom_plan::{
 use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::executor::{Mission, Planned, StepId};
-use crate::horizon::{Behind, Horizon, grounds};
-use crate::reason::{About, Cause, Reason};
+use crate::horizon::{Horizon, NetworkLimit, grounds};
+use crate::reason::{About, Behind, Cause, Reason};
 use progress::Progress;
 use retry::Retry;
 
@@ -51,20 +51,20 @@ struct Sources {
 }
 
 impl Sources {
-    fn of(&self, behind: Behind) -> Option<usize> {
+    fn of(&self, behind: NetworkLimit) -> Option<usize> {
         match behind {
-            Behind::Constraint(id) => self.requirements.get(id.index()).copied().flatten(),
-            Behind::Link(link) => self.links.get(link.index()).copied(),
+            NetworkLimit::Constraint(id) => self.requirements.get(id.index()).copied().flatten(),
+            NetworkLimit::Link(link) => self.links.get(link.index()).copied(),
         }
     }
 }
 
 /// No executor could keep to the plan's network.
-fn contradiction(mission: &Mission, sources: &Sources, behind: &[Behind]) -> Reason {
+fn contradiction(mission: &Mission, sources: &Sources, behind: &[NetworkLimit]) -> Reason {
     let mut reason = Reason::new(Cause::Late).about(About::NoTimes);
     let indices = behind.iter().filter_map(|behind| sources.of(*behind));
     reason.behind = indices
-        .map(|index| explain::words(&mission.task, &mission.plan.plan, index))
+        .map(|index| explain::named(&mission.task, &mission.plan.plan, index))
         .collect();
     reason.behind.dedup();
     reason
@@ -120,11 +120,11 @@ impl Dispatch {
             Sight::Whole => match ConsistentNetwork::try_from(network) {
                 Ok(network) => Horizon::whole(network),
                 Err(cycle) => {
-                    let behind: Vec<Behind> = cycle
+                    let behind: Vec<NetworkLimit> = cycle
                         .constraints
                         .iter()
                         .copied()
-                        .map(Behind::Constraint)
+                        .map(NetworkLimit::Constraint)
                         .collect();
                     let mut reason = contradiction(mission, &sources, &behind);
                     reason.by = Some(-cycle.total);
@@ -148,7 +148,7 @@ impl Dispatch {
             .uncertain_network(reading)
             .map_err(|Impossible(index)| {
                 let mut reason = Reason::new(Cause::Late).about(About::EmptyConstraint);
-                reason.behind = vec![explain::words(&mission.task, plan, index)];
+                reason.behind = vec![explain::named(&mission.task, plan, index)];
                 Box::new(reason)
             })?;
         let sources = Sources {
@@ -172,26 +172,11 @@ impl Dispatch {
         &mut self,
         now: &Rational,
         reading: &dyn Fn(&Constraint) -> Reading,
-    ) -> Result<(), Vec<String>> {
+    ) -> Result<(), Vec<Behind>> {
         let has_happened = |node: NodeId| self.happened(node).is_some();
-        let mut plan = self.plan.clone();
-        let since = |node: NodeId, least: &Rational, most: Bound| Constraint {
-            from: NodeId::ZERO,
-            to: node,
-            lower: Bound::Finite(least.clone()),
-            upper: most,
-            reason: elbowroom_plan::Reason::Given,
-        };
-        for (node, what) in self.plan.nodes().skip(1) {
-            match (self.happened(node), what) {
-                (_, Node::Zero | Node::Timed(_)) | (None, Node::End(_)) => {}
-                (Some(time), _) => {
-                    let fixed = since(node, time, Bound::Finite(time.clone()));
-                    plan.constraints.push(fixed);
-                }
-                (None, _) => plan.constraints.push(since(node, now, Bound::Infinite)),
-            }
-        }
+        // When something ends that is under way is not the executor's to decide.
+        let waits = |what: Node| !matches!(what, Node::End(_));
+        let plan = self.plan.remainder(now, |node| self.happened(node), waits);
         let known = self.plan.constraints.len();
         let network = plan.uncertain_network(&|constraint| {
             if constraint.from == NodeId::ZERO && constraint.reason == elbowroom_plan::Reason::Given
@@ -208,8 +193,8 @@ impl Dispatch {
             }
             reading(constraint)
         });
-        let words = |index: usize| explain::words(&self.task, &self.plan, index);
-        let network = network.map_err(|Impossible(index)| vec![words(index)])?;
+        let named = |index: usize| explain::named(&self.task, &self.plan, index);
+        let network = network.map_err(|Impossible(index)| vec![named(index)])?;
         let own = |index: &usize| *index < known;
         let sources = Sources {
             requirements: network
@@ -220,13 +205,13 @@ impl Dispatch {
             links: network.links,
         };
         let form = network.network.dispatchable().map_err(|conflict| {
-            let mut words: Vec<String> = grounds(&conflict.steps)
+            let mut behind: Vec<Behind> = grounds(&conflict.steps)
                 .iter()
-                .filter_map(|behind| sources.of(*behind))
-                .map(words)
+                .filter_map(|limit| sources.of(*limit))
+                .map(named)
                 .collect();
-            words.dedup();
-            words
+            behind.dedup();
+            behind
         })?;
         let mut horizon = Horizon::dispatchable(Arc::new(form));
         for (node, _) in self.plan.nodes() {
@@ -283,11 +268,7 @@ impl Dispatch {
             progress,
             told: BTreeMap::new(),
             timed,
-            resumed: mission
-                .running
-                .keys()
-                .map(|step| InstanceId(step.0))
-                .collect(),
+            resumed: mission.running.keys().map(|step| step.instance()).collect(),
             retries: BTreeMap::new(),
         };
         dispatch.begin(&mission.running);
@@ -305,7 +286,7 @@ impl Dispatch {
         self.progress
             .happen(&self.plan, NodeId::ZERO, &Rational::ZERO);
         for step in running.keys() {
-            let id = InstanceId(step.0);
+            let id = step.instance();
             let start = self.ends[id.index()][0];
             // The rest of a running action begins with the plan itself.
             let _ = self.horizon.fix(network_node(start), &Rational::ZERO);
@@ -388,7 +369,7 @@ impl Dispatch {
 
     /// The window of a step's start or end, by the world's clock.
     pub(crate) fn planned(&self, step: StepId, is_end: bool) -> Option<Planned> {
-        let node = self.ends.get(step.0 as usize)?[usize::from(is_end)];
+        let node = self.ends.get(step.instance().index())?[usize::from(is_end)];
         let (earliest, latest) = self.window_of(node);
         Some(Planned { earliest, latest })
     }

@@ -16,13 +16,21 @@ use crate::reason::Reason;
 
 /// An action of the present plan, by a number that the executor chooses.
 ///
-/// Executors that go by an STN plan use the position of the action instance.
+/// What is running already when a plan is taken up ([`Mission::running`]) has the number of its
+/// instance in [`Mission::plan`]. Executors that go by that plan number all steps so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub u32);
 
 impl From<InstanceId> for StepId {
     fn from(id: InstanceId) -> Self {
         Self(id.0)
+    }
+}
+
+impl StepId {
+    /// The instance, for executors that number steps by the instances of their plan.
+    pub fn instance(self) -> InstanceId {
+        InstanceId(self.0)
     }
 }
 
@@ -70,6 +78,8 @@ pub struct Mission {
     pub time_triggered: TimeTriggeredPlan,
     /// The plan with room, and with quantities left open.
     pub plan: ParametrizedPlan,
+    /// For each step of `time_triggered`, its instance in `plan`.
+    pub instances: Vec<InstanceId>,
     /// When everything happens if nothing deviates, on the task's clock.
     pub nominal: Schedule,
     /// In which values of the open quantities the plan is guaranteed to work.
@@ -77,9 +87,9 @@ pub struct Mission {
     /// Forms of the plan's network that executors have asked for before.
     pub forms: Forms,
     /// The partial order of the plan's happenings, for those that need it
-    /// ([`Need::PartialOrder`]); its instances are the plan's steps in order of start.
+    /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
-    /// The plan's first steps that are running already.
+    /// What is running already, and goes on in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, Ticket>,
 }
 

@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
 
-use crate::horizon::{Behind, grounds};
+use crate::horizon::{NetworkLimit, grounds};
 
 /// How many networks are remembered; an executor asks for one of a few.
 const MOST: usize = 8;
 
 /// The form of a network, or what stands against there being one.
-pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<Behind>>;
+pub(crate) type Form = Result<Arc<Dispatchable<Rational>>, Vec<NetworkLimit>>;
 
 /// The dispatchable forms of the networks of a plan, each computed once for all executions of it.
 ///

@@ -26,7 +26,7 @@ pub(crate) enum Horizon {
 
 /// What one end of a window comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Behind {
+pub(crate) enum NetworkLimit {
     /// A constraint of the network.
     Constraint(ConstraintId),
     /// What the world may do.
@@ -136,7 +136,7 @@ impl Horizon {
     }
 
     /// What stands behind one end of a window, beginning far away from the node.
-    pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<Behind> {
+    pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
         match self {
             Self::Whole(windows) => windows
                 .grounds(node, end)
@@ -144,13 +144,13 @@ impl Horizon {
                     grounds
                         .constraints
                         .into_iter()
-                        .map(Behind::Constraint)
+                        .map(NetworkLimit::Constraint)
                         .collect()
                 })
                 .unwrap_or_default(),
             Self::OneHop(one_hop) => {
                 let grounds = one_hop.grounds(node, end).into_iter();
-                grounds.map(Behind::Constraint).collect()
+                grounds.map(NetworkLimit::Constraint).collect()
             }
             Self::Dispatchable(dispatcher) => behind(dispatcher, node, end),
         }
@@ -158,7 +158,7 @@ impl Horizon {
 }
 
 /// What stands behind one end of a window of a node, or behind its link if that says more.
-fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<Behind> {
+fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
     let (earliest, latest) = dispatcher.window(node);
     let (least, most) = dispatcher.bounds(node);
     let is_link = match end {
@@ -166,7 +166,7 @@ fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<Behind> 
         WindowEnd::Latest => most.as_ref() != latest,
     };
     if is_link && let Some(link) = dispatcher.form().network().ending_at(node) {
-        return vec![Behind::Link(link)];
+        return vec![NetworkLimit::Link(link)];
     }
     let mut behind = grounds(&dispatcher.behind(node, end));
     if end == WindowEnd::Earliest {
@@ -177,10 +177,10 @@ fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<Behind> 
 }
 
 /// The parts of a network behind these steps.
-pub(crate) fn grounds(steps: &[Step]) -> Vec<Behind> {
+pub(crate) fn grounds(steps: &[Step]) -> Vec<NetworkLimit> {
     let ground = |step: &Step| match step.ground {
-        Ground::Requirement(id) => Behind::Constraint(id),
-        Ground::Early(link) | Ground::Late(link) => Behind::Link(link),
+        Ground::Requirement(id) => NetworkLimit::Constraint(id),
+        Ground::Early(link) | Ground::Late(link) => NetworkLimit::Link(link),
     };
     steps.iter().map(ground).collect()
 }

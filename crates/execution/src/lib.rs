@@ -47,8 +47,8 @@ pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Pl
 pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
-pub use preparation::{Need, Prepared, Preparer, Region};
+pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};
-pub use reason::{About, Cause, Promise, Reason};
+pub use reason::{About, Behind, Cause, Changed, Promise, Reason};
 pub use record::{Entry, NoRecord, Recorder};
 pub use world::{Passage, World, WorldError};

@@ -4,8 +4,13 @@
 
 use std::sync::Arc;
 
+use elbowroom_model::validate::Violation;
 use elbowroom_model::{Task, TimeTriggeredPlan};
-use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, PartialOrderPlan, Schedule, Valuation};
+use elbowroom_plan::deorder::DeorderError;
+use elbowroom_plan::parametrize::ParametrizeError;
+use elbowroom_plan::{
+    DecoupledEnvelope, InstanceId, ParametrizedPlan, PartialOrderPlan, Schedule, Valuation,
+};
 
 use crate::forms::Forms;
 
@@ -32,6 +37,8 @@ pub enum Need {
 pub struct Prepared {
     /// The plan with room.
     pub plan: ParametrizedPlan,
+    /// For each step of the plan that was made ready, its instance.
+    pub instances: Vec<InstanceId>,
     /// When everything happens if nothing deviates.
     pub nominal: Schedule,
     /// For which values it is guaranteed to work, if that was asked for.
@@ -42,18 +49,40 @@ pub struct Prepared {
     pub order: Option<PartialOrderPlan>,
 }
 
+/// Why a plan cannot be made ready: it does not work, or what is to be known of it cannot be found
+/// out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PrepareError {
+    /// The judge rejects the plan.
+    #[error("the plan is not valid: {0}")]
+    Invalid(Box<Violation>),
+    /// The plan has no order.
+    #[error(transparent)]
+    Deorder(#[from] DeorderError),
+    /// Something cannot be left open.
+    #[error(transparent)]
+    Parametrize(#[from] ParametrizeError),
+    /// The plan is not guaranteed to work even if nothing deviates.
+    #[error("the plan is not guaranteed to work even if nothing deviates")]
+    NoGuarantee,
+    /// Who knows what plans survive cannot tell of this one: why.
+    #[error("{0}")]
+    Beyond(String),
+}
+
 /// Makes plans ready.
 pub trait Preparer: Send {
     /// Frees a plan from the order that it does not need, and finds out what was asked for.
     ///
     /// # Errors
-    /// When the plan does not work: why.
+    /// When the plan does not work.
     fn prepare(
         &mut self,
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String>;
+    ) -> Result<Prepared, PrepareError>;
 }
 
 impl<P: Preparer + ?Sized> Preparer for &mut P {
@@ -62,7 +91,7 @@ impl<P: Preparer + ?Sized> Preparer for &mut P {
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String> {
+    ) -> Result<Prepared, PrepareError> {
         (**self).prepare(task, plan, need)
     }
 }

@@ -55,18 +55,19 @@ pub(crate) struct Place<'n> {
 
 /// All amounts that were measured.
 pub(crate) fn places<'n>(news: &'n [News]) -> impl Iterator<Item = Place<'n>> {
-    news.iter().flat_map(|news| {
-        let (step, is_end, measured): (_, _, &'n [Amount]) = match news {
-            News::Started { step, measured, .. } => (step.0, false, measured),
-            News::Ended { step, measured, .. } => (step.0, true, measured),
-            _ => (0, false, &[]),
+    let measured = news.iter().filter_map(|news| {
+        let (step, is_end, measured) = match news {
+            News::Started { step, measured, .. } => (step, false, measured),
+            News::Ended { step, measured, .. } => (step, true, measured),
+            _ => return None,
         };
-        measured.iter().map(move |amount| Place {
-            instance: InstanceId(step),
+        Some(measured.iter().map(move |amount| Place {
+            instance: step.instance(),
             is_end,
             amount,
-        })
-    })
+        }))
+    });
+    measured.flatten()
 }
 
 /// Reads the amounts in the news.

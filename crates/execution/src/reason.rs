@@ -1,12 +1,14 @@
 //! Why an executor decides as it does.
 
 mod about;
+mod behind;
 
 use std::fmt;
 
 use elbowroom_num::{Interval, Rational};
 
 pub use about::About;
+pub use behind::{Behind, Changed};
 
 /// Why an executor decides as it does: what was observed or not, what was allowed, what stands
 /// behind that, by how much it was missed, and since when. Times are the world's.
@@ -22,8 +24,8 @@ pub struct Reason {
     pub observed: Option<Rational>,
     /// What is allowed.
     pub allowed: Option<Interval>,
-    /// The constraints behind that, in words; the one it begins with comes first.
-    pub behind: Vec<String>,
+    /// The constraints or events behind that; the one it begins with comes first.
+    pub behind: Vec<Behind>,
     /// By how much it was missed.
     pub by: Option<Rational>,
     /// Since when this has been so.
@@ -190,7 +192,8 @@ impl fmt::Display for Reason {
             write!(f, ", since {}", since.to_decimal(3))?;
         }
         if !self.behind.is_empty() {
-            write!(f, " (behind it: {})", self.behind.join("; "))?;
+            let behind: Vec<String> = self.behind.iter().map(ToString::to_string).collect();
+            write!(f, " (behind it: {})", behind.join("; "))?;
         }
         Ok(())
     }

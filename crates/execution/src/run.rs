@@ -53,7 +53,7 @@ pub use settings::{
 use crate::event::{Command, Ticket};
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 use crate::planning::Planner;
-use crate::preparation::Preparer;
+use crate::preparation::{PrepareError, Preparer};
 use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 use crate::record::{Entry, Recorder};
@@ -305,7 +305,10 @@ impl<'a> Run<'a> {
         let prepared = self.prepare(plan, situation, running);
         let mission = match prepared {
             Ok(mission) => mission,
-            Err(why) => return Err(Stop::Over(Verdict::NoPlan { why })),
+            Err(error) => {
+                let why = error.to_string();
+                return Err(Stop::Over(Verdict::NoPlan { why }));
+            }
         };
         self.account.begin_plan(&mission.running);
         self.steps = mission.time_triggered.steps.len();
@@ -338,24 +341,27 @@ impl<'a> Run<'a> {
         plan: &TimeTriggeredPlan,
         situation: &Situation,
         running: &[Ticket],
-    ) -> Result<Mission, String> {
+    ) -> Result<Mission, PrepareError> {
         let task = Arc::new(situation.rest_of_task(&self.task));
+        // What is running comes first in it.
         let plan = situation.rest_of_plan(plan);
         let prepared = self
             .ports
             .preparer
             .prepare(&task, &plan, self.ports.executor.need())?;
+        let steps = prepared.instances.iter().copied().map(StepId::from);
         Ok(Mission {
+            running: steps.zip(running.iter().copied()).collect(),
             task,
             origin: situation.time.clone(),
             now: self.now.clone(),
             time_triggered: plan,
             plan: prepared.plan,
+            instances: prepared.instances,
             nominal: prepared.nominal,
             envelope: prepared.envelope,
             forms: prepared.forms,
             order: prepared.order,
-            running: (0..).map(StepId).zip(running.iter().copied()).collect(),
         })
     }
 }

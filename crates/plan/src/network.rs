@@ -8,7 +8,7 @@ use elbowroom_stn::Network;
 
 use crate::numbers::numbers_by_id;
 use crate::parameter::{ParameterId, Valuation};
-use crate::stn_plan::{Bound, Node, NodeId, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
 
 /// A time for each node of an [`StnPlan`], by position.
 ///
@@ -114,6 +114,36 @@ impl StnPlan {
                     *bound = Bound::Finite(valuation[*id].clone());
                 }
             }
+        }
+        plan
+    }
+
+    /// What is left of the plan `now`: what has happened stays where it is, and of the rest what
+    /// `waits` for somebody to bring it about comes not before now. Timed initials keep their times.
+    ///
+    /// The constraints that say so come after the plan's own.
+    #[must_use]
+    pub fn remainder<'t>(
+        &self,
+        now: &Rational,
+        happened: impl Fn(NodeId) -> Option<&'t Rational>,
+        waits: impl Fn(Node) -> bool,
+    ) -> Self {
+        let mut plan = self.clone();
+        for (node, what) in self.nodes().skip(1) {
+            let (lower, upper) = match (happened(node), what) {
+                (_, Node::Timed(_)) => continue,
+                (Some(time), _) => (time, Bound::Finite(time.clone())),
+                (None, what) if waits(what) => (now, Bound::Infinite),
+                (None, _) => continue,
+            };
+            plan.constraints.push(Constraint {
+                from: NodeId::ZERO,
+                to: node,
+                lower: Bound::Finite(lower.clone()),
+                upper,
+                reason: Reason::Given,
+            });
         }
         plan
     }

@@ -16,17 +16,18 @@ use crate::args::CheckArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
-use crate::output::counted;
+use crate::output::Output;
+use crate::words::counted;
 use crate::{input, number, output};
 
 /// Only the tightest margins are shown to people; `--json` has all.
 const MARGINS_SHOWN: usize = 8;
 
 /// Checks a problem, or a plan for it.
-pub(crate) fn run(arguments: &CheckArgs) -> Answer {
-    let task = input::task(&arguments.problem, &arguments.epsilon)?;
+pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
+    let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let plan = match &arguments.plan {
-        Some(path) => Some(plan(&task, path)?),
+        Some(path) => Some(plan(&task, path, output)?),
         None => None,
     };
     let name = arguments
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
         error => Failure::new(error, ""),
     })?;
     if arguments.json {
-        output::print_document(&answer)?;
+        output.document(&answer)?;
     } else {
         output::print(&text(&task, &answer, Look::of_stdout()))?;
     }
@@ -64,8 +65,8 @@ pub(crate) fn run(arguments: &CheckArgs) -> Answer {
 }
 
 /// The plan, with fixed times.
-fn plan(task: &Task, path: &Path) -> Result<TimeTriggeredPlan, Failure> {
-    match input::any_plan(task, path)? {
+fn plan(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPlan, Failure> {
+    match input::any_plan(task, path, output)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
             format!(

@@ -16,10 +16,13 @@ use crate::args::CompareArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::look::Look;
+use crate::output::Output;
+use crate::stopwatch::Stopwatch;
+use crate::words::plain;
 use crate::{input, output};
 
 /// Makes an experiment, or a part of it, or puts parts together.
-pub(crate) fn run(arguments: &CompareArgs) -> Answer {
+pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     let text = input::source(&arguments.experiment, "experiment")?;
     let folder = arguments
         .experiment
@@ -29,7 +32,7 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
     let file = |name: &str| {
         let path = folder.join(name);
         fs::read_to_string(&path)
-            .map_err(|error| format!("cannot read {}: {}", path.display(), output::plain(&error)))
+            .map_err(|error| format!("cannot read {}: {}", path.display(), plain(&error)))
     };
     // Who cannot write there learns it before hours of trials, not after.
     if let Some(folder) = &arguments.output {
@@ -48,7 +51,7 @@ pub(crate) fn run(arguments: &CompareArgs) -> Answer {
         None => Ok(()),
     };
     if arguments.json {
-        output::print_json(&answer.json())?;
+        output.json(&answer.json())?;
     } else {
         output::print(&table.within(Look::of_stdout().width))?;
     }
@@ -75,7 +78,7 @@ fn make(arguments: &CompareArgs, experiment: &AnyExperiment) -> Result<CompareAn
             ProgressStyle::with_template("{bar:30} {pos}/{len} trials, {eta} left")
                 .expect("a template without mistakes"),
         ),
-        interrupt: Interrupt::listen(),
+        stopwatch: Stopwatch::start(&Interrupt::listen()),
     };
     let answer = compare(CompareRequest { experiment, part }, &mut watch);
     watch.bar.finish_and_clear();
@@ -85,16 +88,12 @@ fn make(arguments: &CompareArgs, experiment: &AnyExperiment) -> Result<CompareAn
 /// Shows how many trials have been made, and ends them when the user asks to.
 struct Watch {
     bar: ProgressBar,
-    interrupt: Interrupt,
+    stopwatch: Stopwatch,
 }
 
 impl Watcher for Watch {
     fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.interrupt.is_requested() {
-            ControlFlow::Break(Halt::Cancelled)
-        } else {
-            ControlFlow::Continue(())
-        }
+        self.stopwatch.flow()
     }
 
     fn notice(&mut self, event: &Event<'_>) {
@@ -139,7 +138,7 @@ fn make_folder(folder: &Path) -> Result<(), Failure> {
             format!(
                 "cannot make the folder {}: {}",
                 folder.display(),
-                output::plain(&error)
+                plain(&error)
             ),
             "choose a folder that you may make, or that exists already",
         )

@@ -13,18 +13,19 @@ use elbowroom::plan::parametrize::VarySpec;
 use crate::args::{self, EnvelopeArgs};
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::Look;
+use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
-pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
+pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let mut watch = Watch::start(arguments);
-    let task = input::task(&arguments.problem, &arguments.epsilon)?;
+    let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
     ))?);
-    let plan = input::any_plan(&task, &arguments.plan)?;
+    let plan = input::any_plan(&task, &arguments.plan, output)?;
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
@@ -46,7 +47,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs) -> Answer {
     // The line on the terminal goes before the answer comes.
     drop(watch);
     if arguments.json {
-        output::print_document(&outcome.answer)?;
+        output.document(&outcome.answer)?;
     } else {
         output::print(&text::text(&request, &outcome, Look::of_stdout()))?;
     }

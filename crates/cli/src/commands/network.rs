@@ -14,13 +14,14 @@ use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, HINT, Look, STRONG, styled};
-use crate::output::{self, counted};
+use crate::output::{self, Output};
+use crate::words::counted;
 
 /// Bounds of a reason that people get to see; `--json` has all.
 const STEPS_SHOWN: usize = 12;
 
 /// Reads a network, answers, and writes what else was asked for.
-pub(crate) fn run(arguments: &NetworkArgs) -> Answer {
+pub(crate) fn run(arguments: &NetworkArgs, output: &mut Output) -> Answer {
     let outputs = [&arguments.minimal, &arguments.dispatchable];
     let on_stdout = outputs
         .into_iter()
@@ -58,7 +59,7 @@ pub(crate) fn run(arguments: &NetworkArgs) -> Answer {
     let found = network::examine(&file, &request).map_err(|error| Failure::new(error, ""))?;
     write_forms(arguments, &file)?;
     if arguments.json {
-        output::print_json(&document(&arguments.file, &found)?)?;
+        output.json(&document(&arguments.file, &found)?)?;
     } else if on_stdout == 0 {
         output::print(&report(text.name(), &found, Look::of_stdout()))?;
     }

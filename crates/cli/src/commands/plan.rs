@@ -9,18 +9,20 @@ use elbowroom::external::Planner;
 
 use crate::args::{EMBEDDED, PlanArgs};
 use crate::exit::{Answer, Exit, Failure};
+use crate::output::Output;
 use crate::{input, output};
 use watch::Watch;
 
 /// Plans.
-pub(crate) fn run(arguments: &PlanArgs) -> Answer {
+pub(crate) fn run(arguments: &PlanArgs, output: &mut Output) -> Answer {
     // A misspelt planner is told before files are read.
     let planner = if arguments.planner.eq_ignore_ascii_case(EMBEDDED) {
         None
     } else {
         Some(named(arguments)?)
     };
-    let (task, domain, problem) = input::task_with_sources(&arguments.problem, &arguments.epsilon)?;
+    let (task, domain, problem) =
+        input::task_with_sources(&arguments.problem, &arguments.epsilon, output)?;
     let mut watch = Watch::start(arguments, planner.is_some());
     let mut request = PlanRequest {
         task: &task,
@@ -37,7 +39,7 @@ pub(crate) fn run(arguments: &PlanArgs) -> Answer {
     };
     // The line on the terminal goes before the answer comes.
     drop(watch);
-    print(arguments, &outcome)
+    print(arguments, &outcome, output)
 }
 
 /// The planner that the command line asks for.
@@ -57,7 +59,7 @@ fn unsupported(error: RequestError) -> Failure {
     )
 }
 
-fn print(arguments: &PlanArgs, outcome: &PlanOutcome) -> Answer {
+fn print(arguments: &PlanArgs, outcome: &PlanOutcome, output: &mut Output) -> Answer {
     let answer = &outcome.answer;
     if let PlanFinding::Plan {
         repaired: Some(objection),
@@ -71,7 +73,7 @@ fn print(arguments: &PlanArgs, outcome: &PlanOutcome) -> Answer {
         output::write_file(path, plan)?;
     }
     if arguments.json {
-        output::print_document(answer)?;
+        output.document(answer)?;
     } else if let PlanFinding::NoPlan { reason } | PlanFinding::None { reason } = &answer.finding {
         output::print(&format!("{reason}\n"))?;
     } else if let (Some(plan), None) = (&plan, &arguments.output) {

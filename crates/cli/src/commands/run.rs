@@ -7,7 +7,6 @@ mod replay;
 mod spec;
 mod text;
 mod trace_file;
-mod watch;
 
 use std::sync::Arc;
 
@@ -25,24 +24,25 @@ use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input::{self, AnyPlan};
 use crate::interrupt::Interrupt;
-use crate::output::{self, tame};
+use crate::output::{self, Output};
+use crate::stopwatch::Stopwatch;
+use crate::words::tame;
 use realtime::{Pace, PacedPlanner, Realtime};
 use spec::contradiction;
 use trace_file::TraceFile;
-use watch::Watch;
 
 /// Executes a plan, or plays a stored run back.
-pub(crate) fn run(arguments: &RunArgs) -> Answer {
+pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     if let Some(path) = &arguments.replay {
-        return replay::run(path, arguments.json);
+        return replay::run(path, arguments.json, output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new("DOMAIN and PROBLEM are missing", ""));
     };
     let (spec, world) = spec::of(arguments, domain, problem)?;
-    let task = task(&spec)?;
+    let task = task(&spec, output)?;
     let first = match arguments.plan() {
-        Some(path) => Some(time_triggered(&task, path)?),
+        Some(path) => Some(time_triggered(&task, path, output)?),
         None => None,
     };
     // What is wrong with a file is told before anything is done.
@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
     };
     let trouble = file.close();
     let shown = if arguments.json {
-        output::print_document(&outcome.answer)
+        output.document(&outcome.answer)
     } else {
         output::print(&text::human(&outcome.report))
     };
@@ -100,10 +100,10 @@ pub(crate) fn run(arguments: &RunArgs) -> Answer {
 }
 
 /// The problem of a specification, with its warnings told.
-fn task(spec: &RunSpec) -> Result<Task, Failure> {
+fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
     let (domain, problem) = (spec.domain.source(), spec.problem.source());
     let read = elbowroom::pddl::read_problem(&domain, &problem);
-    let problem = Arc::new(input::with_warnings(read)?);
+    let problem = Arc::new(input::with_warnings(read, output)?);
     Ok(Task::new(problem).with_epsilon(spec.epsilon.clone()))
 }
 
@@ -124,7 +124,7 @@ impl Job<'_> {
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
             .recorded_by(recorder);
-        execute(request, world, &mut Watch::new(self.interrupt))
+        execute(request, world, &mut Stopwatch::start(self.interrupt))
     }
 
     /// A run in the world that the specification describes, on a wall clock if it asks for one.
@@ -154,12 +154,16 @@ impl Job<'_> {
                 planning_time: &spec.planning_time,
             })
             .recorded_by(recorder);
-        execute(request, &mut world, &mut Watch::new(self.interrupt))
+        execute(request, &mut world, &mut Stopwatch::start(self.interrupt))
     }
 }
 
-fn time_triggered(task: &Task, path: &std::path::Path) -> Result<TimeTriggeredPlan, Failure> {
-    match input::any_plan(task, path)? {
+fn time_triggered(
+    task: &Task,
+    path: &std::path::Path,
+    output: &mut Output,
+) -> Result<TimeTriggeredPlan, Failure> {
+    match input::any_plan(task, path, output)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
             format!("{} is an STN plan file", path.display()),

@@ -6,7 +6,8 @@ use clap::CommandFactory;
 
 use crate::args::{CommandLine, CompletionsArgs, ManArgs};
 use crate::exit::{Answer, Exit, Failure};
-use crate::output::{self, plain};
+use crate::output;
+use crate::words::plain;
 
 /// `elbowroom completions`: a script for a shell.
 pub(crate) fn completions(arguments: &CompletionsArgs) -> Answer {

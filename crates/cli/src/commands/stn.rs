@@ -9,20 +9,21 @@ use crate::args::StnArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
 use crate::look::{BAD, Look, styled};
+use crate::output::Output;
 use crate::{input, output};
 
 /// Writes the STN plan, and what else was asked for.
-pub(crate) fn run(arguments: &StnArgs) -> Answer {
-    let task = input::task(&arguments.problem, &arguments.epsilon)?;
-    let plan = input::any_plan(&task, &arguments.plan)?;
+pub(crate) fn run(arguments: &StnArgs, output: &mut Output) -> Answer {
+    let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
+    let plan = input::any_plan(&task, &arguments.plan, output)?;
     let request = StnRequest { task: &task, plan };
     let outcome = stn(&request).map_err(|error| Failure::new(error, ""))?;
     if let Some(violation) = &outcome.repaired {
         input::tell_repair(&arguments.plan, violation);
     }
     match &outcome.plan {
-        Some(plan) => network(arguments, &task, plan, &outcome),
-        None => invalid(arguments, &outcome),
+        Some(plan) => network(arguments, &task, plan, &outcome, output),
+        None => invalid(arguments, &outcome, output),
     }
 }
 
@@ -31,6 +32,7 @@ fn network(
     task: &Task,
     plan: &ParametrizedPlan,
     outcome: &StnOutcome,
+    output: &mut Output,
 ) -> Answer {
     if let Some(path) = &arguments.dot {
         output::write_file(path, &graph::to_dot(task, plan))?;
@@ -43,7 +45,7 @@ fn network(
         output::write_file(path, &stn_text(task, plan)?)?;
     }
     if arguments.json {
-        output::print_document(&outcome.answer)?;
+        output.document(&outcome.answer)?;
     } else if arguments.output.is_none() && !is_dot_on_stdout {
         output::print(&stn_text(task, plan)?)?;
     }
@@ -51,10 +53,10 @@ fn network(
 }
 
 /// A plan that is not valid has no room. Standard output is for the network alone.
-fn invalid(arguments: &StnArgs, outcome: &StnOutcome) -> Answer {
+fn invalid(arguments: &StnArgs, outcome: &StnOutcome, output: &mut Output) -> Answer {
     let file = arguments.plan.display();
     if arguments.json {
-        output::print_document(&outcome.answer)?;
+        output.document(&outcome.answer)?;
     } else if let StnFinding::Invalid { violation } = &outcome.answer.finding {
         let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
         push_wrapped(&mut text, &violation.message, 2, Look::PLAIN.width);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use elbowroom::envelope::{Guarantee, Oracle, StopReason, irr};
 use elbowroom::execute::{Analyst, Execution};
 use elbowroom::execution::run::{Patience, PlanningTime, Report, RunSettings, Verdict};
-use elbowroom::execution::{Forms, Need, NoPlanner, Prepared, Preparer, World};
+use elbowroom::execution::{Forms, Need, NoPlanner, PrepareError, Prepared, Preparer, World};
 use elbowroom::flow;
 use elbowroom::model::validate::{self, validate};
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -24,7 +24,7 @@ pub(crate) struct Ready<'a> {
     /// With all durations left open, and the box.
     pub(crate) open: Prepared,
     /// For `esterel`, `adaptable` and `lookahead`.
-    orderings: Result<Prepared, String>,
+    orderings: Result<Prepared, PrepareError>,
 }
 
 /// How a run ended.
@@ -60,6 +60,7 @@ impl<'a> Ready<'a> {
     pub(crate) fn new(subject: &'a Subject, search: Search<'_>) -> Result<Self, String> {
         let task = &subject.task;
         let nominal = subject.freed.deordered.nominal.clone();
+        let instances = subject.freed.deordered.instances.clone();
         let open = flow::open(task, subject.freed.clone(), &[])
             .map_err(|_| "durations cannot be left open".to_owned())?;
         let closed = flow::closed(task, subject.freed.clone());
@@ -70,6 +71,7 @@ impl<'a> Ready<'a> {
             subject,
             network: Prepared {
                 plan: closed,
+                instances: instances.clone(),
                 nominal: nominal.clone(),
                 envelope: None,
                 forms: Forms::default(),
@@ -77,6 +79,7 @@ impl<'a> Ready<'a> {
             },
             open: Prepared {
                 plan: Arc::unwrap_or_clone(open),
+                instances,
                 nominal,
                 envelope: Some(boxed.envelope),
                 forms: Forms::default(),
@@ -176,7 +179,7 @@ impl Preparer for Remembered<'_> {
         _task: &Arc<Task>,
         _plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String> {
+    ) -> Result<Prepared, PrepareError> {
         match need {
             Need::Orderings | Need::PartialOrder => self.0.orderings.clone(),
             Need::Network => Ok(self.0.network.clone()),

@@ -4,8 +4,9 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Guarantee, Oracle, irr};
-use elbowroom_execution::{Forms, Need, Prepared, Preparer, Region};
+use elbowroom_execution::{Forms, Need, PrepareError, Prepared, Preparer, Region};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_plan::deorder;
 use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize};
@@ -14,7 +15,18 @@ use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation};
 
 use super::facts_only::{as_timed, facts_only};
 use super::vary::is_about_an_absent_action;
-use crate::flow;
+use crate::flow::{self, FlowError};
+
+impl From<FlowError> for PrepareError {
+    fn from(error: FlowError) -> Self {
+        match error {
+            FlowError::Invalid(violation) => Self::Invalid(violation),
+            FlowError::Deorder(error) => Self::Deorder(error),
+            FlowError::Parametrize(error) => Self::Parametrize(error),
+            FlowError::Refused(_) => Self::Beyond(error.to_string()),
+        }
+    }
+}
 
 /// Makes plans ready with [`flow`].
 #[derive(Clone)]
@@ -62,7 +74,7 @@ impl Analyst {
     }
 
     /// The specifications that fit something in the plan.
-    fn specs(&self, task: &Task, freed: &flow::Freed) -> Result<Vec<VarySpec>, String> {
+    fn specs(&self, task: &Task, freed: &flow::Freed) -> Result<Vec<VarySpec>, ParametrizeError> {
         let mut fitting = Vec::new();
         for spec in &self.settings.vary {
             let plan = freed.deordered.plan.clone();
@@ -72,30 +84,34 @@ impl Analyst {
                 Ok(_) | Err(ParametrizeError::NoNominal { .. }) => fitting.push(spec.clone()),
                 Err(ParametrizeError::NothingMatches { .. }) => {}
                 Err(error) if is_about_an_absent_action(task, spec, &error) => {}
-                Err(error) => return Err(error.to_string()),
+                Err(error) => return Err(error),
             }
         }
         Ok(fitting)
     }
 
-    fn open(&self, task: &Task, freed: flow::Freed) -> Result<ParametrizedPlan, String> {
+    fn open(&self, task: &Task, freed: flow::Freed) -> Result<ParametrizedPlan, PrepareError> {
         let specs = self.specs(task, &freed)?;
         if specs.is_empty() && !self.settings.vary.is_empty() {
             return Ok(flow::closed(task, freed));
         }
-        flow::open(task, freed, &specs).map_err(|error| error.to_string())
+        Ok(flow::open(task, freed, &specs)?)
     }
 
     /// What facts alone order: see [`Need::Orderings`].
-    fn orderings(task: &Task, plan: &TimeTriggeredPlan, need: Need) -> Result<Prepared, String> {
-        let deordered = deorder::deorder(task, &facts_only(plan));
-        let mut deordered = deordered.map_err(|error| error.to_string())?;
+    fn orderings(
+        task: &Task,
+        plan: &TimeTriggeredPlan,
+        need: Need,
+    ) -> Result<Prepared, PrepareError> {
+        let mut deordered = deorder::deorder(task, &facts_only(plan))?;
         let order = (need == Need::PartialOrder).then(|| partial_order(task, &as_timed(plan)));
         for (instance, step) in deordered.instances.iter().zip(&plan.steps) {
             deordered.plan.instances[instance.index()].action = step.action.clone();
         }
         Ok(Prepared {
             plan: ParametrizedPlan::closed(task, deordered.plan),
+            instances: deordered.instances,
             nominal: deordered.nominal,
             envelope: None,
             forms: Forms::default(),
@@ -107,14 +123,12 @@ impl Analyst {
         &self,
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
-    ) -> Result<DecoupledEnvelope, String> {
-        let mut oracle =
-            Oracle::new(task, plan, self.settings.guarantee).map_err(|error| error.to_string())?;
+    ) -> Result<DecoupledEnvelope, PrepareError> {
+        let beyond = |refusal: Refusal| PrepareError::Beyond(refusal.to_string());
+        let mut oracle = Oracle::new(task, plan, self.settings.guarantee).map_err(beyond)?;
         let search = &self.settings.search;
-        let run = irr(&mut oracle, search, &mut |_| self.flow());
-        let run = run.map_err(|error| error.to_string())?;
-        run.envelope
-            .map_err(|_| "the plan is not guaranteed to work even if nothing deviates".to_owned())
+        let run = irr(&mut oracle, search, &mut |_| self.flow()).map_err(beyond)?;
+        run.envelope.map_err(|_| PrepareError::NoGuarantee)
     }
 }
 
@@ -124,16 +138,17 @@ impl Preparer for Analyst {
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String> {
+    ) -> Result<Prepared, PrepareError> {
         let is_about_orders = matches!(need, Need::Orderings | Need::PartialOrder);
         if is_about_orders && flow::judge(task, plan).is_valid() {
             return Self::orderings(task, plan, need);
         }
-        let freed = flow::free(task, plan).map_err(|error| error.to_string())?;
+        let freed = flow::free(task, plan)?;
         if is_about_orders {
             return Self::orderings(task, plan, need);
         }
         let nominal = freed.deordered.nominal.clone();
+        let instances = freed.deordered.instances.clone();
         let plan = Arc::new(match need {
             Need::Orderings | Need::PartialOrder | Need::Network => flow::closed(task, freed),
             Need::OpenNetwork | Need::Envelope => self.open(task, freed)?,
@@ -145,6 +160,7 @@ impl Preparer for Analyst {
         };
         Ok(Prepared {
             plan: Arc::unwrap_or_clone(plan),
+            instances,
             nominal,
             envelope,
             forms: Forms::default(),

@@ -11,7 +11,7 @@ use elbowroom_model::validate::{self, validate_from};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_plan::deorder::deorder;
-use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan, Valuation};
+use elbowroom_plan::{Bound, Constraint, InstanceId, StnPlan, Valuation};
 use elbowroom_sim::draw::keyed;
 use elbowroom_sim::{Purpose, WorldModel};
 use elbowroom_stn::ConsistentNetwork;
@@ -305,21 +305,7 @@ impl Rest {
                 plan.constraints[index].upper = Bound::Infinite;
             }
         }
-        let nodes: Vec<_> = plan.nodes().skip(1).collect();
-        for (node, what) in nodes {
-            let (lower, upper) = match (&happened[node.index()], what) {
-                (_, Node::Timed(_)) => continue,
-                (Some(time), _) => (time.clone(), Bound::Finite(time.clone())),
-                (None, _) => (now.clone(), Bound::Infinite),
-            };
-            plan.constraints.push(Constraint {
-                from: NodeId::ZERO,
-                to: node,
-                lower: Bound::Finite(lower),
-                upper,
-                reason: Reason::Given,
-            });
-        }
+        let plan = plan.remainder(now, |node| happened[node.index()].as_ref(), |_| true);
         Self { plan, to_come }
     }
 

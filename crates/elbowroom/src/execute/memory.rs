@@ -9,7 +9,9 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-use elbowroom_execution::{Need, PlanAnswer, Planner, PlannerAnswer, Prepared, Preparer};
+use elbowroom_execution::{
+    Need, PlanAnswer, Planner, PlannerAnswer, PrepareError, Prepared, Preparer,
+};
 use elbowroom_model::{Situation, State, Task, TimeTriggeredPlan, TimedHappening};
 use elbowroom_num::Rational;
 use indexmap::IndexMap;
@@ -97,7 +99,7 @@ impl<P: Planner> Planner for RememberingPlanner<P> {
 #[derive(Clone, Debug)]
 pub struct RememberingPreparer<P> {
     preparer: P,
-    memory: Memory<Question, Result<Prepared, String>>,
+    memory: Memory<Question, Result<Prepared, PrepareError>>,
     table: Option<(usize, usize)>,
 }
 
@@ -127,7 +129,7 @@ impl<P: Preparer> Preparer for RememberingPreparer<P> {
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String> {
+    ) -> Result<Prepared, PrepareError> {
         let table = table(task);
         if *self.table.get_or_insert(table) != table {
             return self.preparer.prepare(task, plan, need);

@@ -38,8 +38,10 @@ fn an_amount_in_which_the_duration_stands_is_held_against_how_long_it_took() {
     }
     let report = scene.run("adaptable", &model, 0);
     // Who goes by orders says after which news none was left.
-    let behind = &report.reasons[0].behind;
-    assert_eq!(behind, &["(survey rover crater) succeeded at 20"]);
+    let [behind] = report.reasons[0].behind.as_slice() else {
+        panic!("{:?}", report.reasons);
+    };
+    assert_eq!(behind.to_string(), "(survey rover crater) succeeded at 20");
     // More of it because it took longer is no deviation.
     let model = scene.world("[[duration]]\naction = \"recharge\"\nconstant = 10.5\n");
     let report = scene.run("fixed:10", &model, 0);

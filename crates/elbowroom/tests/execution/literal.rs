@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use elbowroom::execution::run::Report;
 use elbowroom::execution::{
     Cause, Decided, Decision, Ending, Executor, Forms, Mission, Moment, Need, News, NoPlanner,
-    Order, Planned, Prepared, Preparer, Reason, StepId,
+    Order, Planned, PrepareError, Prepared, Preparer, Reason, StepId,
 };
 use elbowroom::model::{State, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
@@ -59,9 +59,10 @@ impl Preparer for AsItIs {
         task: &Arc<Task>,
         _plan: &TimeTriggeredPlan,
         _need: Need,
-    ) -> Result<Prepared, String> {
+    ) -> Result<Prepared, PrepareError> {
         let plan = StnPlan::unconstrained(task, Vec::new());
         Ok(Prepared {
+            instances: Vec::new(),
             nominal: plan.nodes.iter().map(|_| Rational::ZERO).collect(),
             plan: ParametrizedPlan {
                 told: std::collections::BTreeMap::default(),

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use elbowroom::execution::run::{Report, Verdict};
 use elbowroom::execution::{
-    Cause, Command, Ending, Event, NoPlanner, NoRecord, Observation, Passage, Planner, Recorder,
-    World, WorldError,
+    Behind, Cause, Command, Ending, Event, NoPlanner, NoRecord, Observation, Passage, Planner,
+    Recorder, World, WorldError,
 };
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Replay, ReplayPlanner, ReplayWorld, Stored, TraceWriter};
@@ -186,7 +186,11 @@ fn a_dead_end_may_come_from_an_observation_or_a_timed_initial_or_be_there_from_t
         panic!("{report:#?}");
     };
     assert_eq!(reason.since, Some(Rational::from(30)));
-    assert_eq!(reason.behind, ["(shelved) was seen to be false"]);
+    let seen = Behind::Fact {
+        fact: "(shelved)".to_owned(),
+        truth: false,
+    };
+    assert_eq!(reason.behind, [seen]);
 
     // Nobody tells `esterel` that the shop closes.
     let plan = "0: (pick) [10]\n10.001: (sort) [10]";

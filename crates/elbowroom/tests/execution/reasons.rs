@@ -80,7 +80,10 @@ fn live_gives_up_exactly_when_the_deadline_is_out_of_reach() {
     assert_eq!(reason.cause, Cause::Unreachable, "{reason}");
     let deadline = "(counter-open office) becomes false at 60";
     assert!(
-        reason.behind.iter().any(|it| it.contains(deadline)),
+        reason
+            .behind
+            .iter()
+            .any(|it| it.to_string().contains(deadline)),
         "{reason}"
     );
 }

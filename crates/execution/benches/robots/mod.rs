@@ -182,6 +182,7 @@ pub(crate) fn mission(count: usize, is_open: bool) -> Mission {
         now: Rational::ZERO,
         time_triggered: TimeTriggeredPlan::default(),
         plan,
+        instances: Vec::new(),
         nominal,
         envelope,
         forms: Forms::default(),

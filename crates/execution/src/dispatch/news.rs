@@ -9,7 +9,7 @@ use crate::event::Ending;
 use crate::executor::{Moment, News};
 use crate::horizon::{Horizon, Missed};
 use crate::projection;
-use crate::reason::{About, Cause, Reason};
+use crate::reason::{About, Behind, Cause, Reason};
 
 impl Dispatch {
     /// Takes note of what is new. The first thing that the plan does not survive, if there is one.
@@ -18,10 +18,10 @@ impl Dispatch {
         let mut is_surprised = None;
         for news in moment.news {
             let new = match news {
-                News::Started { step, time, .. } => self.started(InstanceId(step.0), time),
+                News::Started { step, time, .. } => self.started(step.instance(), time),
                 News::Ended {
                     step, time, ending, ..
-                } => self.ended(InstanceId(step.0), time, ending),
+                } => self.ended(step.instance(), time, ending),
                 News::Fact(fact) => {
                     is_surprised = Some(moment.belief.task().fact_name(*fact));
                     None
@@ -51,7 +51,7 @@ impl Dispatch {
         let failure = projection::failure(self, moment)?;
         let mut reason = Reason::new(Cause::Surprise).about(About::Seen(what.to_owned()));
         reason.action = failure.action;
-        reason.behind = vec![failure.condition];
+        reason.behind = vec![Behind::Condition(failure.condition)];
         reason.since = Some(moment.now.clone());
         Some(reason)
     }

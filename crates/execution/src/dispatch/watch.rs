@@ -108,9 +108,9 @@ impl Dispatch {
                 planned: self.planned(StepId::from(id), false).unwrap_or_default(),
             });
         }
-        let first = orders.first().map(|order| InstanceId(order.step.0));
+        let first = orders.first().map(|order| order.step.instance());
         for order in &orders {
-            let id = InstanceId(order.step.0);
+            let id = order.step.instance();
             self.progress.ready.remove(&self.ends[id.index()][0]);
             self.progress.running.insert(id);
             self.told.insert(id, now.clone());

@@ -1,7 +1,7 @@
 //! `esterel`: paper 2's baseline.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Bound, Constraint, InstanceId};
+use elbowroom_plan::{Bound, Constraint};
 
 use super::Registered;
 use crate::dispatch::{Bounds, Dispatch, Sight, replan};
@@ -72,13 +72,13 @@ impl Executor for Esterel {
 fn learn(dispatch: &mut Dispatch, news: &News) -> Option<Reason> {
     match news {
         News::Started { step, time, .. } => {
-            dispatch.note_start(InstanceId(step.0), time);
+            dispatch.note_start(step.instance(), time);
             None
         }
         News::Ended {
             step, time, ending, ..
         } => {
-            let id = InstanceId(step.0);
+            let id = step.instance();
             let [start, _] = dispatch.nodes_of(id);
             let name = &dispatch.action(id).name;
             let why = match ending {

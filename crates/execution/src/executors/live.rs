@@ -6,9 +6,7 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::ground::{Action, Body, Change, Effect, Expression};
 use elbowroom_num::Rational;
-use elbowroom_plan::{
-    Bound, Constraint, InstanceId, NodeId, ParameterId, ParametrizedPlan, Valuation,
-};
+use elbowroom_plan::{Bound, InstanceId, ParameterId, ParametrizedPlan, Valuation};
 
 use super::{Registered, promise};
 use crate::dispatch::{Bounds, Dispatch, replan};
@@ -162,7 +160,7 @@ impl Rest {
         if let Some(step) = step.filter(|_| self.reads_numbers) {
             let (plan, values) = self.remainder(moment.now);
             if let Some(why) = region.objection(&self.mission.task, &plan, &values) {
-                let action = &self.dispatch.action(InstanceId(step.0)).name;
+                let action = &self.dispatch.action(step.instance()).name;
                 let reason = Reason::new(Cause::GuaranteeLost)
                     .of(action)
                     .about(About::Said(why));
@@ -254,21 +252,9 @@ impl Rest {
             let action = &mut plan.plan.instances[instance.index()].action;
             set_amount(action, *is_end, measured);
         }
-        let nodes: Vec<_> = plan.plan.nodes().skip(1).collect();
-        for (node, what) in nodes {
-            let (lower, upper) = match (self.dispatch.happened(node), what) {
-                (_, elbowroom_plan::Node::Timed(_)) => continue,
-                (Some(time), _) => (time.clone(), Bound::Finite(time.clone())),
-                (None, _) => (now.clone(), Bound::Infinite),
-            };
-            plan.plan.constraints.push(Constraint {
-                from: NodeId::ZERO,
-                to: node,
-                lower: Bound::Finite(lower),
-                upper,
-                reason: elbowroom_plan::Reason::Given,
-            });
-        }
+        plan.plan = plan
+            .plan
+            .remainder(&now, |node| self.dispatch.happened(node), |_| true);
         for (parameter, instance) in duration_parameters(&self.mission.plan) {
             let [start, end] = self.dispatch.nodes_of(instance);
             if let (Some(start), None) =
@@ -291,7 +277,7 @@ fn range(plan: &ParametrizedPlan, parameter: ParameterId) -> Bounds {
 /// The instance whose start or end is told of.
 fn instance_of(news: &News) -> Option<InstanceId> {
     match news {
-        News::Started { step, .. } | News::Ended { step, .. } => Some(InstanceId(step.0)),
+        News::Started { step, .. } | News::Ended { step, .. } => Some(step.instance()),
         _ => None,
     }
 }

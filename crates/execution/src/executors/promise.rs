@@ -88,7 +88,7 @@ pub(super) fn weaken(
         let reading = |constraint: &Constraint| room.reading(constraint);
         dispatch
             .rebound(&local, &reading)
-            .map_err(|words| behind = words)
+            .map_err(|against| behind = against)
     };
     // What numbers bear is known only where nothing has left the envelope.
     let reads_numbers = mission.plan.reads_numbers(&mission.task);

@@ -7,14 +7,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use elbowroom_model::ground::{Change, Condition, FactId, FluentId};
+use elbowroom_model::ground::{Condition, FactId, FluentId};
 use elbowroom_model::{Situation, Task, reachability};
 use elbowroom_num::{Interval, Rational};
 
 use super::{Account, Run};
 use crate::event::{Ending, Ticket};
 use crate::progression::Progression;
-use crate::reason::{About, Cause, Reason};
+use crate::reason::{About, Behind, Cause, Changed, Reason};
 
 /// Something observed that was believed.
 #[derive(Clone, Debug)]
@@ -137,11 +137,11 @@ impl Past<'_> {
     fn between(&self, count: usize, reason: Reason, goal: &Condition) -> Reason {
         let next = self.history.get(count);
         let until = next.map_or(self.now, |next| &next.time).clone();
-        if let Some((time, words)) = self.timed(&self.after(count), &until, goal) {
-            return with_event(reason, words, time);
+        if let Some((time, event)) = self.timed(&self.after(count), &until, goal) {
+            return with_event(reason, event, time);
         }
         match next {
-            Some(next) => with_event(reason, self.words(&next.what), next.time.clone()),
+            Some(next) => with_event(reason, self.named(&next.what), next.time.clone()),
             None => reason.since(self.now.clone()),
         }
     }
@@ -153,7 +153,7 @@ impl Past<'_> {
             return reason;
         }
         match self.timed(&start, self.now, goal) {
-            Some((time, words)) => with_event(reason, words, time),
+            Some((time, event)) => with_event(reason, event, time),
             None => reason,
         }
     }
@@ -164,29 +164,21 @@ impl Past<'_> {
         from: &Progression,
         until: &Rational,
         goal: &Condition,
-    ) -> Option<(Rational, String)> {
+    ) -> Option<(Rational, Behind)> {
         let mut state = from.clone();
         let to_come = self.task.timed().iter().skip(state.timed_past());
         for timed in to_come.take_while(|timed| timed.time <= *until) {
             let _ = state.advance(&timed.time);
             if is_lost(&state, goal) {
-                let words = timed.changes.iter().map(|change| self.change(change));
-                return Some((timed.time.clone(), words.collect::<Vec<_>>().join(", ")));
+                let event = Behind::Past(Changed::all(self.task, &timed.changes));
+                return Some((timed.time.clone(), event));
             }
         }
         None
     }
 
-    fn change(&self, change: &Change) -> String {
-        let task = self.task;
-        match change {
-            Change::Add(fact) => format!("{} became true", task.fact_name(*fact)),
-            Change::Delete(fact) => format!("{} became false", task.fact_name(*fact)),
-            Change::Update { fluent, .. } => format!("{} changed", task.fluent_name(*fluent)),
-        }
-    }
-
-    fn words(&self, what: &What) -> String {
+    /// What has happened, by name.
+    fn named(&self, what: &What) -> Behind {
         let task = self.task;
         let entry = |ticket: &Ticket| {
             let entry = self.account.get(*ticket);
@@ -195,22 +187,20 @@ impl Past<'_> {
             (name.unwrap_or_default(), ending)
         };
         match what {
-            What::Started(ticket) => format!("the start of {}", entry(ticket).0),
-            What::Ended(ticket) => format!("the end of {}", entry(ticket).0),
+            What::Started(ticket) => Behind::Start(entry(ticket).0),
+            What::Ended(ticket) => Behind::End(entry(ticket).0),
             What::Stopped(ticket) => match entry(ticket) {
-                (name, Some(Ending::Failed { why })) if !why.is_empty() => {
-                    format!("{name} failed: {why}")
-                }
-                (name, Some(Ending::Failed { .. })) => format!("{name} failed"),
-                (name, _) => format!("{name} was cancelled"),
+                (action, Some(Ending::Failed { why })) => Behind::Failed { action, why },
+                (action, _) => Behind::Cancelled(action),
             },
-            What::Fact(fact, truth) => {
-                format!("{} was seen to be {truth}", task.fact_name(*fact))
-            }
-            What::Value(fluent, value) => {
-                let value = value.to_decimal(3);
-                format!("{} was seen to be {value}", task.fluent_name(*fluent))
-            }
+            What::Fact(fact, truth) => Behind::Fact {
+                fact: task.fact_name(*fact),
+                truth: *truth,
+            },
+            What::Value(fluent, value) => Behind::Value {
+                fluent: task.fluent_name(*fluent),
+                value: Some(value.clone()),
+            },
         }
     }
 
@@ -246,9 +236,9 @@ impl Past<'_> {
     }
 }
 
-fn with_event(reason: Reason, words: String, time: Rational) -> Reason {
+fn with_event(reason: Reason, event: Behind, time: Rational) -> Reason {
     Reason {
-        behind: vec![words],
+        behind: vec![event],
         ..reason.since(time)
     }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means};
 use elbowroom_execution::run::{Ports, Run, RunSettings};
 use elbowroom_execution::{
-    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, Prepared, Preparer,
-    Recorder, Region, Ticket, World, WorldError,
+    Command, Ending, Event, Forms, Need, NoPlanner, Observation, Passage, PrepareError, Prepared,
+    Preparer, Recorder, Region, Ticket, World, WorldError,
 };
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -84,13 +84,13 @@ impl Preparer for ByHand {
         task: &Arc<Task>,
         plan: &TimeTriggeredPlan,
         need: Need,
-    ) -> Result<Prepared, String> {
-        let deordered = deorder(task, plan).map_err(|error| error.to_string())?;
-        let nominal = deordered.nominal;
+    ) -> Result<Prepared, PrepareError> {
+        let deordered = deorder(task, plan)?;
+        let (instances, nominal) = (deordered.instances, deordered.nominal);
         let is_open = matches!(need, Need::OpenNetwork | Need::Envelope);
         let order = (need == Need::PartialOrder).then(|| partial_order(task, plan));
         let prepared = if is_open {
-            parametrize(task, deordered.plan, &nominal, &[]).map_err(|error| error.to_string())?
+            parametrize(task, deordered.plan, &nominal, &[])?
         } else {
             ParametrizedPlan::closed(task, deordered.plan)
         };
@@ -102,6 +102,7 @@ impl Preparer for ByHand {
         let envelope = is_open.then(|| DecoupledEnvelope::new(&prepared, twice));
         Ok(Prepared {
             plan: prepared,
+            instances,
             nominal,
             envelope: envelope.flatten(),
             forms: Forms::default(),

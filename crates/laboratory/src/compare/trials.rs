@@ -132,7 +132,7 @@ impl Setting<'_> {
         for spec in &self.experiment.executors {
             preparer
                 .prepare(task, first, spec.registered.need)
-                .map_err(|why| self.wrong(&why))?;
+                .map_err(|error| self.wrong(&error.to_string()))?;
         }
         let planning_time = match &self.experiment.settings.planning_time {
             PlanningTime::Seconds(seconds) => seconds.clone(),

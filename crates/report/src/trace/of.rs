@@ -118,7 +118,7 @@ impl ReasonLine {
             about: reason.about.as_ref().map(ToString::to_string),
             observed: optional(reason.observed.as_ref()),
             allowed: reason.allowed.as_ref().map(interval),
-            behind: reason.behind.clone(),
+            behind: reason.behind.iter().map(ToString::to_string).collect(),
             by: optional(reason.by.as_ref()),
             since: optional(reason.since.as_ref()),
             promise: reason.promise.map(|promise| promise.name().to_owned()),

@@ -13,8 +13,9 @@ use elbowroom::num::Rational;
 
 use crate::limits::{self, push_paragraph, push_wrapped};
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
+use crate::number;
 use crate::table::{self, Row};
-use crate::{number, output};
+use crate::words::counted;
 use example::{example, what};
 
 /// The answer, whatever it is.
@@ -134,8 +135,8 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     let course = format!(
         "{}. {}, {}, {}.",
         ended(request, *stop),
-        output::counted(*checks, "check"),
-        output::counted(widenings.len(), "widening"),
+        counted(*checks, "check"),
+        counted(widenings.len(), "widening"),
         duration(*seconds)
     );
     let mut how = String::new();

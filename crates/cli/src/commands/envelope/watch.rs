@@ -1,4 +1,4 @@
-//! Watches the clock and Ctrl-C while an envelope is computed.
+//! Watches the clock and Ctrl-C while an envelope is computed, and shows how far it has come.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -7,16 +7,14 @@ use std::time::Duration;
 use elbowroom::answers::{Event, Halt, Watcher};
 
 use crate::args::EnvelopeArgs;
-use crate::clock::Clock;
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
+use crate::stopwatch::{Stopwatch, duration};
 
 /// Ends the work never, at a time limit, or at Ctrl-C.
 pub(super) struct Watch {
-    clock: Clock,
-    limit: Option<Duration>,
-    interrupt: Interrupt,
+    stopwatch: Stopwatch,
     progress: Progress,
     plan: PathBuf,
 }
@@ -24,12 +22,9 @@ pub(super) struct Watch {
 impl Watch {
     /// Starts to watch.
     pub(super) fn start(arguments: &EnvelopeArgs) -> Self {
+        let limit = arguments.time_limit.as_ref().map(duration);
         Self {
-            clock: Clock::start(),
-            limit: arguments.time_limit.as_ref().map(|seconds| {
-                Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
-            }),
-            interrupt: Interrupt::listen(),
+            stopwatch: Stopwatch::start(&Interrupt::listen()).until(limit),
             progress: Progress::new(),
             plan: arguments.plan.clone(),
         }
@@ -38,29 +33,20 @@ impl Watch {
 
 impl Watcher for Watch {
     fn elapsed(&mut self) -> Duration {
-        self.clock.elapsed()
+        self.stopwatch.elapsed()
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        if self.interrupt.is_requested() {
-            ControlFlow::Break(Halt::Cancelled)
-        } else if self
-            .limit
-            .is_some_and(|limit| self.clock.elapsed() >= limit)
-        {
-            ControlFlow::Break(Halt::TimeLimit)
-        } else {
-            ControlFlow::Continue(())
-        }
+        self.stopwatch.flow()
     }
 
     fn notice(&mut self, event: &Event<'_>) {
         match event {
             Event::Repaired(violation) => input::tell_repair(&self.plan, violation),
             Event::Envelope(progress) => {
-                let widenings = progress.widenings;
+                let (elapsed, widenings) = (self.elapsed(), progress.widenings);
                 self.progress
-                    .show(self.clock.elapsed(), || format!("{widenings} widenings"));
+                    .show(elapsed, || format!("{widenings} widenings"));
             }
             _ => {}
         }

@@ -8,7 +8,7 @@ use elbowroom::external::Outcome;
 use crate::exit::Failure;
 use crate::look::{FAINT, HINT, styled};
 use crate::number;
-use crate::output::counted;
+use crate::words::counted;
 
 /// The plan as text, with a last line, a comment, that says what it is worth where that is not
 /// simply when it ends.

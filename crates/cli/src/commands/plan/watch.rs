@@ -8,19 +8,17 @@ use elbowroom::answers::{Event, Halt, PlanProgress, Watcher};
 use elbowroom::num::Rational;
 
 use crate::args::PlanArgs;
-use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 use crate::number;
-use crate::output::counted;
 use crate::progress::Progress;
+use crate::stopwatch::{Stopwatch, duration};
+use crate::words::counted;
 
 /// Watches the plans that come, Ctrl-C, and, for who keeps no time of its own, the time.
 pub(super) struct Watch {
-    clock: Clock,
+    stopwatch: Stopwatch,
     line: Progress,
-    interrupt: Interrupt,
     limit: Option<Duration>,
-    keeps_time: bool,
     best: Option<Worth>,
 }
 
@@ -33,12 +31,12 @@ struct Worth {
 impl Watch {
     /// Starts to watch. Another planner keeps its time limit itself.
     pub(super) fn start(arguments: &PlanArgs, is_other_planner: bool) -> Self {
+        let limit = arguments.time_limit.as_ref().map(duration);
+        let own_limit = limit.filter(|_| !is_other_planner);
         Self {
-            clock: Clock::start(),
+            stopwatch: Stopwatch::start(&Interrupt::listen()).until(own_limit),
             line: Progress::new(),
-            interrupt: Interrupt::listen(),
-            limit: arguments.time_limit.as_ref().map(duration),
-            keeps_time: !is_other_planner,
+            limit,
             best: None,
         }
     }
@@ -49,7 +47,7 @@ impl Watch {
 
     /// Shows how far the search has come.
     fn show(&mut self, progress: &PlanProgress<'_>) {
-        let elapsed = self.clock.elapsed();
+        let elapsed = self.stopwatch.elapsed();
         let (best, limit) = (&self.best, self.limit);
         self.line.show(elapsed, || {
             let mut line = match (progress.states, progress.memory) {
@@ -83,18 +81,11 @@ impl Watch {
 
 impl Watcher for Watch {
     fn elapsed(&mut self) -> Duration {
-        self.clock.elapsed()
+        self.stopwatch.elapsed()
     }
 
     fn flow(&mut self) -> ControlFlow<Halt> {
-        let is_late = |limit: Duration| self.keeps_time && self.clock.elapsed() >= limit;
-        if self.interrupt.is_requested() {
-            ControlFlow::Break(Halt::Cancelled)
-        } else if self.limit.is_some_and(is_late) {
-            ControlFlow::Break(Halt::TimeLimit)
-        } else {
-            ControlFlow::Continue(())
-        }
+        self.stopwatch.flow()
     }
 
     fn notice(&mut self, event: &Event<'_>) {
@@ -112,9 +103,4 @@ impl Watcher for Watch {
         }
         self.show(progress);
     }
-}
-
-/// Seconds as the clock understands them.
-fn duration(seconds: &Rational) -> Duration {
-    Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
 }

@@ -8,8 +8,8 @@ use elbowroom::num::Rational;
 
 use crate::clock::Clock;
 use crate::number;
-use crate::output::{counted, tame};
 use crate::progress::Progress;
+use crate::words::{counted, tame};
 
 /// Of what is under way, only so many actions are named.
 const MOST_NAMED: usize = 3;

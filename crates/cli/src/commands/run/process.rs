@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::clock::Clock;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
-use crate::output::{excerpt, plain};
+use crate::words::{excerpt, plain};
 use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 
 /// How long a program has to end when the run is over.

@@ -13,9 +13,10 @@ use serde_json::{Value, json};
 
 use crate::exit::{Answer, Exit, Failure};
 use crate::look::{BAD, GOOD, styled};
+use crate::output::Output;
 use crate::{input, output};
 
-pub(super) fn run(path: &Path, as_json: bool) -> Answer {
+pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let name = path.display().to_string();
     let text = input::source(path, "trace")?;
     let unreadable = |message: String| Failure::new(format!("{name}, {message}"), "");
@@ -24,7 +25,7 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
         let hint = "the trace may be of another version of this program";
         Failure::new(format!("{name}, {error}"), hint)
     })?;
-    let task = super::task(&spec)?;
+    let task = super::task(&spec, output)?;
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
         first.map_err(|error| unreadable(error.to_string()))?
@@ -45,7 +46,7 @@ pub(super) fn run(path: &Path, as_json: bool) -> Answer {
     .map_err(|error| unreadable(format!("line 1: {error}")))?;
     let (agreed, difference) = replay.outcome();
     if as_json {
-        output::print_json(&json!({
+        output.json(&json!({
             "format": "elbowroom-replay",
             "version": 1,
             "trace": name,

@@ -7,7 +7,7 @@ use elbowroom::execution::run::{Report, Verdict};
 
 use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
 use crate::number::nearest;
-use crate::output::{counted, tame};
+use crate::words::{counted, tame};
 use crate::wrap::wrapped;
 
 pub(super) fn human(report: &Report) -> String {

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::exit::Failure;
-use crate::output::plain;
+use crate::words::plain;
 
 /// A trace file, or nothing at all. Each line is handed to the operating system before the next
 /// thing happens, so that a run that is killed leaves its trace.

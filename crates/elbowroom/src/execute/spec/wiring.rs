@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
-use elbowroom_execution::{Need, NoPlanner, Odds, Planner, Preparer, World};
+use elbowroom_execution::{Need, NoPlanner, Odds, Planner, PrepareError, Preparer, World};
 use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -15,7 +15,7 @@ use elbowroom_text::Diagnostics;
 use super::{NOBODY, RunSpec};
 use crate::answers::plan::EMBEDDED;
 use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
-use crate::parse_box;
+use crate::{BoxTextError, parse_box};
 
 /// How long another planner has for its first plan.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -58,11 +58,11 @@ pub enum SpoilerError {
     #[error("there is no plan to spoil")]
     NoPlan,
     /// The plan does not work.
-    #[error("{0}")]
-    Unprepared(String),
+    #[error(transparent)]
+    Unprepared(#[from] PrepareError),
     /// The box is not one of this plan.
-    #[error("{0}")]
-    Box(String),
+    #[error(transparent)]
+    Box(#[from] BoxTextError),
     /// The plan has no envelope, and no box was given.
     #[error("the plan has no envelope to spoil it in")]
     NoEnvelope,
@@ -88,11 +88,9 @@ impl RunSpec {
         };
         let plan = plan.ok_or(SpoilerError::NoPlan)?;
         let mut analyst = Analyst::new(self.envelopes());
-        let prepared = analyst.prepare(task, plan, Need::OpenNetwork);
-        let prepared = prepared.map_err(SpoilerError::Unprepared)?;
+        let prepared = analyst.prepare(task, plan, Need::OpenNetwork)?;
         let envelope = match (&spoiler.inside, prepared.envelope) {
-            (Some(text), _) => parse_box(text, &prepared.plan)
-                .map_err(|error| SpoilerError::Box(error.to_string()))?,
+            (Some(text), _) => parse_box(text, &prepared.plan)?,
             (None, Some(envelope)) => envelope,
             (None, None) => return Err(SpoilerError::NoEnvelope),
         };

@@ -16,7 +16,7 @@ use crate::dispatch::replan;
 use crate::event::Ending;
 use crate::executor::{Decided, Decision, Mission, Moment, News, Order, Planned, StepId};
 use crate::progression::Progression;
-use crate::reason::{About, Cause, Reason};
+use crate::reason::{About, Behind, Cause, Reason};
 
 /// A search looks at so many happenings at most, sequences times the plan's length; then the best
 /// order so far is taken. Plans of some twenty happenings are searched to the end.
@@ -47,8 +47,8 @@ pub(super) struct Rest {
     recent: Vec<(NodeId, Rational)>,
     /// How often each instance has failed in a row.
     failures: BTreeMap<InstanceId, i32>,
-    /// What was new last, in words: what came before no order was left.
-    latest: Option<String>,
+    /// What was new last: what came before no order was left.
+    latest: Option<Behind>,
     /// What was told to stop and has not.
     let_go: BTreeSet<StepId>,
     /// How often each instance was told to stop.
@@ -61,10 +61,17 @@ impl Rest {
     /// A plan that has just been taken up: `steps` are the actions in the order of the model's
     /// instances.
     pub(super) fn new(mission: &Mission, chooser: Chooser, steps: Vec<Step>) -> Self {
-        let running = mission.running.keys();
-        let under_way = running.map(|&step| (step, (InstanceId(step.0), Some(Rational::ZERO))));
+        let in_order = mission
+            .order
+            .iter()
+            .flat_map(|order| &order.instance_of_step);
+        let under_way = mission.instances.iter().zip(in_order);
+        let under_way = under_way.map(|(&own, &in_order)| (StepId::from(own), in_order));
+        let under_way = under_way.filter(|(step, _)| mission.running.contains_key(step));
         Self {
-            under_way: under_way.collect(),
+            under_way: under_way
+                .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
+                .collect(),
             next_step: u32::try_from(steps.len()).unwrap_or(u32::MAX),
             steps,
             chooser,
@@ -95,7 +102,7 @@ impl Rest {
         belief: &Progression,
         likelihoods: &Likelihoods,
     ) -> Option<Reason> {
-        self.latest = self.words(news, belief).or(self.latest.take());
+        self.latest = self.named(news, belief).or(self.latest.take());
         match news {
             News::Started { step, time, .. } => {
                 let local = time - &self.mission.origin;
@@ -143,32 +150,32 @@ impl Rest {
         }
     }
 
-    /// What is new, in words.
-    fn words(&self, news: &News, belief: &Progression) -> Option<String> {
+    /// What is new, by name.
+    fn named(&self, news: &News, belief: &Progression) -> Option<Behind> {
         let action = |step: &StepId| {
             let (instance, _) = self.under_way.get(step)?;
-            Some(self.steps[instance.index()].action.name.as_str())
+            Some(self.steps[instance.index()].action.name.clone())
         };
-        let at = |time: &Rational| time.to_decimal(3);
         Some(match news {
-            News::Started { step, time, .. } => {
-                format!("{} started at {}", action(step)?, at(time))
-            }
+            News::Started { step, time, .. } => Behind::Started {
+                action: action(step)?,
+                at: time.clone(),
+            },
             News::Ended {
                 step, time, ending, ..
-            } => format!("{} {} at {}", action(step)?, ending.name(), at(time)),
-            News::Fact(fact) => {
-                let name = belief.task().fact_name(*fact);
-                let truth = if belief.fact(*fact) { "true" } else { "false" };
-                format!("{name} was seen to be {truth}")
-            }
-            News::Value(fluent) => {
-                let name = belief.task().fluent_name(*fluent);
-                match belief.value(*fluent) {
-                    Some(value) => format!("{name} was seen to be {}", at(value)),
-                    None => format!("{name} was seen to have no value"),
-                }
-            }
+            } => Behind::Ended {
+                action: action(step)?,
+                ending: ending.clone(),
+                at: time.clone(),
+            },
+            News::Fact(fact) => Behind::Fact {
+                fact: belief.task().fact_name(*fact),
+                truth: belief.fact(*fact),
+            },
+            News::Value(fluent) => Behind::Value {
+                fluent: belief.task().fluent_name(*fluent),
+                value: belief.value(*fluent).cloned(),
+            },
             News::Contradiction { .. } | News::Silence { .. } => return None,
         })
     }

@@ -1,0 +1,56 @@
+//! Ends a computation when its time is up, or when the user asks to.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom::answers::{Halt, Watcher};
+use elbowroom::num::Rational;
+
+use crate::clock::Clock;
+use crate::interrupt::Interrupt;
+
+/// A clock since the start, with the reasons for which a computation ends early.
+pub(crate) struct Stopwatch {
+    clock: Clock,
+    interrupt: Interrupt,
+    limit: Option<Duration>,
+}
+
+impl Stopwatch {
+    /// Starts to measure; Ctrl-C alone ends the computation.
+    pub(crate) fn start(interrupt: &Interrupt) -> Self {
+        Self {
+            clock: Clock::start(),
+            interrupt: interrupt.clone(),
+            limit: None,
+        }
+    }
+
+    /// The same, but a time limit ends it as well, if there is one.
+    #[must_use]
+    pub(crate) fn until(self, limit: Option<Duration>) -> Self {
+        Self { limit, ..self }
+    }
+}
+
+impl Watcher for Stopwatch {
+    fn elapsed(&mut self) -> Duration {
+        self.clock.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let is_late = |limit: Duration| self.clock.elapsed() >= limit;
+        if self.interrupt.is_requested() {
+            ControlFlow::Break(Halt::Cancelled)
+        } else if self.limit.is_some_and(is_late) {
+            ControlFlow::Break(Halt::TimeLimit)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+/// Seconds as the clock understands them.
+pub(crate) fn duration(seconds: &Rational) -> Duration {
+    Duration::try_from_secs_f64(seconds.to_f64()).unwrap_or(Duration::MAX)
+}

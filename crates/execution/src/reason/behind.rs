@@ -1,0 +1,158 @@
+//! What stands behind a reason: [`Behind`], and its words.
+
+use std::fmt;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::Change;
+use elbowroom_num::Rational;
+
+use crate::event::Ending;
+
+/// A constraint of the plan, a condition or an event that stands behind a
+/// [`Reason`](super::Reason).
+///
+/// Its [`Display`](fmt::Display) is the one place where it becomes words. Times are the world's.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Behind {
+    /// The plan's bounds on the duration of this action.
+    Duration(String),
+    /// One time point of the plan comes before another, both as the plan describes them.
+    Order {
+        /// The earlier one.
+        first: String,
+        /// The later one.
+        second: String,
+    },
+    /// Timed initials that are to come.
+    Timed {
+        /// What they change.
+        changes: Vec<Changed>,
+        /// When, where that is told.
+        at: Option<Rational>,
+    },
+    /// More constraints, between the one before and the one after.
+    Others,
+    /// A condition that would not hold, as the problem writes it.
+    Condition(String),
+    /// Timed initials that have happened.
+    Past(Vec<Changed>),
+    /// The effects of this action at its start.
+    Start(String),
+    /// The effects of this action at its end.
+    End(String),
+    /// This action has failed.
+    Failed {
+        /// Which.
+        action: String,
+        /// What the world says of it; empty if it says nothing.
+        why: String,
+    },
+    /// This action was cancelled.
+    Cancelled(String),
+    /// This action has started.
+    Started {
+        /// Which.
+        action: String,
+        /// When.
+        at: Rational,
+    },
+    /// This action has ended.
+    Ended {
+        /// Which.
+        action: String,
+        /// How.
+        ending: Ending,
+        /// When.
+        at: Rational,
+    },
+    /// A fact was seen.
+    Fact {
+        /// Which.
+        fact: String,
+        /// To be what.
+        truth: bool,
+    },
+    /// A fluent was seen.
+    Value {
+        /// Which.
+        fluent: String,
+        /// To have which value, if it has one.
+        value: Option<Rational>,
+    },
+}
+
+/// What a timed initial does to a fact or a fluent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Changed {
+    /// This fact becomes true.
+    True(String),
+    /// This fact becomes false.
+    False(String),
+    /// This fluent gets another value.
+    Value(String),
+}
+
+impl Changed {
+    /// What these do, by name.
+    pub(crate) fn all(task: &Task, changes: &[Change]) -> Vec<Self> {
+        let named = changes.iter().map(|change| match change {
+            Change::Add(fact) => Self::True(task.fact_name(*fact)),
+            Change::Delete(fact) => Self::False(task.fact_name(*fact)),
+            Change::Update { fluent, .. } => Self::Value(task.fluent_name(*fluent)),
+        });
+        named.collect()
+    }
+
+    fn words(&self, is_past: bool) -> String {
+        let becomes = if is_past { "became" } else { "becomes" };
+        match self {
+            Self::True(fact) => format!("{fact} {becomes} true"),
+            Self::False(fact) => format!("{fact} {becomes} false"),
+            Self::Value(fluent) if is_past => format!("{fluent} changed"),
+            Self::Value(fluent) => format!("{fluent} changes"),
+        }
+    }
+}
+
+fn listed(changes: &[Changed], is_past: bool) -> String {
+    let words = changes.iter().map(|change| change.words(is_past));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+impl fmt::Display for Behind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Duration(action) => write!(f, "the duration of {action}"),
+            Self::Order { first, second } => write!(f, "{first} before {second}"),
+            Self::Timed { changes, at } => {
+                f.write_str(&listed(changes, false))?;
+                match at {
+                    Some(time) => write!(f, " at {}", time.to_decimal(3)),
+                    None => Ok(()),
+                }
+            }
+            Self::Others => f.write_str("…"),
+            Self::Condition(condition) => f.write_str(condition),
+            Self::Past(changes) => f.write_str(&listed(changes, true)),
+            Self::Start(action) => write!(f, "the start of {action}"),
+            Self::End(action) => write!(f, "the end of {action}"),
+            Self::Failed { action, why } if why.is_empty() => write!(f, "{action} failed"),
+            Self::Failed { action, why } => write!(f, "{action} failed: {why}"),
+            Self::Cancelled(action) => write!(f, "{action} was cancelled"),
+            Self::Started { action, at } => write!(f, "{action} started at {}", at.to_decimal(3)),
+            Self::Ended { action, ending, at } => {
+                write!(f, "{action} {} at {}", ending.name(), at.to_decimal(3))
+            }
+            Self::Fact { fact, truth } => write!(f, "{fact} was seen to be {truth}"),
+            Self::Value {
+                fluent,
+                value: Some(value),
+            } => write!(f, "{fluent} was seen to be {}", value.to_decimal(3)),
+            Self::Value {
+                fluent,
+                value: None,
+            } => write!(f, "{fluent} was seen to have no value"),
+        }
+    }
+}
