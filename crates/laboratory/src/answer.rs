@@ -205,6 +205,14 @@ impl CompareAnswer {
         }
     }
 
+    /// The results for programs: a number in each cell, and names that occur once.
+    pub fn records(&self) -> Table {
+        match self {
+            Self::Timed(results) => results.records(),
+            Self::Untimed(results) => perturbed::records(results),
+        }
+    }
+
     /// The plots, by name; those of experiments on a clock have none.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         match self {

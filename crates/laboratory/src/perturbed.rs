@@ -29,7 +29,7 @@ pub use experiment::{
     Case, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
 pub use results::{PerturbedResults, Row, Work};
-pub use table::{plots, table};
+pub use table::{plots, records, table};
 
 use crate::compare::Part;
 use planner::EmbeddedPlans;

@@ -4,16 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::number::count;
+
 #[derive(Args, Debug)]
 pub(crate) struct CompareArgs {
     /// The experiment (docs/formats/experiment.md)
     #[arg(value_name = "EXPERIMENT.toml")]
     pub(crate) experiment: PathBuf,
     /// Number of trials of each problem; by default that of the experiment
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     pub(crate) trials: Option<u64>,
     /// Number of threads; 0 for one per processor
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = count, allow_negative_numbers = true)]
     pub(crate) jobs: usize,
     /// Run only part `I` of `N`, counted from 0
     #[arg(long, value_name = "I/N", value_parser = shard)]

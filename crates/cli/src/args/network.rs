@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::number::{count, whole};
+
 #[derive(Args, Debug)]
 #[command(after_long_help = FORMATS_HELP)]
 pub(crate) struct NetworkArgs {
@@ -18,16 +20,16 @@ pub(crate) struct NetworkArgs {
     #[arg(long, value_name = "OUT")]
     pub(crate) dispatchable: Option<PathBuf>,
     /// Simulate N executions with random durations
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000), allow_negative_numbers = true)]
     pub(crate) simulate: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, requires = "simulate")]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole, allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
     /// How durations are drawn
     #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
     pub(crate) durations: DurationsChoice,
     /// Number of branches after which weak controllability, which can be hard, is left undecided
-    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES)]
+    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES, value_parser = count, allow_negative_numbers = true)]
     pub(crate) branches: usize,
     /// Print the answer as one JSON document
     #[arg(long)]

@@ -24,8 +24,8 @@ pub(crate) struct PlanArgs {
     /// Return the first plan, even with a time limit
     #[arg(long)]
     pub(crate) first: bool,
-    /// Memory limit in MB
-    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    /// Memory limit in MB; by default 2048 for the embedded planner
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40), allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
     /// Write the plan to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]

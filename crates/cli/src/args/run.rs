@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use elbowroom::num::Rational;
 
 use super::envelope::{Guarantee, controllable};
-use super::number::{factor, positive};
+use super::number::{count, factor, positive, whole};
 use super::plan::EMBEDDED;
 
 #[derive(Args, Debug)]
@@ -33,10 +33,10 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) planner_time: Option<Rational>,
     /// Number of states that the embedded planner may evaluate for a plan
-    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole, allow_negative_numbers = true)]
     pub(crate) planner_states: u64,
     /// Number of states after the first plan, in search of a better one
-    #[arg(long, value_name = "N", default_value_t = 2_000)]
+    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole, allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
     /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each action
     /// when that is worst; without it, everything goes as planned
@@ -69,6 +69,8 @@ pub(crate) struct RunArgs {
         long,
         value_name = "N",
         default_value_t = 0,
+        value_parser = whole,
+        allow_negative_numbers = true,
         conflicts_with = "world_process"
     )]
     pub(crate) seed: u64,
@@ -89,10 +91,10 @@ pub(crate) struct RunArgs {
     pub(crate) running: RunningChoice,
     /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0, with
     /// --realtime `measured`
-    #[arg(long, value_name = "measured|S")]
+    #[arg(long, value_name = "measured|S", allow_negative_numbers = true)]
     pub(crate) planning_time: Option<String>,
     /// Number of new plans that may be made
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count, allow_negative_numbers = true)]
     pub(crate) max_replans: usize,
     /// Time limit of the run, in seconds of the world
     #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive, allow_negative_numbers = true)]

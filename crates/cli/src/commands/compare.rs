@@ -124,7 +124,7 @@ fn write(folder: &Path, answer: &CompareAnswer, table: &Table) -> Result<(), Fai
     let write = |name: &str, text: &str| output::write_file(&folder.join(name), text);
     write("results.json", &format!("{:#}\n", answer.json()))?;
     write("table.md", &table.markdown())?;
-    write("table.csv", &table.csv())?;
+    write("table.csv", &answer.records().csv())?;
     for (name, plot) in answer.plots() {
         let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
         write(&format!("{name}.svg"), &svg)?;

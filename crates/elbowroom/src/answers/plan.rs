@@ -220,7 +220,7 @@ pub fn plan(
         }
         Answer::NoneFound { stopped, counts } => {
             let stop = course.stop(stopped);
-            let reason = none_found(stop, counts);
+            let reason = none_found(stop, counts, settings.max_memory);
             (Err(PlanFinding::None { reason }), stop, counts)
         }
         Answer::Unsupported(unsupported) => {
@@ -355,12 +355,16 @@ impl Course<'_> {
     }
 }
 
-fn none_found(stop: PlanStop, counts: Counts) -> String {
+/// `memory` is the limit of it, in bytes.
+fn none_found(stop: PlanStop, counts: Counts, memory: usize) -> String {
     let evaluated = counts.evaluated;
     let ended = match stop {
         PlanStop::Cancelled => format!("stopped after {evaluated} states"),
         PlanStop::TimeLimit => format!("gave up at the time limit, after {evaluated} states"),
-        PlanStop::MemoryLimit => format!("gave up at the memory limit, after {evaluated} states"),
+        PlanStop::MemoryLimit => format!(
+            "gave up at the memory limit of {} MB, after {evaluated} states",
+            memory >> 20
+        ),
         _ => format!("searched all that the search can reach, {evaluated} states"),
     };
     format!("no plan found: {ended}; this is no proof that there is none")

@@ -74,7 +74,8 @@ impl Run<'_> {
                 }
                 None
             }
-            Event::Unintelligible { .. } => {
+            Event::Unintelligible { said, why } => {
+                self.progress.note_unintelligible(said, why);
                 return Some("cannot be understood; nothing was made of it");
             }
         };

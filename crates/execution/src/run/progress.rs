@@ -20,6 +20,8 @@ pub(super) struct Progress {
     /// From when the answers are counted.
     since: Rational,
     answers: usize,
+    /// The last message since then that could not be understood, and why.
+    unintelligible: Option<(String, String)>,
 }
 
 impl Progress {
@@ -27,6 +29,12 @@ impl Progress {
     /// against it. How many plans there are is bounded by itself.
     pub(super) fn begin_plan(&mut self) {
         self.answers = 0;
+    }
+
+    /// Takes note of a message that could not be understood: it may be what the world meant to say
+    /// instead of nothing.
+    pub(super) fn note_unintelligible(&mut self, said: &str, why: &str) {
+        self.unintelligible = Some((said.to_owned(), why.to_owned()));
     }
 
     /// Takes note of an answer at `now`; `steps` is how many the present plan has.
@@ -37,15 +45,20 @@ impl Progress {
         if *now >= &self.since + Rational::ONE {
             self.since.clone_from(now);
             self.answers = 0;
+            self.unintelligible = None;
         }
         self.answers += 1;
         let most = MOST_ANSWERS.max(ANSWERS_PER_STEP.saturating_mul(steps));
         if self.answers <= most {
             return Ok(());
         }
+        let hint = self.unintelligible.as_ref().map_or_else(
+            String::new,
+            |(said, why)| format!("; what it said last could not be understood: `{said}`: {why}"),
+        );
         Err(format!(
             "its clock stands still: {most} answers have brought it from {} to {} only; when \
-             nothing happens, time must pass until the moment that was asked for",
+             nothing happens, time must pass until the moment that was asked for{hint}",
             self.since.to_f64(),
             now.to_f64(),
         ))
@@ -72,6 +85,16 @@ mod tests {
         assert_eq!(taken(3 * most, 0, |_| Rational::ZERO), most);
         let creeping = |n: i64| Rational::ONE - Rational::new(1, n + 1);
         assert_eq!(taken(3 * most, 0, creeping), most);
+    }
+
+    #[test]
+    fn what_was_not_understood_meanwhile_is_named() {
+        let mut progress = Progress::default();
+        progress.note_unintelligible("hello", "not JSON");
+        let why = (0..=MOST_ANSWERS)
+            .find_map(|_| progress.note(&Rational::ZERO, 0).err())
+            .expect("the clock stands still");
+        assert!(why.ends_with("understood: `hello`: not JSON"), "{why}");
     }
 
     #[test]

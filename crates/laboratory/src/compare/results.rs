@@ -188,6 +188,48 @@ impl Results {
             notes: notes(&self.rows),
         }
     }
+
+    /// The same for programs: a row for each column and executor, a number in each cell, and names
+    /// that occur once.
+    pub fn records(&self) -> Table {
+        let headings = [
+            "column",
+            "executor",
+            "runs",
+            "successes",
+            "coverage",
+            "coverage_lower_95",
+            "coverage_upper_95",
+            "mean_replans",
+        ];
+        let mut rows = Vec::new();
+        for (index, column) in self.columns.iter().enumerate() {
+            for (executor, cells) in self.rows.iter().zip(&self.cells) {
+                let cell = &cells[index];
+                let number = |value: Option<f64>| {
+                    value.map_or_else(String::new, |value| format!("{value:.4}"))
+                };
+                let interval = cell.coverage().wilson();
+                rows.push(vec![
+                    column.clone(),
+                    executor.clone(),
+                    cell.runs.to_string(),
+                    cell.successes.to_string(),
+                    number(cell.coverage().share()),
+                    number(interval.map(|(lower, _)| lower)),
+                    number(interval.map(|(_, upper)| upper)),
+                    number(cell.mean_replans().value()),
+                ]);
+            }
+        }
+        Table {
+            caption: self.title.clone(),
+            headings: headings.map(str::to_owned).to_vec(),
+            keys: 2,
+            rows,
+            notes: Vec::new(),
+        }
+    }
 }
 
 /// What each row's executor does, as it is registered; each executor once.
@@ -263,16 +305,25 @@ impl Cell {
         }
     }
 
-    /// Coverage, and mean number of new plans of successful runs.
-    fn words(&self) -> [String; 2] {
-        let coverage = Proportion {
+    /// The share of runs that reached the goal.
+    fn coverage(&self) -> Proportion {
+        Proportion {
             successes: self.successes,
             count: self.runs,
-        };
-        let replans = Mean {
+        }
+    }
+
+    /// The mean number of new plans of successful runs.
+    fn mean_replans(&self) -> Mean {
+        Mean {
             sum: self.replans,
             count: self.successes,
-        };
+        }
+    }
+
+    /// [`Self::coverage`] and [`Self::mean_replans`] for the table.
+    fn words(&self) -> [String; 2] {
+        let (coverage, replans) = (self.coverage(), self.mean_replans());
         let percent = |share: f64| format!("{:.1}", share * 100.0);
         let coverage = match (coverage.share(), coverage.wilson()) {
             (Some(share), Some((lower, upper))) => {

@@ -11,13 +11,53 @@ use crate::untimed::ExecutorName;
 
 /// The results as a table.
 pub fn table(results: &PerturbedResults) -> Table {
+    let mut title = results.title.clone();
+    let made = parts::made(results.trials, "each row", results.shards, &results.parts);
+    if results.is_interrupted {
+        title = format!("{title} (interrupted; of {made})");
+    } else if made.starts_with("incomplete") {
+        title = format!("{title} ({made})");
+    }
     let rows = &results.rows;
-    let headings = [
-        "case",
-        "world",
-        "executor",
-        "success %",
-        "95 % interval",
+    let caption = [title].into_iter();
+    let caption = caption.chain(agreement(rows)).chain(nearness(rows));
+    let interval = |row: &Row| {
+        let interval = row.success.wilson();
+        let interval =
+            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
+        vec![interval.unwrap_or_default()]
+    };
+    Table {
+        caption: caption.collect::<Vec<_>>().join("\n"),
+        ..of_rows(rows, &["95 % interval"], interval)
+    }
+}
+
+/// The results for programs: a number in each cell.
+pub fn records(results: &PerturbedResults) -> Table {
+    let ends = |row: &Row| {
+        let interval = row.success.wilson();
+        let (lower, upper) = interval.unzip();
+        vec![percent(lower), percent(upper)]
+    };
+    Table {
+        caption: results.title.clone(),
+        ..of_rows(&results.rows, &["lower 95 %", "upper 95 %"], ends)
+    }
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or_else(String::new, |share| format!("{:.1}", 100.0 * share))
+}
+
+/// Without a caption; `interval` has the cells under `interval_headings`.
+fn of_rows(
+    rows: &[Row],
+    interval_headings: &[&str],
+    interval: impl Fn(&Row) -> Vec<String>,
+) -> Table {
+    let before = ["case", "world", "executor", "success %"];
+    let after = [
         "published %",
         "z",
         "optimum %",
@@ -29,20 +69,17 @@ pub fn table(results: &PerturbedResults) -> Table {
         "failed starts (failure)",
         "actions (failure)",
     ];
-    let percent =
-        |share: Option<f64>| share.map_or_else(String::new, |s| format!("{:.1}", 100.0 * s));
     let mean = |mean: Mean| mean.value().map_or_else(String::new, |m| format!("{m:.2}"));
     let row = |row: &Row| {
-        let interval = row.success.wilson();
-        let interval =
-            interval.map(|(lower, upper)| format!("{:.1}–{:.1}", 100.0 * lower, 100.0 * upper));
         let z = row.distance().map(|z| format!("{z:+.1}"));
-        vec![
+        let mut cells = vec![
             row.case.clone(),
             row.world.name().to_owned(),
             row.executor.name().to_owned(),
             percent(row.success.share()),
-            interval.unwrap_or_default(),
+        ];
+        cells.extend(interval(row));
+        cells.extend([
             percent(row.published.and_then(Proportion::share)),
             z.unwrap_or_default(),
             percent(row.optimum),
@@ -53,20 +90,13 @@ pub fn table(results: &PerturbedResults) -> Table {
             mean(row.failed.messages),
             mean(row.failed.failed_starts),
             mean(row.failed.actions),
-        ]
+        ]);
+        cells
     };
-    let mut title = results.title.clone();
-    let made = parts::made(results.trials, "each row", results.shards, &results.parts);
-    if results.is_interrupted {
-        title = format!("{title} (interrupted; of {made})");
-    } else if made.starts_with("incomplete") {
-        title = format!("{title} ({made})");
-    }
-    let caption = [title].into_iter();
-    let caption = caption.chain(agreement(rows)).chain(nearness(rows));
+    let headings = before.iter().chain(interval_headings).chain(&after);
     Table {
-        caption: caption.collect::<Vec<_>>().join("\n"),
-        headings: headings.map(str::to_owned).to_vec(),
+        caption: String::new(),
+        headings: headings.map(|heading| (*heading).to_owned()).collect(),
         keys: 3,
         rows: rows.iter().map(row).collect(),
         notes: Vec::new(),

@@ -46,11 +46,11 @@ pub(super) fn human(report: &Report) -> String {
                 styled(HINT, "interrupted")
             )
         }
-        Verdict::WorldFailed { why } => {
-            let why = wrapped(&tame(why), width, 2);
-            let failed = styled(BAD, "failed");
-            format!("{failed}: the world failed at {time}:\n{why}\n")
-        }
+        // Why is the message with which the command ends, and is not said twice.
+        Verdict::WorldFailed { .. } => format!(
+            "{}: the world failed at {time}, after {replans}\n",
+            styled(BAD, "failed")
+        ),
     };
     for (heading, reasons) in [
         ("Why no plan reaches the goal", &report.dead_end),

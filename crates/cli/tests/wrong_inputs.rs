@@ -1,0 +1,289 @@
+//! Mistakes that new users made, each with what the command has to say to it.
+
+mod command;
+
+use std::fs;
+use std::path::PathBuf;
+
+use command::elbowroom;
+use serde_json::Value;
+
+const DELIVERY: [&str; 3] = [
+    "cases/delivery/domain.pddl",
+    "cases/delivery/problem.pddl",
+    "cases/delivery/plan.plan",
+];
+const BATTERY: [&str; 3] = [
+    "cases/battery/domain.pddl",
+    "cases/battery/problem.pddl",
+    "cases/battery/plan.plan",
+];
+const TANK: [&str; 3] = [
+    "cases/tank/domain.pddl",
+    "cases/tank/problem.pddl",
+    "cases/tank/plan.plan",
+];
+
+/// A file that no other test uses, removed in the end.
+struct Temporary(PathBuf);
+
+impl Temporary {
+    fn new(name: &str, content: &str) -> Self {
+        let name = format!("elbowroom-{}-{name}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        fs::write(&path, content).expect("a temporary file can be written");
+        Self(path)
+    }
+
+    fn name(&self) -> &str {
+        self.0.to_str().expect("a name in UTF-8")
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+/// What the command says on standard error when it ends with this exit code.
+fn said(code: i32, arguments: &[&str]) -> String {
+    let output = elbowroom(arguments);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {output:?}");
+    String::from_utf8(output.stderr).expect("text")
+}
+
+fn envelope<'a>(problem: &[&'a str; 3], options: &[&'a str]) -> Vec<&'a str> {
+    [&["envelope"], &problem[..], options].concat()
+}
+
+#[test]
+fn a_parameter_that_does_not_exist_is_told_with_those_that_do() {
+    for (contains, words) in [
+        ("d0=[5,12]", "the parameters are `dur_0`, `dur_1`"),
+        (
+            "(drive rover depot shelff)=[5,12]",
+            "did you mean `(drive rover depot shelf)`?",
+        ),
+    ] {
+        let said = said(2, &envelope(&DELIVERY, &["--contains", contains]));
+        assert!(said.contains(words), "{contains}: {said}");
+    }
+}
+
+/// The schedule that is shown, the sentence above it and the document speak of one number.
+#[test]
+fn the_shortfall_of_a_box_is_the_same_everywhere() {
+    let outside = envelope(&DELIVERY, &["--contains", "dur_0=[5,30] dur_3=[10,30]"]);
+    let text = elbowroom(&outside);
+    let text = String::from_utf8(text.stdout).expect("text");
+    let document = elbowroom(&[&outside[..], &["--json"]].concat());
+    assert_eq!(document.status.code(), Some(1), "{document:?}");
+    let document: Value = serde_json::from_slice(&document.stdout).expect("a document");
+    let shortfall = &document["counterexample"]["shortfall"];
+    let decimal = shortfall["decimal"].as_f64().expect("a number");
+    // 30 + 2 + 30 + 3 and four separations of 0.001 are late for a deadline at 60.
+    assert!((decimal - 5.004).abs() < 1e-9, "{document:#}");
+    assert!(text.contains("too late by 5.004"), "{text}");
+    assert_eq!(text.matches(" by ").count(), 1, "{text}");
+}
+
+#[test]
+fn a_rate_of_continuous_change_is_varied_through_the_fluent_that_says_it() {
+    let said = said(
+        2,
+        &envelope(&TANK, &["--vary", "constant drain level"]),
+    );
+    assert!(said.contains("`initial (outflow barrel)`"), "{said}");
+}
+
+#[test]
+fn an_initial_value_that_a_duration_follows_is_varied_as_that_duration() {
+    let vary = ["--vary", "initial (survey-time crater)"];
+    let said = said(2, &envelope(&BATTERY, &vary));
+    assert!(
+        said.contains("vary `duration (survey rover crater)`"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
+    let network = Temporary::new(
+        "empty-bound.stn",
+        "durative-action instance n0 : (fill barrel);\n\
+         c: n0.end - n0.start in [9, 8];\n\
+         c: n0.start - .zero in [0, inf];\n",
+    );
+    let problem = [TANK[0], TANK[1], network.name()];
+    let said = said(2, &envelope(&problem, &[]));
+    assert!(said.contains("nothing lies between 9 and 8"), "{said}");
+    assert!(said.contains(":2:26"), "{said}");
+}
+
+#[test]
+fn algorithms_that_do_not_exist_are_not_offered() {
+    for method in ["best", "exact"] {
+        let said = said(2, &envelope(&DELIVERY, &["--method", method]));
+        let offered = said.split("possible values").nth(1).expect("a list");
+        assert!(!offered.contains(method), "{said}");
+    }
+}
+
+#[test]
+fn files_in_the_wrong_order_are_recognised() {
+    let [domain, problem, plan] = DELIVERY;
+    let plan_first = said(2, &["check", domain, plan, problem]);
+    assert!(plan_first.contains("it looks like a plan"), "{plan_first}");
+    let problem_first = said(2, &["check", problem, domain]);
+    assert!(problem_first.contains("in the wrong order?"), "{problem_first}");
+}
+
+#[test]
+fn what_is_read_leniently_in_a_plan_is_a_warning() {
+    for (name, plan, words) in [
+        (
+            "unit",
+            "0: (fill barrel) [15 min]\n15.001: (drain barrel) [10]\n",
+            "`min` is ignored",
+        ),
+        (
+            "no-brackets",
+            "0: (fill barrel) 15\n15.001: (drain barrel) [10]\n",
+            "`15` is ignored",
+        ),
+        (
+            "no-times",
+            "(fill barrel) [15]\n(drain barrel) [10]\n",
+            "no action has a time",
+        ),
+    ] {
+        let plan = Temporary::new(&format!("{name}.plan"), plan);
+        let output = elbowroom(&["check", TANK[0], TANK[1], plan.name()]);
+        let said = String::from_utf8(output.stderr).expect("text");
+        assert!(said.contains("warning: "), "{name}: {said}");
+        assert!(said.contains(words), "{name}: {said}");
+    }
+}
+
+#[test]
+fn numbers_below_zero_are_taken_for_values_and_not_for_options() {
+    let world = "cases/delivery/world.toml";
+    let experiment = "crates/cli/tests/files/late-drives.toml";
+    let run = |option| vec!["run", DELIVERY[0], DELIVERY[1], option, "-1"];
+    for arguments in [
+        [&run("--seed")[..], &["--world", world]].concat(),
+        run("--max-replans"),
+        run("--planner-states"),
+        run("--improve-states"),
+        run("--epsilon"),
+        run("--time-limit"),
+        run("--planning-time"),
+        vec!["compare", experiment, "--jobs", "-1"],
+        vec!["compare", experiment, "--trials", "-1"],
+        vec!["plan", DELIVERY[0], DELIVERY[1], "--memory", "-1"],
+    ] {
+        let said = said(2, &arguments);
+        assert!(!said.contains("unexpected argument"), "{arguments:?}: {said}");
+        assert!(said.contains("-1"), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn a_text_where_a_number_belongs_is_told_in_words() {
+    let text = fs::read_to_string(command::root().join("experiments/olisipo_sf3.toml"));
+    let text = text.expect("the experiment");
+    let wrong = text.replacen("seed = 1", "seed = \"one\"", 1);
+    assert_ne!(text, wrong);
+    let file = Temporary::new("seed.toml", &wrong);
+    let said = said(2, &["compare", file.name()]);
+    assert!(said.contains("a whole number"), "{said}");
+    assert!(!said.contains("u64"), "{said}");
+}
+
+/// Wagons that are shunted between many tracks: no plan is found in a megabyte.
+#[test]
+fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
+    let tracks: Vec<String> = (0..12).map(|n| format!("t{n}")).collect();
+    let wagons: Vec<String> = (0..10).map(|n| format!("w{n}")).collect();
+    let domain = Temporary::new(
+        "shunting-domain.pddl",
+        "(define (domain shunting)
+           (:requirements :typing :durative-actions)
+           (:types track wagon)
+           (:predicates (on ?w - wagon ?t - track) (free ?t - track))
+           (:durative-action shunt
+             :parameters (?w - wagon ?from ?to - track)
+             :duration (= ?duration 1)
+             :condition (and (at start (on ?w ?from)) (at start (free ?to)))
+             :effect (and (at start (not (on ?w ?from))) (at start (not (free ?to)))
+                          (at end (on ?w ?to)) (at end (free ?from)))))",
+    );
+    let on: Vec<String> = (0..10).map(|n| format!("(on w{n} t{n})")).collect();
+    let goal: Vec<String> = (0..10).map(|n| format!("(on w{n} t{})", 9 - n)).collect();
+    let problem = Temporary::new(
+        "shunting-problem.pddl",
+        &format!(
+            "(define (problem yard) (:domain shunting)
+               (:objects {} - track {} - wagon)
+               (:init {} (free t10) (free t11))
+               (:goal (and {})))",
+            tracks.join(" "),
+            wagons.join(" "),
+            on.join(" "),
+            goal.join(" ")
+        ),
+    );
+    let output = elbowroom(&["plan", domain.name(), problem.name(), "--memory", "1"]);
+    assert_eq!(output.status.code(), Some(3), "{output:?}");
+    let said = String::from_utf8([output.stdout, output.stderr].concat()).expect("text");
+    assert!(said.contains("memory limit of 1 MB"), "{said}");
+    assert!(said.contains("no proof"), "{said}");
+}
+
+/// A world that answers with a ticket that it never got lets no time pass, and is told so.
+#[test]
+fn a_ticket_that_was_never_given_is_named() {
+    let world = Temporary::new(
+        "ticket.sh",
+        "while read -r line; do case \"$line\" in *'\"wait\"'*|*'\"look\"'*)\n\
+         echo '{\"type\":\"ended\",\"ticket\":77,\"time\":0,\"outcome\":\"succeeded\"}'\n\
+         echo '{\"type\":\"time\",\"now\":0}';; esac; done\n",
+    );
+    let command = format!("sh {}", world.name());
+    let run = ["run", DELIVERY[0], DELIVERY[1], "--world-process", &command];
+    let output = elbowroom(&run);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let told = String::from_utf8(output.stderr).expect("text");
+    assert!(told.contains("its clock stands still"), "{told}");
+    assert!(told.contains("ticket 77 was never given"), "{told}");
+    // The report says that the world failed; why is said once.
+    let report = String::from_utf8(output.stdout).expect("text");
+    assert!(report.contains("the world failed at 0"), "{report}");
+    assert!(!report.contains("stands still"), "{report}");
+    let strict = said(2, &[&run[..], &["--strict-world"]].concat());
+    assert!(strict.contains("ticket 77 was never given"), "{strict}");
+}
+
+/// Names that occur once and a number in each cell, as programs want it.
+#[test]
+fn the_table_of_an_experiment_is_one_for_programs() {
+    let folder = std::env::temp_dir().join(format!("elbowroom-{}-tidy", std::process::id()));
+    let path = folder.display().to_string();
+    let experiment = "crates/cli/tests/files/late-drives.toml";
+    let output = elbowroom(&["compare", experiment, "--trials", "2", "-o", &path]);
+    assert!(output.status.success(), "{output:?}");
+    let table = fs::read_to_string(folder.join("table.csv")).expect("a table");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
+    let mut headings = rows[0].clone();
+    headings.sort_unstable();
+    headings.dedup();
+    assert_eq!(headings.len(), rows[0].len(), "{table}");
+    for row in &rows[1..] {
+        assert_eq!(row.len(), rows[0].len(), "{table}");
+        for cell in &row[2..] {
+            assert!(cell.parse::<f64>().is_ok(), "`{cell}`: {table}");
+        }
+    }
+    fs::remove_dir_all(folder).expect("it is there");
+}
