@@ -49,7 +49,7 @@ pub(crate) struct CommandLine {
     pub(crate) command: Command,
 }
 
-/// When to use colours.
+/// Use of colour in the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Colour {
     /// On a terminal, unless `NO_COLOR` is set

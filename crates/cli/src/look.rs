@@ -10,7 +10,7 @@ const DEFAULT_WIDTH: usize = 80;
 /// Wider lines are hard to read.
 const MAX_WIDTH: usize = 110;
 
-/// How to lay out text.
+/// Layout of text: width and character set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Look {
     /// Columns to stay within.

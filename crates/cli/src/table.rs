@@ -14,7 +14,7 @@ use unicode_width::UnicodeWidthStr;
 use crate::look::{FAINT, Look, STRONG, styled};
 use crate::number::{self, Rounding};
 
-/// What a row of the table shows.
+/// A row of the table.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
     /// The parameter's name.
@@ -73,7 +73,7 @@ pub(crate) fn render(rows: &[Row], look: Look) -> String {
     table
 }
 
-/// Where the columns stand.
+/// The widths and positions of the columns.
 struct Layout {
     /// Width of the names.
     names: usize,

@@ -157,7 +157,7 @@ fn items(text: &str) -> Result<Vec<(String, String)>, BoxTextError> {
     Ok(items)
 }
 
-/// What stands after the `=`.
+/// The value or interval after the `=`.
 enum Value {
     Interval(Interval),
     /// So far from the nominal value, in both directions.

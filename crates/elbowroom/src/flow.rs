@@ -16,7 +16,7 @@ use crate::answers::envelope::envelope;
 use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, Unwatched};
 use crate::room;
 
-/// What to leave open, and how to search.
+/// The quantities to vary, and the parameters of the search.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// What to leave open; all durations if empty.

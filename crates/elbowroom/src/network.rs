@@ -36,7 +36,7 @@ pub use simulate::{Durations, Simulation, SimulationError};
 /// More branches than that are not looked at for weak controllability, unless one asks for more.
 pub const MOST_BRANCHES: usize = 1 << 12;
 
-/// What to find out about a network.
+/// A request for an analysis of a temporal network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// After how many branches the question of weak controllability is given up.

@@ -13,7 +13,8 @@ use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, ParameterId, Parametrized
 use elbowroom_stn::Weight;
 use elbowroom_stn::uncertain::{Conflict, Ground, LinkId, Recheck, StrongConflict, Unit};
 
-/// What no executor can satisfy without knowing beforehand what it learns too late.
+/// A conflict that makes a network not dynamically controllable: no executor can satisfy it without
+/// knowing values before they are observed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControlConflict {
     /// What stands against each other, in order.
@@ -151,7 +152,7 @@ impl Kept {
     }
 }
 
-/// What checking the kept network again has shown.
+/// The result of an incremental controllability check.
 enum Rechecked {
     /// Nothing: the box differs in more than one link.
     Unknown,

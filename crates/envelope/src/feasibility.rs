@@ -17,7 +17,8 @@ const MOST_CORNERS: usize = 1 << 8;
 /// How many branches [`Branching`] looks at before the question is given up.
 pub(crate) const MOST_BRANCHES: usize = 1 << 14;
 
-/// Whether a plan's network has a schedule for every value in a box (weak controllability).
+/// The feasibility check: a plan's network has a schedule for every value in a box (weak
+/// controllability).
 ///
 /// The values for which it has one form a convex set, so the corners of the box decide. Few of
 /// them need looking at: a parameter matters only through cycles of constraints. If all cycles

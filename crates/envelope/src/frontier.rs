@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
-/// How steps change after a success.
+/// The step size after a successful widening.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Growth {

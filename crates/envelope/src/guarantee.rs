@@ -67,7 +67,7 @@ pub(crate) enum Controllability {
     Strong(Control),
 }
 
-/// What both of the guarantees that are more than weak go by.
+/// The data shared by the dynamic and the strong guarantee.
 #[derive(Clone, Debug)]
 pub(crate) struct Control {
     plan: Arc<ParametrizedPlan>,

@@ -10,7 +10,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, Side};
 use crate::frontier::{Frontier, Growth};
 use crate::oracle::{Objection, Oracle};
 
-/// How to search.
+/// Settings of IRR.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The search ends when all steps are below this (β of Algorithm 1); positive. A step is halved
@@ -61,7 +61,7 @@ pub enum StopReason {
 /// How many boxes may be undecided before a search ends: each took long.
 const MOST_UNDECIDED: usize = 4;
 
-/// What keeps one end of the final box where it is.
+/// The reason why one end of the final box cannot move.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Limit {
     /// Nothing: the end is infinite.

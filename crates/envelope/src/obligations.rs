@@ -90,7 +90,7 @@ pub struct BadCase {
     pub inequalities: Vec<Inequality>,
 }
 
-/// What is required.
+/// A requirement on every schedule.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Requirement {
     /// Two interfering happenings are at least ε apart; `first` comes first.

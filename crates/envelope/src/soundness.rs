@@ -98,7 +98,7 @@ pub fn broken_in(
     soundness.broken(task, plan, envelope, None)
 }
 
-/// How the conditions that a plan has to meet are met in all its schedules.
+/// The number of conditions of a plan, by what enforces them in all its schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conditions {
     /// Those that are bounds on the difference of two times: the network implies them, so that an

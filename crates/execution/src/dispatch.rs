@@ -34,14 +34,14 @@ use retry::Retry;
 /// Finite bounds of a constraint.
 pub(crate) type Bounds = (Option<Rational>, Option<Rational>);
 
-/// How far to look; see [`Horizon`].
+/// The reach of constraint propagation; see [`Horizon`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sight {
     Whole,
     OneHop,
 }
 
-/// Which of the plan's constraints the parts of its network come from, by position.
+/// The plan's constraints from which the parts of its network were made, by position.
 #[derive(Clone, Debug)]
 struct Sources {
     /// For each constraint of the network; `None` if it comes from none.

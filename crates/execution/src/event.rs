@@ -19,7 +19,7 @@ impl fmt::Display for Ticket {
     }
 }
 
-/// What the world is told to do.
+/// A command to the world.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// Start an action now.
@@ -47,7 +47,7 @@ pub struct Observation {
     pub event: Event,
 }
 
-/// What can be observed.
+/// An observation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// An action has started.
@@ -89,7 +89,7 @@ pub enum Event {
     },
 }
 
-/// How an action ended.
+/// The outcome of an action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// As the domain says.

@@ -56,7 +56,7 @@ pub trait Executor: Send {
     }
 }
 
-/// When a happening is planned.
+/// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planned {
     /// Not before.
@@ -157,7 +157,7 @@ pub struct Amount {
     pub values: Vec<(FluentId, Rational)>,
 }
 
-/// What to do, and why.
+/// A decision with its reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decided {
     /// What to do.
@@ -166,7 +166,7 @@ pub struct Decided {
     pub reason: Reason,
 }
 
-/// What to do next.
+/// A decision of an executor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Decision {
     /// Start these actions now.

@@ -39,7 +39,7 @@ pub const EXECUTORS: &[Registered] = &[
     lookahead::REGISTERED,
 ];
 
-/// What there is to know of an executor before there is one.
+/// The registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
     /// Its name.
@@ -58,7 +58,7 @@ pub struct Registered {
     make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
 }
 
-/// What an executor may ask while it executes.
+/// The services that an executor may use while it executes a plan.
 pub struct Means {
     /// The whole envelope.
     pub region: Box<dyn Region>,

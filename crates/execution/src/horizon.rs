@@ -11,7 +11,7 @@ use elbowroom_stn::{
 /// The window of a time point, its ends `None` where they are infinite.
 pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 
-/// When time points may happen, given those that have.
+/// The time windows of time points, given those that have been executed.
 #[derive(Clone, Debug)]
 pub(crate) enum Horizon {
     /// What follows from all constraints together.
@@ -24,7 +24,7 @@ pub(crate) enum Horizon {
     Dispatchable(Box<Dispatcher>),
 }
 
-/// What one end of a window comes from.
+/// The origin of one end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NetworkLimit {
     /// A constraint of the network.

@@ -12,7 +12,7 @@ pub trait Odds: Send {
     fn compare(&mut self, rest: &Remainder<'_>) -> Option<Compared>;
 }
 
-/// What is left of a plan when nothing is under way.
+/// The remaining part of a plan when no action is running.
 #[derive(Clone, Debug)]
 pub struct Remainder<'a> {
     /// The plan.

@@ -23,7 +23,7 @@ impl<P: Planner + ?Sized> Planner for Box<P> {
     }
 }
 
-/// What a planner answers, and how long it took.
+/// A planner's answer, with the planning time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {
     /// The answer.
@@ -32,7 +32,7 @@ pub struct Planned {
     pub seconds: Option<Rational>,
 }
 
-/// What a planner answers.
+/// A planner's answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlanAnswer {
     /// A plan.

@@ -14,7 +14,7 @@ use elbowroom_plan::{
 
 use crate::forms::Forms;
 
-/// What an executor needs to know of a plan.
+/// The form of a plan that an executor requires, from the least to the most preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is

@@ -7,7 +7,7 @@ use elbowroom_plan::{InstanceId, ParameterId, ParameterKind, ParametrizedPlan};
 
 use crate::executor::{Amount, Moment, News};
 
-/// What an amount that was measured says about the parameters in its expression.
+/// A measured amount as a linear equation over the parameters in its expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reading {
     /// The action in whose effect they stand.
@@ -28,7 +28,7 @@ pub(crate) struct Deviation {
     pub(crate) observed: Rational,
 }
 
-/// What the news say about amounts.
+/// The measured amounts among the news.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Amounts {
     pub(crate) readings: Vec<Reading>,

@@ -34,7 +34,7 @@ pub struct Reason {
     pub promise: Option<Promise>,
 }
 
-/// What an executor can promise of the rest of a plan, the strongest first.
+/// The guarantee for the rest of a plan, the strongest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Promise {
     /// It works whatever the world does within the envelope.

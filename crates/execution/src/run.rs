@@ -63,7 +63,7 @@ use dead_end::Happened;
 use farewell::Closing;
 use progress::Progress;
 
-/// What a run needs, but for the world.
+/// The components of a run, except for the world.
 pub struct Ports<'a> {
     /// Where plans come from.
     pub planner: Box<dyn Planner + 'a>,

@@ -20,7 +20,7 @@ pub struct Command {
     pub arguments: Vec<String>,
 }
 
-/// What is wrong with a command line.
+/// An error in a planner's command line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CommandError {
     /// There is nothing in it.
@@ -48,7 +48,7 @@ pub enum CommandError {
     Unknown(String),
 }
 
-/// What stands for the placeholders.
+/// The values of the placeholders.
 #[derive(Clone, Debug)]
 pub(super) struct Filling {
     pub(super) domain: PathBuf,

@@ -14,7 +14,7 @@ use super::request::{Question, Request};
 /// judged like any plan. Both plans are for the task given, which begins at time 0.
 pub type Repair<'a> = dyn FnMut(&Task, &TimeTriggeredPlan) -> Option<TimeTriggeredPlan> + 'a;
 
-/// What the judge says of a text.
+/// The validator's verdict on a planner's output.
 pub(super) enum Judgement {
     Accepted(Found),
     Refused(String),

@@ -23,7 +23,7 @@ struct Inner {
     is_closed: bool,
 }
 
-/// What was found in the mailbox.
+/// The result of reading the mailbox.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Mail {
     Text(String),

@@ -22,7 +22,7 @@ pub struct Found {
     pub repaired: Option<String>,
 }
 
-/// What happens while a planner runs.
+/// An event while a planner runs.
 #[derive(Clone, Debug)]
 pub enum Event<'a> {
     /// It is still running.
@@ -48,7 +48,7 @@ pub enum Event<'a> {
     },
 }
 
-/// What came of a run. Each is a different answer, and only the first is a plan.
+/// The outcome of a planner's run. Only the first kind is a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The last plan that the judge accepted.
@@ -191,7 +191,7 @@ pub(super) fn signal_name(signal: i32) -> String {
     format!("signal {signal}")
 }
 
-/// What came of a run, and how it went.
+/// The outcome of a planner's run, with statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// What came of it.
@@ -200,7 +200,7 @@ pub struct Report {
     pub statistics: Statistics,
 }
 
-/// How a run went.
+/// Statistics of a planner's run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     /// From the start of the process to its end.

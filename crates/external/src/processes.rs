@@ -18,7 +18,7 @@ pub(super) const MARK: &str = "ELBOWROOM_RUN";
 /// A process, told apart from later ones with its number by when it started.
 type Identity = (i32, u64);
 
-/// What `/proc/PID/stat` says.
+/// The fields of `/proc/PID/stat` that are used.
 #[derive(Clone, Copy, Debug)]
 struct Status {
     parent: i32,

@@ -8,7 +8,7 @@ use super::registry::Planner;
 use super::supervise::{Ending, Stream, Watcher};
 use super::workspace::Workspace;
 
-/// What the side that reads shares with the side that judges.
+/// The state shared by the reading and the validating thread.
 #[derive(Default)]
 pub(super) struct Shared {
     pub(super) mailbox: Mailbox,

@@ -171,7 +171,7 @@ pub struct Planner {
     pub habits: Habits,
 }
 
-/// What to start.
+/// The kind of program to start.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A program.

@@ -4,7 +4,7 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_pddl::{ProblemText, Source, end_times, read_problem, write_problem};
 
-/// What to plan.
+/// A planning request.
 #[derive(Debug)]
 pub struct Request<'a> {
     /// The task. Plans are given in its terms; their facts enter its table.

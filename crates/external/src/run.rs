@@ -20,7 +20,7 @@ use super::start::{not_started, prepare};
 use super::supervise::{Ended, Ending, Limits, supervise};
 use super::workspace::Workspace;
 
-/// How to run a planner.
+/// Settings for running a planner.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// How long it may run.

@@ -8,7 +8,7 @@ use std::time::Duration;
 #[cfg(unix)]
 mod unix;
 
-/// What a process may use.
+/// Resource limits of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Limits {
     /// Wall-clock time.
@@ -19,7 +19,7 @@ pub(super) struct Limits {
     pub(super) memory: Option<u64>,
 }
 
-/// What processes use together.
+/// Resource usage of a group of processes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Usage {
     /// Memory, in bytes. Pages that they share count for each.
@@ -28,7 +28,7 @@ pub(super) struct Usage {
     pub(super) work: Duration,
 }
 
-/// How the process ended.
+/// The way in which a process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// By itself, with this exit code.
@@ -43,7 +43,7 @@ pub enum Ending {
     Stopped,
 }
 
-/// How a run went.
+/// Statistics of a planner's run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ended {
     pub(super) ending: Ending,
@@ -55,14 +55,14 @@ pub(super) struct Ended {
     pub(super) peak_memory: u64,
 }
 
-/// Which stream a piece of output comes from.
+/// The output stream of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stream {
     Output,
     Error,
 }
 
-/// What happens meanwhile.
+/// Callbacks while a process runs.
 pub(super) trait Watcher {
     /// The process has printed something.
     fn printed(&mut self, stream: Stream, bytes: &[u8]);

@@ -30,7 +30,7 @@ pub struct CompareRequest<'a> {
     pub part: Part,
 }
 
-/// How often each executor succeeded, and what it took: `docs/formats/results-json.md`.
+/// The results of an experiment: `docs/formats/results-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum CompareAnswer {

@@ -22,7 +22,7 @@ pub use results::{Cell, Pair, Results, ResultsError};
 use parts::Partial;
 use trials::Setting;
 
-/// Which trials to make, and how.
+/// The trials to make, and the number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
     /// How many trials of each problem and column the whole has.

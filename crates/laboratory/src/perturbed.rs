@@ -34,7 +34,7 @@ pub use table::{plots, records, table};
 use crate::compare::Part;
 use planner::EmbeddedPlans;
 
-/// Who watches the trials.
+/// Callbacks of the trials.
 struct Watch<'w> {
     /// Whether to make another one.
     goes_on: &'w (dyn Fn() -> bool + Sync),

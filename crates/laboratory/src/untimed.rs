@@ -53,7 +53,7 @@ pub trait UntimedWorld {
     fn end(&mut self, action: &Action);
 }
 
-/// Who executes plans in such worlds.
+/// An executor for worlds without time.
 pub trait UntimedExecutor {
     /// Forgets the trial before. What has been calculated may be kept.
     fn begin(&mut self) {}
@@ -62,12 +62,12 @@ pub trait UntimedExecutor {
     fn execute(&mut self, plan: &Arc<TimeTriggeredPlan>, stage: &mut Stage<'_>);
 }
 
-/// Who plans: from what holds to a plan, `None` if there is none.
+/// A planner: from a state to a plan, `None` if there is none.
 ///
 /// The same plan should be the same `Arc`: executors remember what they have made of it.
 pub type Plans<'a> = dyn FnMut(&State) -> Option<Arc<TimeTriggeredPlan>> + 'a;
 
-/// When a trial is over in any case.
+/// Limits of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Planning rounds.
@@ -94,7 +94,7 @@ pub type DeadEndWatch<'a> = dyn Fn(&State, &[ActionName]) -> bool + 'a;
 /// A ground action: its schema and its arguments.
 pub type ActionName = (SchemaId, Vec<ObjectId>);
 
-/// What a trial is played by.
+/// The components of a trial.
 pub struct Game<'g> {
     /// The problem.
     pub task: &'g Task,
@@ -107,7 +107,7 @@ pub struct Game<'g> {
     pub limits: Limits,
 }
 
-/// What was done in a trial.
+/// Counts of the steps in a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Actions that have started.
@@ -130,7 +130,7 @@ impl Tally {
     }
 }
 
-/// How a trial went.
+/// The result of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trial {
     /// Whether the goal held when an execution ended.

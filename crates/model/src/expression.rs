@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 use crate::ground::FluentId;
 use crate::problem::Fluent;
 
-/// How two numbers are compared.
+/// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Comparison {
     /// `<`

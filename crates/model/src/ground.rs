@@ -154,7 +154,7 @@ impl Guard {
     }
 }
 
-/// What a ground effect does.
+/// The change that a ground effect makes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// The fact becomes true. Wins over a deletion by the same happening.
@@ -172,7 +172,7 @@ pub enum Change {
     },
 }
 
-/// What happens at one moment: a start, an end, an instantaneous action.
+/// A snap action: a start, an end, or an instantaneous action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SnapAction {
     /// Needed on arrival.
@@ -203,7 +203,7 @@ pub enum Body {
     Durative(DurativeBody),
 }
 
-/// What a durative action needs and does.
+/// The conditions and effects of a durative action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DurativeBody {
     /// All must hold; none means that any duration `>= 0` will do.

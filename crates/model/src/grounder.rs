@@ -14,7 +14,7 @@ use crate::state::TimedHappening;
 use crate::table::Table;
 use crate::terms::{resolve, with_arguments};
 
-/// What is known beforehand, so that quantifiers need not be expanded in full.
+/// Knowledge of static conditions, so that quantifiers need not be expanded in full.
 pub(crate) trait Foreknowledge {
     /// The truth of a condition that is the same in every state; `None` for all others.
     fn truth(&self, condition: &Condition, binding: &[ObjectId]) -> Option<bool>;

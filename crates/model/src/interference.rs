@@ -6,7 +6,7 @@ use crate::ground::{Action, Body, Change, Condition, Expression, FactId, FluentI
 use crate::state::TimedHappening;
 use crate::task::Task;
 
-/// What a happening reads and writes.
+/// The facts and fluents that a happening reads and writes.
 ///
 /// Two happenings [interfere](Footprint::interferes_with) when it matters which comes first, or
 /// when PDDL 2.1 says that it might (Fox & Long 2003, definition 12). Conditions of conditional

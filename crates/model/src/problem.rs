@@ -280,7 +280,7 @@ pub struct Guard {
     pub now: Condition,
 }
 
-/// What an effect does.
+/// The change that an effect makes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// The fact becomes true. Wins over a deletion by the same happening.
@@ -298,7 +298,7 @@ pub enum Change {
     },
 }
 
-/// How a fluent changes.
+/// An assignment operator: `assign`, `increase` and their like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum UpdateOperator {
     /// `:= value`
@@ -366,7 +366,7 @@ pub struct TimedInitial {
     pub change: TimedChange,
 }
 
-/// What a timed initial does.
+/// The change that a timed initial makes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TimedChange {
     /// The fact becomes true.

@@ -54,7 +54,7 @@ const STEPS_PER_QUESTION: u64 = 8192;
 /// How many actions are made between two such questions.
 const ACTIONS_PER_QUESTION: usize = 256;
 
-/// When to give up.
+/// Limits of grounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The most ground actions.
@@ -73,7 +73,7 @@ impl Default for Settings {
     }
 }
 
-/// How grounding ended.
+/// The result of grounding.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
     /// All that can be reached was found.
@@ -82,7 +82,7 @@ pub enum Answer {
     LimitReached,
 }
 
-/// What can be reached.
+/// The reachable ground actions and facts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grounding {
     /// The actions, by schema and arguments, without conditions that hold at all times and without

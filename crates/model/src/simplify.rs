@@ -6,7 +6,7 @@ use crate::ground::{
     Action, Body, Change, Condition, Effect, Expression, FactId, FluentId, Guard, SnapAction,
 };
 
-/// What is known to be the same in every state.
+/// Access to facts and values that are the same in every state.
 pub trait Constants {
     /// The fact's truth, if it never changes.
     fn truth(&mut self, fact: FactId) -> Option<bool>;

@@ -10,7 +10,7 @@ use crate::problem::{TimedChange, TimedInitial};
 use crate::state::State;
 use crate::task::Task;
 
-/// Where things stand at one moment, and what is still under way.
+/// A state at one moment, with the actions that are running.
 ///
 /// Times are those of the task's own clock: its timed initials up to and including
 /// [`Situation::time`] have happened, the later ones are to come.

@@ -62,7 +62,7 @@ use crate::situation::Situation;
 use crate::state::State;
 use crate::task::Task;
 
-/// How strictly to judge.
+/// Settings of the validator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
@@ -140,7 +140,7 @@ impl Verdict {
     }
 }
 
-/// Where a valid plan leads, and how narrowly.
+/// The final state of a valid plan, and its margins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// The time of the last happening of the plan's actions.

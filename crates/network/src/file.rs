@@ -38,8 +38,7 @@ impl Format {
     }
 }
 
-/// How the duration of a contingent link is distributed. Numbers are in the network's unit of
-/// time.
+/// The distribution of a contingent link's duration, in the network's unit of time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Duration {
     /// Bell-shaped.
@@ -95,7 +94,7 @@ pub struct GivenWait {
     pub delay: Option<Rational>,
 }
 
-/// What a file says.
+/// The contents of a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NetworkFile {
     /// How it is written.

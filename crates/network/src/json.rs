@@ -88,7 +88,7 @@ pub(crate) fn parse<'a>(text: &'a str, report: &mut Report) -> Option<Json<'a>> 
         .ok()
 }
 
-/// Where the text is no JSON, and why.
+/// A syntax error in JSON: its position and a message.
 struct Wrong {
     at: usize,
     message: String,

@@ -17,7 +17,7 @@ use elbowroom_stn::branching::{Branching, Corner, OpenBound, TooManyBranches};
 use elbowroom_stn::uncertain::{ContingentLink, LinkId, UncertainNetwork};
 use elbowroom_stn::{Constraint, ConstraintId, Network, NodeId};
 
-/// What the bounds of a network say about weak controllability.
+/// The result of a weak-controllability check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Weak {
     /// There is a schedule for whatever the world does.
@@ -55,7 +55,7 @@ pub struct WeakStep {
     pub given: Given,
 }
 
-/// What a step goes by.
+/// The ground of one step of a conflict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Given {
     /// A requirement.

@@ -49,7 +49,7 @@ pub(crate) fn parse(text: &str, report: &mut Report) -> Option<Vec<Element>> {
     }
 }
 
-/// Where the text is no XML, and why.
+/// A syntax error in XML: its position and a message.
 struct Wrong {
     at: usize,
     message: String,

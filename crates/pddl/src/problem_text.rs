@@ -18,7 +18,7 @@ use elbowroom_num::Rational;
 pub use running::end_times;
 use running::ends_of_running;
 
-/// How a problem is written.
+/// A problem to be written as PDDL text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProblemText {
     /// For each running action, the time on the task's clock at which it will end; see

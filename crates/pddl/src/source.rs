@@ -11,7 +11,7 @@ pub(crate) struct Span {
     pub(crate) end: usize,
 }
 
-/// Which of the texts that are read together.
+/// The identifier of one of several texts that are read together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FileId {
     Domain,

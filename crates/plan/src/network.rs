@@ -51,7 +51,7 @@ pub fn network_node(node: NodeId) -> elbowroom_stn::NodeId {
     elbowroom_stn::NodeId(node.0)
 }
 
-/// Where a constraint of [`StnPlan::network`] comes from.
+/// The origin of a constraint of [`StnPlan::network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// A node comes at 0 or later.

@@ -42,7 +42,7 @@ pub struct Parameter {
     pub range: Interval,
 }
 
-/// Which quantity a parameter stands for.
+/// The quantity that a parameter stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
     /// The duration of an action instance. The domain's duration constraints no longer bind it,

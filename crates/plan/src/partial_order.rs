@@ -181,7 +181,7 @@ fn duration_link(constraint: Constraint) -> Link {
     }
 }
 
-/// What a happening needs, and does.
+/// The conditions and effects of a happening.
 #[derive(Default)]
 struct Use {
     /// Facts needed true; basic facts under a derived one are in both sets.

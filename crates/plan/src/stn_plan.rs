@@ -43,7 +43,7 @@ impl From<usize> for InstanceId {
     }
 }
 
-/// What happens at a time point.
+/// The event at a time point of a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Node {
     /// The plan begins; time 0.

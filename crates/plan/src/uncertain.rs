@@ -9,7 +9,7 @@ use crate::network::network_node;
 use crate::parameter::{ParameterId, ParametrizedPlan};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 
-/// What a constraint of a plan means to an executor.
+/// The meaning of a plan's constraint for an executor: a requirement or a contingent link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// `lower <= to - from <= upper` has to be seen to; `None` is no bound.

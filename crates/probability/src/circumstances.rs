@@ -9,7 +9,7 @@ use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::belief::Belief;
 
-/// What is known at the moment at which an order is looked for.
+/// The state from which an order is searched for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Circumstances {
     /// Now, by the clock of the task's timed initials. Those up to and including now have

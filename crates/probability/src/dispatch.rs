@@ -19,7 +19,7 @@ use crate::network::TooCoupled;
 use crate::search::{OrderSearch, Progress};
 use crate::total_order::{Slot, TotalOrderPlan};
 
-/// What to do next.
+/// The next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
     /// The goal holds and nothing is under way.
@@ -47,7 +47,7 @@ pub struct NextHappening {
     pub is_new_order: bool,
 }
 
-/// When to look for a new order.
+/// The policy for searching a new order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reconsider {
     /// When no layer of the present one fits, as in the paper.

@@ -17,7 +17,7 @@ pub use authors::read as read_authors;
 pub use file::read;
 pub use write::write;
 
-/// How a fact changes by itself while one snap action is done.
+/// The probabilities of a spontaneous change of a fact in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flip {
     /// The probability that it becomes true, if it is false.
@@ -39,7 +39,7 @@ impl Flip {
     }
 }
 
-/// How likely an action is to do what it should.
+/// The success probabilities of an action: its start and its effects.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Success {
     /// The probability that an attempt to start it succeeds, its conditions being true.
@@ -50,7 +50,7 @@ pub struct Success {
     pub deletions: BTreeMap<PredicateId, f64>,
 }
 
-/// What applies where nothing more specific is said.
+/// Default probabilities, for what has no more specific entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Defaults {
     /// For facts that are false.
@@ -72,7 +72,7 @@ pub struct PartialFlip {
     pub becomes_false: Option<f64>,
 }
 
-/// How likely facts are to change by themselves, and actions and effects to succeed.
+/// Likelihoods: the probabilities of spontaneous changes, and of successful actions and effects.
 ///
 /// What is said of one ground fact or action goes before what is said of its predicate or schema,
 /// and that before the defaults.

@@ -19,7 +19,7 @@ use crate::likelihoods::{Flip, Likelihoods, Missing};
 
 pub(crate) use requirement::{Requirement, evaluate, visit_facts};
 
-/// What an effect that may fail leaves behind, and when facts change by themselves.
+/// The semantics of failed effects and of spontaneous changes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Semantics {
     /// Paper 2's network: an effect that fails leaves the opposite behind, and a fact on which

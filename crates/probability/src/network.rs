@@ -55,7 +55,7 @@ pub struct PrunedNetwork<'m> {
     undo: Vec<Undo>,
 }
 
-/// What [`PrunedNetwork::pop`] goes back to.
+/// The state that [`PrunedNetwork::pop`] restores.
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     facts: facts::Checkpoint,

@@ -38,7 +38,7 @@ use crate::total_order::Slot;
 pub use process::Perturbed;
 pub use small_world::Table;
 
-/// How many steps a run may have.
+/// The number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Horizon {
     /// At most so many.
@@ -106,7 +106,7 @@ pub enum NotSmall {
     PaperSemantics,
 }
 
-/// What an agent does in a state.
+/// An agent's action in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Move {
     /// Tries a start or an instantaneous action, or ends an action: a node of the plan.

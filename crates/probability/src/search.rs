@@ -44,7 +44,7 @@ use separations::Separations;
 use symmetry::Symmetry;
 use timing::Timing;
 
-/// Which sequences are orders of the plan.
+/// The sequences that count as orders of the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Candidates {
     /// Those that reach the goal if nothing goes wrong, as in the paper.
@@ -54,7 +54,7 @@ pub enum Candidates {
     All,
 }
 
-/// How to search.
+/// Settings of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchSettings {
     /// Which sequences count.
@@ -74,7 +74,7 @@ impl Default for SearchSettings {
     }
 }
 
-/// How a search ended.
+/// The reason why a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchStop {
     /// Nothing is better.
@@ -83,7 +83,7 @@ pub enum SearchStop {
     Interrupted,
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The order most likely to succeed; `None` if no order can.
@@ -94,7 +94,7 @@ pub struct Found {
     pub sequences: usize,
 }
 
-/// What a search tells its callback.
+/// Progress of a search, for its callback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// How many sequences were looked at so far.

@@ -30,7 +30,7 @@ pub struct TotalOrderPlan {
     pub assumed_conditions: usize,
 }
 
-/// What must hold between two happenings.
+/// The conditions that must hold between two happenings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layer {
     /// Facts with the truth they must have, sorted.
@@ -41,7 +41,7 @@ pub struct Layer {
     pub running: Vec<InstanceId>,
 }
 
-/// When a happening may be.
+/// The time window of a happening.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
     /// Which one.

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, Exp1, Gamma, LogNormal, Normal, Triangular};
 
-/// What a random number is for.
+/// The purpose of a random number.
 ///
 /// Part of its key; the numbers must never change, or else old seeds mean new worlds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ fn stable_hash(text: &str) -> u64 {
     })
 }
 
-/// How a quantity is distributed.
+/// The distribution of a quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Distribution {
     /// Always the same.

@@ -53,7 +53,7 @@ pub struct Amount {
     pub rule: Rule,
 }
 
-/// How often actions fail.
+/// The failure probability of actions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failing {
     /// Which.
@@ -64,7 +64,7 @@ pub struct Failing {
     pub when: Failure,
 }
 
-/// When an action fails, if it does.
+/// The moment at which an action fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// It does not start at all.
@@ -88,7 +88,7 @@ pub struct Exogenous {
     pub is_reported: bool,
 }
 
-/// What happens by itself.
+/// A change that no action causes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExogenousChange {
     /// The fact, `(predicate object …)`, becomes true or false.
@@ -97,7 +97,7 @@ pub enum ExogenousChange {
     Value(String, Rational),
 }
 
-/// How well the world reports. Each probability is that of a single report.
+/// The reliability of the world's reports. Each probability is that of a single report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reports {
     /// It never comes.

@@ -11,7 +11,7 @@ pub struct ActionPattern {
     arguments: Option<Vec<Option<String>>>,
 }
 
-/// What a pattern may name.
+/// The kind of name that a pattern matches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Names {
     Actions,

@@ -15,7 +15,7 @@ pub struct ConsistentNetwork<W = Rational> {
     repair: Repair<W>,
 }
 
-/// How much of a network was there at some moment.
+/// A snapshot of the size of a network, to go back to.
 ///
 /// Checkpoints nest: going back to one makes all later ones void.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

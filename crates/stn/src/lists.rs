@@ -2,7 +2,7 @@
 
 use crate::{ConstraintId, NodeId};
 
-/// Which constraints begin (or end) at each node, in the order they were added.
+/// The constraints that begin (or end) at each node, in the order they were added.
 ///
 /// The lists are chained through the constraints: however many nodes there are, there are four
 /// allocations.

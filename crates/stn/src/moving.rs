@@ -34,7 +34,7 @@ pub struct MovingWindows<W = Rational> {
     queue: BinaryHeap<Reverse<(W, NodeId)>>,
 }
 
-/// What one end of a window comes from.
+/// The origin of one end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     /// From nothing: it is infinite, or the node is the origin.
@@ -45,7 +45,7 @@ enum Source {
     Constraint(ConstraintId),
 }
 
-/// Which end of a window.
+/// One end of a time window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WindowEnd {
     /// How early the node may be.

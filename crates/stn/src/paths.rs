@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 use crate::{ConsistentNetwork, Constraint, ConstraintId, NodeId, Schedule, Weight};
 
-/// Which end of the paths is the same for all.
+/// The direction of shortest paths: from one node, or to one node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// The paths begin at the root: distances bound `node - root`.

@@ -8,7 +8,7 @@ use crate::record::Record;
 use crate::render;
 use crate::source::{Source, Span};
 
-/// Whether a text can be used in spite of what was found.
+/// The severity of a finding: an error makes a text unusable, a warning does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {

@@ -73,14 +73,14 @@ ACTIONS is an action's name, a label (n0), or (NAME object _ ...), where _ match
 may be followed by `weight W`, its weight in the search, and `in [LB, UB]`, the range of its values;
 a constant or condition also by `shared`: one parameter for all instances.";
 
-/// How to search for an envelope.
+/// The algorithm that computes an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Method {
     /// Incremental rectangular robustification: widen one bound at a time
     Irr,
 }
 
-/// How the step size changes after a success.
+/// The step size after a successful widening.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Growth {
     /// It doubles
@@ -89,7 +89,7 @@ pub(crate) enum Growth {
     Constant,
 }
 
-/// What is guaranteed inside an envelope.
+/// The guarantee that holds inside an envelope.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Guarantee {
     /// Weak controllability: a schedule exists for all values, if they are known in advance

@@ -36,7 +36,7 @@ pub(crate) struct NetworkArgs {
     pub(crate) json: bool,
 }
 
-/// How the durations of contingent links are drawn.
+/// The distribution of the durations of contingent links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DurationsChoice {
     /// As the file says, and evenly between the bounds where it says nothing

@@ -167,7 +167,7 @@ const IN_THE_TRACE: &[&str] = &[
     "epsilon",
 ];
 
-/// What happens to running actions when a new plan is made.
+/// The treatment of running actions when a new plan is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RunningChoice {
     /// Cancel them

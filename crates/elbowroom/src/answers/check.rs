@@ -23,7 +23,7 @@ pub struct CheckRequest<'a> {
     pub settings: Settings,
 }
 
-/// Whether a plan is valid: `docs/formats/check-json.md`.
+/// The result of a validation: `docs/formats/check-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum CheckAnswer {
@@ -42,7 +42,7 @@ pub enum CheckFormat {
     Check,
 }
 
-/// What the judge says about a plan.
+/// The validator's report on a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanChecked {
     /// Always the same.
@@ -60,7 +60,7 @@ pub struct PlanChecked {
     pub finding: CheckFinding,
 }
 
-/// Whether the plan is valid.
+/// The verdict on a plan, with the evidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum CheckFinding {
@@ -100,7 +100,7 @@ pub struct FluentValue {
     pub is_changed: bool,
 }
 
-/// How close a comparison came to failing.
+/// The margin by which a comparison holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MarginAnswer {
     /// The comparison.
@@ -120,7 +120,7 @@ pub struct MarginAnswer {
     pub is_strict: bool,
 }
 
-/// What a problem consists of.
+/// A summary of a problem.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProblemRead {
     /// Always the same.

@@ -51,7 +51,7 @@ pub struct EnvelopeRequest {
     pub search: Search,
 }
 
-/// How to search for an envelope.
+/// Parameters of the search for an envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Search {
     /// How boxes are looked for.
@@ -215,7 +215,7 @@ fn contains(
     Ok(outcome)
 }
 
-/// What an answer is about.
+/// The plan that an answer is about, with its request and explainer.
 #[derive(Clone, Copy)]
 struct Subject<'a> {
     request: &'a EnvelopeRequest,

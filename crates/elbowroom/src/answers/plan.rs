@@ -73,7 +73,7 @@ pub enum PlanFormat {
     Plan,
 }
 
-/// What was found.
+/// The result of a search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer")]
 pub enum PlanFinding {
@@ -144,7 +144,7 @@ pub enum PlanStop {
     Ended,
 }
 
-/// What a planner counts.
+/// Statistics of a planner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum PlanStatistics {

@@ -37,7 +37,7 @@ pub struct RunOutcome {
     pub report: Report,
 }
 
-/// What came of a run: `docs/formats/run-json.md`.
+/// The result of a run: `docs/formats/run-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunAnswer {
     /// The answer itself, as the last line of a trace has it.
@@ -58,7 +58,7 @@ pub enum RunFormat {
     Run,
 }
 
-/// How far a run has come.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunProgress<'a> {
     /// What has just been recorded: a decision, a command, an observation, a plan, …

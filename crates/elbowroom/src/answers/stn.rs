@@ -53,7 +53,7 @@ pub enum StnFormat {
     Stn,
 }
 
-/// What came of it.
+/// The result of the relaxation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum StnFinding {

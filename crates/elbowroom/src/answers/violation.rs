@@ -4,7 +4,7 @@ use elbowroom_model::validate::Violation;
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
 
-/// When a plan goes wrong, in which action, and how.
+/// The first violation in a plan: its time, its action and a description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViolationAnswer {
     /// When.

@@ -37,7 +37,7 @@ pub enum Halt {
     Cancelled,
 }
 
-/// What a watcher hears of.
+/// A progress event, reported to a watcher.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Event<'a> {
@@ -54,7 +54,7 @@ pub enum Event<'a> {
     Trials(TrialsProgress),
 }
 
-/// How far the search for an envelope has come.
+/// Progress of the search for an envelope.
 #[derive(Clone, Debug)]
 pub struct EnvelopeProgress<'a> {
     /// The plan whose parameters the box is about.
@@ -67,7 +67,7 @@ pub struct EnvelopeProgress<'a> {
     pub steps: usize,
 }
 
-/// How far a planner has come.
+/// Progress of a planner.
 #[derive(Clone, Debug)]
 pub struct PlanProgress<'a> {
     /// When the last action ends, if this is about a new plan.
@@ -82,7 +82,7 @@ pub struct PlanProgress<'a> {
     pub memory: Option<u64>,
 }
 
-/// How far an experiment has come.
+/// Progress of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialsProgress {
     /// How many trials have been made.

@@ -96,7 +96,7 @@ pub struct Execution<'a> {
     is_explaining: bool,
 }
 
-/// Who decides.
+/// The executor of a run: a registered one, or the caller's own.
 enum Decider<'a> {
     Registered(ExecutorSpec),
     Another(Box<dyn Executor + 'a>),

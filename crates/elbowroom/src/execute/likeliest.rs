@@ -256,7 +256,7 @@ impl<'a> Likeliest<'a> {
     }
 }
 
-/// What is left of a plan.
+/// The remaining part of a plan.
 struct Rest {
     /// With what has happened fixed, and what is to come not before now.
     plan: StnPlan,

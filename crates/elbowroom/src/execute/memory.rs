@@ -103,7 +103,7 @@ pub struct RememberingPreparer<P> {
     table: Option<(usize, usize)>,
 }
 
-/// What a preparer is asked.
+/// The arguments of a preparer, as a key of its memory.
 #[derive(Clone, Debug)]
 struct Question {
     need: Need,

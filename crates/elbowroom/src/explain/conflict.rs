@@ -13,7 +13,7 @@ pub(super) struct Conflict {
     pub(super) excess: Rational,
 }
 
-/// What an edge of the network comes from.
+/// The origin of an edge of the network.
 #[derive(Clone, Copy)]
 enum Edge<'a> {
     /// Nothing happens before time 0.
@@ -75,7 +75,7 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
     })
 }
 
-/// What there is to fit into.
+/// The constraint that a chain of actions has to fit into.
 enum Room {
     /// An action during which it must happen.
     Action(String),

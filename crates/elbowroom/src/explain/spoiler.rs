@@ -11,7 +11,7 @@ use super::Explainer;
 /// A play is given up after so many rounds: it goes on for ever only if nothing has a limit.
 const MOST_ROUNDS: usize = 10_000;
 
-/// When an executor that knows nothing in advance starts what it may start.
+/// The time at which an executor without foresight starts an action: the earliest or the latest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Policy {
     /// As early as the windows allow.
@@ -20,7 +20,7 @@ enum Policy {
     Late,
 }
 
-/// What came of a play.
+/// The result of a play of the executor against the world.
 struct Play {
     /// What happened, in order.
     happened: Vec<(Rational, NodeId)>,

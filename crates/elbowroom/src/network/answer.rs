@@ -8,7 +8,7 @@ use super::simulate::Durations;
 pub(super) const FORMAT: &str = "elbowroom-network-answer";
 pub(super) const VERSION: u32 = 1;
 
-/// What was found out about a network.
+/// The analysis of a temporal network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// `elbowroom-network-answer`.
@@ -48,7 +48,7 @@ impl Answer {
     }
 }
 
-/// Whether a promise can be made.
+/// The result of a controllability check: yes, no or undecided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -60,7 +60,7 @@ pub enum Verdict {
     Undecided,
 }
 
-/// Whether a promise can be made, and if not, why.
+/// The result of a controllability check, with the conflict if it fails.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
     /// Whether.
@@ -94,7 +94,7 @@ impl Promise {
     }
 }
 
-/// What contradicts itself.
+/// A conflict: the constraints that contradict each other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
     /// By how much the steps contradict each other: a positive number; `inf` if there is no limit
@@ -118,7 +118,7 @@ pub struct Step {
     pub words: String,
 }
 
-/// How long a link takes in a reason.
+/// The duration of a contingent link in a conflict.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LinkDuration {
     /// The point from which the link counts.
@@ -131,7 +131,7 @@ pub struct LinkDuration {
     pub value: Number,
 }
 
-/// When a point happens.
+/// The time of a time point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Time {
     /// The point.
@@ -174,7 +174,7 @@ impl From<&Rational> for Number {
     }
 }
 
-/// How often dispatch succeeded.
+/// The success rate of simulated dispatch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulated {
     /// How many runs were made.

@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_stn::uncertain::{Dispatchable, Dispatcher, LinkId, UncertainNetwork};
 use elbowroom_stn::{Minimal, NodeId, Schedule};
 
-/// Who decides when the points happen that the world does not choose.
+/// The dispatcher of the controllable time points.
 pub(super) enum Executor {
     /// By the dispatchable network, as early as it allows.
     Dispatchable(Arc<Dispatchable<Rational>>),
@@ -14,7 +14,7 @@ pub(super) enum Executor {
     EarlyFirst(Minimal<Rational>),
 }
 
-/// What decides the next point that the executor chooses.
+/// The state of a dispatcher during one simulated execution.
 enum Decider<'a> {
     Dispatcher(Box<Dispatcher<Rational>>),
     Windows(&'a Minimal<Rational>),

@@ -20,7 +20,7 @@ pub(super) struct Draws<'a> {
     groups: Vec<Group>,
 }
 
-/// Where the duration of a link comes from.
+/// The source of a link's random durations.
 struct Source {
     distribution: Distribution,
     resolution: Rational,

@@ -28,7 +28,7 @@ pub struct Simulation {
     pub durations: Durations,
 }
 
-/// How the durations of links are drawn.
+/// The distribution from which the durations of links are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Durations {

@@ -13,7 +13,7 @@ pub(crate) type Alternatives = Vec<Vec<Inequality>>;
 /// How many alternatives a condition may unfold into.
 const MOST_ALTERNATIVES: usize = 4096;
 
-/// What one asks of a condition.
+/// The truth value that is asked of a condition.
 ///
 /// A comparison with an undefined number says nothing: it is neither true nor false, and so are
 /// the conditions around it, unless their other parts decide.

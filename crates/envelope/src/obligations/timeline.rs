@@ -25,7 +25,7 @@ pub(crate) struct Timeline {
     pub(crate) assumptions: Vec<Inequality>,
 }
 
-/// How a fact changes.
+/// The changes of a fact along a plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactHistory {
     pub(crate) initially: bool,
@@ -33,7 +33,7 @@ pub(crate) struct FactHistory {
     pub(crate) events: Vec<(NodeId, bool)>,
 }
 
-/// How a fluent changes.
+/// The changes of a fluent along a plan.
 #[derive(Clone, Debug, Default)]
 struct FluentHistory {
     initially: Option<Linear>,
@@ -53,10 +53,10 @@ pub(crate) enum FluentChange {
     DriftEnd(NodeId),
 }
 
-/// Which nodes have happened.
+/// A cut through a plan: whether a node has happened.
 pub(crate) type Cut<'a> = &'a dyn Fn(NodeId) -> bool;
 
-/// What an expression is read in: a cut, the moment of reading, and the action it belongs to.
+/// The context in which an expression is evaluated: a cut, a moment, and the action it belongs to.
 pub(crate) struct Reading<'a> {
     pub(crate) task: &'a Task,
     pub(crate) timeline: &'a Timeline,
@@ -272,7 +272,7 @@ impl Reading<'_> {
     }
 }
 
-/// What rules read: basic facts, and comparisons of constants.
+/// The context in which rules are evaluated: basic facts, and comparisons of constants.
 struct Basic<'a>(&'a Reading<'a>);
 
 impl Moment<Refusal> for Basic<'_> {

@@ -38,7 +38,7 @@ pub(crate) struct Before<W> {
     assumed: usize,
 }
 
-/// Whether a bad case is possible.
+/// The result of a feasibility check of a bad case.
 pub(crate) enum Outcome {
     /// No; one proof for each combination of values of multiplied parameters.
     Impossible(Vec<Certificate>),

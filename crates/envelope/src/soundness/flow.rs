@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use elbowroom_num::Rational;
 use elbowroom_stn::{ConsistentNetwork, ConstraintId, NodeId, Weight};
 
-/// How much flows along each constraint, by its number.
+/// The flow along each constraint, by its number.
 pub(crate) type Flow = Vec<Rational>;
 
 /// The cheapest flow that brings `demand[k]` units net into each node `k` (the demands add up to

@@ -13,7 +13,7 @@ use crate::obligations::Inequality;
 use crate::reduction::Reduction;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side, Valuation};
 
-/// What a bound of the linear program stands for.
+/// The meaning of a bound of the linear program.
 enum Meaning {
     Edge(usize),
     End(BoxEnd),

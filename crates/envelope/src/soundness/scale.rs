@@ -9,9 +9,9 @@ use elbowroom_stn::Weight;
 use crate::reduction::{Edge, Reduction};
 use elbowroom_plan::DecoupledEnvelope;
 
-/// How bounds become weights. Sums and comparisons of weights are those of the bounds.
+/// A mapping from bounds to weights that preserves sums and comparisons.
 pub(crate) trait Scale {
-    /// What a bound becomes.
+    /// The weight of a bound.
     type Weight: Weight;
 
     /// The bound's weight.

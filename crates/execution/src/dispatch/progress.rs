@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, Constraint, InstanceId, Node, NodeId, StnPlan, network_node};
 use elbowroom_stn::Network;
 
-/// What has happened of a plan.
+/// The executed part of a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
     /// When each node happened, on the plan's clock.

@@ -11,7 +11,7 @@ use elbowroom_probability::{
 
 use crate::reason::About;
 
-/// Who chooses the next happening.
+/// The policy that chooses the next happening.
 pub(super) enum Chooser {
     /// Orders of the plan's happenings, and their layers.
     Orders(Box<LayerDispatch>),

@@ -22,11 +22,11 @@ pub(super) const REGISTERED: Registered = Registered {
     argument: Some("number of percentage points"),
     is_optional: true,
     summary: "Dispatches so that the rest of the plan works whatever happens within its envelope. \
-              When something leaves it, makes the widest promise of the rest that still holds, with \
-              the observed values fixed, and replans only when the rest does not work even if \
-              nothing deviates any more. With a number, also when nothing is under way and \
-              another plan is at least so many percentage points likelier to succeed in the world \
-              that the world file describes.",
+              When a value leaves it, gives the strongest guarantee that still holds for the rest, \
+              with the observed values fixed, and replans only when the rest does not work even if \
+              nothing deviates any more. With a number, it also replans while no action is running \
+              and another plan is more likely to succeed, by at least that number of percentage \
+              points, in the world that the world file describes.",
     paper: "goes beyond Cashmore et al. (2020)",
     need: Need::OpenNetwork,
     make: |argument, means| {

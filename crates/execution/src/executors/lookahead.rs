@@ -29,7 +29,7 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// What `lookahead` has found out about a problem and its likelihoods; clones share it. Nobody has
+/// The policy table of `lookahead` for a problem and its likelihoods, shared by clones. Nobody has
 /// to fill it, and it changes no decision: it saves making the same table in every run.
 #[derive(Clone, Debug, Default)]
 pub struct Foresight(Arc<OnceLock<Option<Arc<Table>>>>);

@@ -13,7 +13,7 @@ use crate::reason::{About, Cause, Promise, Reason};
 /// How much of the room around what is planned is tried, in halves of the share before.
 const HALVINGS: u32 = 4;
 
-/// How long actions that have used up their room may still take.
+/// The assumption about the remaining duration of overdue actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Overrun {
     /// However long.

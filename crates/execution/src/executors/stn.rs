@@ -67,7 +67,7 @@ impl Executor for Stn {
     }
 }
 
-/// Who decides how long an action takes to which the domain leaves that open.
+/// The party that chooses a duration which the domain leaves open.
 #[derive(Clone, Copy, Debug)]
 enum Open {
     /// The world, as long as the domain allows.

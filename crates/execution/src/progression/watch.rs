@@ -14,7 +14,7 @@ use super::polynomial::{Cell, cells};
 use super::{Progression, Underway, Unreadable};
 use crate::event::Ticket;
 
-/// Which moments after the present group are meant.
+/// A span of time after the present happening group.
 #[derive(Clone, Copy)]
 enum Span<'a> {
     /// All that come soon enough.
@@ -23,7 +23,7 @@ enum Span<'a> {
     Until(&'a Rational),
 }
 
-/// What does not hold in a span.
+/// The conditions that are violated in a span.
 #[derive(Default)]
 struct Lost {
     /// Parts of over-all conditions.

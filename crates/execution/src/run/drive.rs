@@ -10,7 +10,7 @@ use crate::reason::{About, Cause, Reason};
 use crate::record::Entry;
 use crate::world::{Passage, World, WorldError};
 
-/// What a run needs of the world next.
+/// The next request of a run to its driver.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
     /// To be given this command; then [`Run::next`] again.

@@ -11,7 +11,7 @@ use crate::record::Entry;
 /// How many seconds of the world's time cancelled actions have to stop when a run ends.
 pub const FAREWELL: i64 = 5;
 
-/// How a run ends, while what is running is told to stop.
+/// The closing phase of a run, while running actions are cancelled.
 pub(super) struct Closing {
     verdict: Verdict,
     dead_end: Vec<Reason>,

@@ -11,7 +11,7 @@ use crate::executor::{Amount, News, Planned};
 use crate::quantities;
 use crate::record::Entry;
 
-/// What is wrong with a report that is not taken at its word.
+/// The objection to a report that is ignored or corrected.
 type Remark = Option<&'static str>;
 
 impl Run<'_> {

@@ -8,7 +8,7 @@ use elbowroom_num::Rational;
 use super::account::ExecutedStep;
 use crate::reason::Reason;
 
-/// How to run.
+/// Settings of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSettings {
     /// What becomes of running actions when a new plan is made.
@@ -37,7 +37,7 @@ impl Default for RunSettings {
     }
 }
 
-/// What becomes of running actions when a new plan is made.
+/// The treatment of running actions when a new plan is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunningRule {
     /// They are cancelled, and the plan begins when they have stopped. What `ROSPlan` does.
@@ -79,7 +79,7 @@ impl FromStr for RunningRule {
     }
 }
 
-/// How long making a plan takes in the world.
+/// The planning time, as it passes in the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlanningTime {
     /// As long as the planner says it took.
@@ -151,7 +151,7 @@ impl Default for Patience {
     }
 }
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The goal is reached.
@@ -199,7 +199,7 @@ impl Verdict {
     }
 }
 
-/// What came of a run.
+/// The report on a finished run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// How it ended.

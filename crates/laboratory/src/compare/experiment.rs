@@ -51,7 +51,7 @@ pub struct Experiment {
     pub published: Vec<Published>,
 }
 
-/// Who makes plans.
+/// The planner of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Planning {
     /// The embedded planner.

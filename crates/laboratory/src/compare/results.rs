@@ -42,7 +42,7 @@ pub struct Results {
     pub pairs: Vec<Vec<Pair>>,
 }
 
-/// What came of the runs of one executor in one column.
+/// The results of one executor in one column.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {

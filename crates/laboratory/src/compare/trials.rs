@@ -37,7 +37,7 @@ pub(super) struct Setting<'a> {
     pub(super) pieces: usize,
 }
 
-/// What all trials of a problem have in common.
+/// The data shared by all trials of a problem.
 struct Common<'a> {
     task: Arc<Task>,
     first: TimeTriggeredPlan,

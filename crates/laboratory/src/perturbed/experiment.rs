@@ -74,7 +74,7 @@ pub enum WorldKind {
     AsPublished,
 }
 
-/// Who plans, at the beginning and after a plan was given up.
+/// The planner, for the first plan and for replanning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlannerKind {

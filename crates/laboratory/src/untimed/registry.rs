@@ -13,7 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Adaptable, AsPublished, Esterel, Foresighted, NoForesight, UntimedExecutor};
 
-/// What there is to know of an executor before there is one.
+/// The registry entry of an executor: name, documentation and constructor.
 #[derive(Clone, Copy)]
 pub struct Registered {
     /// Its name. What exists on a clock, too, has the same name there
@@ -27,7 +27,7 @@ pub struct Registered {
     make: fn(&Means<'_>) -> Result<Box<dyn UntimedExecutor>, NoForesight>,
 }
 
-/// What an executor may ask.
+/// The services that an executor may use.
 pub struct Means<'m> {
     /// The problem.
     pub task: Arc<Task>,

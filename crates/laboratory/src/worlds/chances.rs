@@ -8,7 +8,7 @@ use elbowroom_model::problem::{ObjectId, SchemaId};
 use elbowroom_probability::likelihoods::Missing;
 use elbowroom_probability::{Flip, Likelihoods};
 
-/// What is drawn in a perturbed world, and with which probabilities.
+/// The random events of a perturbed world, with their probabilities.
 #[derive(Clone, Debug)]
 pub struct Chances {
     /// How each fact changes by itself.

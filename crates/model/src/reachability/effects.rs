@@ -26,7 +26,7 @@ pub(super) enum List {
     End,
 }
 
-/// What effects have in common, discrete and continuous ones.
+/// The common form of discrete and continuous effects.
 struct Effect<'a> {
     variables: &'a [Variable],
     guard: &'a Guard,

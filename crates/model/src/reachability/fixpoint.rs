@@ -22,7 +22,7 @@ use crate::hash::Set;
 /// The objects for a schema's parameters.
 pub(super) type Arguments = Box<[ObjectId]>;
 
-/// What was reached.
+/// The reachable atoms and values.
 pub(super) struct Reachable<'a> {
     pub(super) relaxation: Relaxation<'a>,
     /// The arguments with which each schema can start.

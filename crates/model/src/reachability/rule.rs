@@ -26,7 +26,7 @@ pub(super) struct Rule<'a> {
     pub(super) tests: Vec<Test<'a>>,
 }
 
-/// What a rule concludes.
+/// The conclusion of a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Head {
     /// An action can start; if `and_end`, it can also end, and not otherwise start.

@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use crate::problem::{Expression, Fluent};
 
-/// What is known of an expression without knowing the time.
+/// The time-independent value of an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     /// This number, always.

@@ -22,7 +22,7 @@ pub(super) struct WaitingRoom {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ticket(usize);
 
-/// What is not possible yet.
+/// A rule instance that is not applicable yet.
 #[derive(Clone, Debug)]
 pub(super) enum Pending {
     /// A binding of a rule (by position) whose tests are not all possible.

@@ -11,7 +11,7 @@ use crate::derivation::{Moment, holds};
 use crate::ground::{Condition, Expression, FactId};
 use crate::task::Task;
 
-/// What an explanation draws on.
+/// The data that an explanation uses.
 pub(super) struct Witness<'a> {
     pub(super) task: &'a Task,
     /// Numbers at the moment in question.

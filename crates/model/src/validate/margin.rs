@@ -11,7 +11,7 @@ use super::violation::{ActionInstance, When};
 use crate::ground::{Condition, Expression};
 use crate::problem::Comparison;
 
-/// How close one comparison of one action, or of the goal, came to failing.
+/// The margin by which a comparison of an action or of the goal holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Margin {
     /// The action; `None` for the goal.

@@ -23,7 +23,7 @@ pub(super) struct Piece<'a> {
     pub(super) slack: &'a Rational,
 }
 
-/// Where a condition stops being true; times count from the beginning of the piece.
+/// The moment at which a condition stops being true; times count from the beginning of the piece.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Break {
     /// The earliest moment of falsehood, or the latest number known not to be above it.
@@ -210,7 +210,7 @@ struct Cell {
     is_last: bool,
 }
 
-/// Where one looks.
+/// A position within a piece.
 #[derive(Clone)]
 enum Place {
     Point(Rational),

@@ -31,7 +31,7 @@ impl Stop {
     }
 }
 
-/// What is being read, and when.
+/// The expression being evaluated, and its moment.
 pub(super) struct Place<'a> {
     time: &'a Rational,
     step: Option<usize>,

@@ -10,7 +10,7 @@ use crate::situation::Situation;
 use crate::state::TimedHappening;
 use crate::task::Task;
 
-/// What a happening is.
+/// The event of a happening.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum What<'a> {
     /// The start of the plan's step of this position.

@@ -38,7 +38,7 @@ impl ActionInstance {
     }
 }
 
-/// What can be wrong.
+/// A kind of violation.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mistake {
     /// An action starts before the plan begins, at this time.
@@ -115,7 +115,7 @@ pub enum Mistake {
     },
 }
 
-/// Which condition of an action, or the goal.
+/// The condition of an action, by its time specifier, or the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum When {
     /// Of an instantaneous action.
@@ -170,7 +170,7 @@ pub struct Occurrence {
     pub action: Option<ActionInstance>,
 }
 
-/// What of an action a happening is.
+/// The part of an action that a happening is: its start, its end, or all of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Point {
     /// The start of a durative action.
@@ -192,7 +192,7 @@ pub struct Undecided {
     pub difficulty: Difficulty,
 }
 
-/// What keeps the judge from judging.
+/// The reason why the validator cannot evaluate a condition.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difficulty {
     /// A number is left open.

@@ -25,7 +25,7 @@ use crate::file::{Format, NetworkFile};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// What stands under a heading.
+/// The section that a line belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Section {
     Kind,
@@ -35,7 +35,7 @@ enum Section {
     Links,
 }
 
-/// What is counted.
+/// A count in the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum What {
     Points,
@@ -65,7 +65,7 @@ impl Section {
     }
 }
 
-/// What was read so far.
+/// The state of the reader.
 struct Reader {
     builder: Builder,
     /// How many time points, edges and links the file says it has, and where it does.

@@ -13,7 +13,7 @@ pub enum Optimum {
     Value(Delta),
 }
 
-/// How far a variable can go before some variable meets a bound.
+/// The largest step of a variable before some variable meets a bound.
 enum Limit {
     None,
     /// By so far; then it meets its own other bound.

@@ -13,7 +13,7 @@ use crate::syntax::Node;
 /// Most text that is copied, over all effects, because it stands around more than one of them.
 const MOST_COPIED: usize = 20_000_000;
 
-/// When an effect happens.
+/// The time at which an effect takes place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moment {
     /// In an instantaneous action.

@@ -15,7 +15,7 @@ use crate::syntax::Node;
 /// The place in the list of initial values of each fluent that has one.
 type Valued = BTreeMap<(FunctionId, Vec<ObjectId>), usize>;
 
-/// What a timed change is about.
+/// The subject of a timed initial.
 #[derive(PartialEq)]
 enum Subject<'a> {
     Fact(PredicateId, &'a [ObjectId]),

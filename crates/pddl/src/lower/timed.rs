@@ -9,7 +9,7 @@ use crate::lower::scope::Scope;
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// When a part of a durative action is read or done.
+/// The time specifier of a part of a durative action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Time {
     Start,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// What a line of a planner's log is, for programs that read a log while it is being written.
+/// The kind of a line of a planner's log, for programs that read a log while it is being written.
 ///
 /// A plan is a run of [`LineKind::Timed`] and [`LineKind::Broken`] lines, perhaps with blank ones
 /// between; separators and noise end it. [`read_plan`](crate::read_plan) reads such a run.
@@ -36,7 +36,7 @@ impl LineKind {
     }
 }
 
-/// What a line is.
+/// The kind of a line.
 #[derive(Debug, PartialEq)]
 pub(super) enum Line<'s> {
     /// Nothing, or a comment that says nothing.

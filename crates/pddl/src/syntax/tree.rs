@@ -16,7 +16,7 @@ pub(crate) struct Node<'s> {
     pub(crate) kind: Kind<'s>,
 }
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Debug)]
 pub(crate) enum Kind<'s> {
     Word(&'s str),

@@ -59,7 +59,7 @@ pub(super) enum Quantity {
     Fluent(FluentId),
 }
 
-/// What happenings do to a quantity; a set of bits.
+/// The uses of a quantity by happenings, as a bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Use(u8);
 

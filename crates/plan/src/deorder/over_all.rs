@@ -136,7 +136,7 @@ fn overlap_in_part(
     time(second.0) < time(first) && time(first) < time(second.1)
 }
 
-/// What an action reads throughout, besides what decides its conditional effects.
+/// The over-all conditions of an action, without those of its conditional effects.
 #[derive(Default)]
 struct Required {
     /// Basic facts, and whether they must be true.

@@ -5,7 +5,7 @@ use elbowroom_text::{Report, Source};
 
 use super::tokens::{Span, Token, tokens};
 
-/// What an STN plan file says, by kind of item.
+/// The contents of an STN plan file, by kind of item.
 #[derive(Debug, Default)]
 pub(super) struct File<'a> {
     pub(super) parameters: Vec<ParameterItem<'a>>,

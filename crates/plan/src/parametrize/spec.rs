@@ -25,7 +25,7 @@ pub struct VarySpec {
     pub range: Option<(Option<Rational>, Option<Rational>)>,
 }
 
-/// Which quantities a [`VarySpec`] leaves open.
+/// The quantities that a [`VarySpec`] leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// The durations of all durative instances.

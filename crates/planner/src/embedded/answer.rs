@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use super::compile::Unsupported;
 use super::tuning::Tuning;
 
-/// How to plan.
+/// Settings of the planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// About how many bytes the search may keep. When they are used up, the search ends as if it
@@ -21,7 +21,7 @@ pub struct Settings {
     pub tuning: Tuning,
 }
 
-/// What makes a plan better than another.
+/// The objective by which plans are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Objective {
     /// The problem's metric where it has one that can be evaluated, else the makespan. Of plans of
@@ -44,7 +44,7 @@ impl Default for Settings {
     }
 }
 
-/// How far the search is.
+/// Progress of the search.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// What is being done.
@@ -58,7 +58,7 @@ pub struct Progress {
     pub best: Option<Rational>,
 }
 
-/// What the planner is doing.
+/// The phase of the search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Phase {
     /// Finding out which actions are possible at all.

@@ -49,7 +49,7 @@ pub(crate) struct Stepper<'a> {
     pub(crate) has_rounded: bool,
 }
 
-/// What the network does not say of its nodes, whose times are rounded to ticks.
+/// The exact data of a network's nodes, whose times are rounded to ticks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Log {
     /// For each end of an action its node, that of its start if it started in the plan, and the

@@ -119,7 +119,7 @@ pub(crate) struct Conditional {
     pub(crate) change: Change,
 }
 
-/// What a conditional effect does.
+/// The change of a conditional effect.
 #[derive(Clone, Debug)]
 pub(crate) enum Change {
     Add(u32),
@@ -170,7 +170,7 @@ pub(crate) enum Compressibility {
     Safe,
 }
 
-/// How long an action may take.
+/// The duration bounds of an action.
 #[derive(Clone, Debug)]
 pub(crate) struct Duration {
     /// The constant bounds.

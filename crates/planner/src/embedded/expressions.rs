@@ -30,7 +30,7 @@ pub(crate) struct Symbolic {
     pub(crate) demands: Vec<(Form, Comparison)>,
 }
 
-/// When something is read: the time, and the duration of the action that reads.
+/// The moment of evaluation: the time, and the duration of the evaluating action.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Moment {
     pub(crate) time: Form,

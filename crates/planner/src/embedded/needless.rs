@@ -52,7 +52,7 @@ pub(super) fn without_needless(
     left
 }
 
-/// What a step does.
+/// The effects of a step.
 struct Added {
     /// The facts that it makes true.
     facts: BTreeSet<FactId>,

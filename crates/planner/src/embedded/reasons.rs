@@ -13,7 +13,7 @@ use super::time::Ticks;
 /// The most deadlines that are looked at one by one.
 const MOST_SUSPECTS: usize = 24;
 
-/// What the parts of a proof are called.
+/// The names used in a proof.
 #[derive(Debug)]
 pub(crate) struct Names {
     /// By position in [`Compiled::facts`]; empty where no proof mentions it.

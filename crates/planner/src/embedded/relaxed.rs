@@ -41,7 +41,7 @@ const UNREACHED: u32 = u32::MAX;
 /// No operator: true in the state.
 const NO_OPERATOR: u32 = u32::MAX;
 
-/// What one evaluation found.
+/// The result of one heuristic evaluation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Estimate {
     /// How many steps the relaxed plan has; what they cost, in a weighing search.

@@ -390,7 +390,7 @@ fn share(search: &Search<'_>, budget: u64, compiled: &Compiled) -> u64 {
     }
 }
 
-/// How a share of a search ended.
+/// The reason why a share of a search ended.
 enum Outcome {
     Stop(Stopped),
     /// With a better plan, where the metric decides.

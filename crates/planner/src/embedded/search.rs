@@ -92,7 +92,7 @@ struct Node {
     progress: Option<Box<Progress>>,
 }
 
-/// What the stronger bound says of a state.
+/// The stronger bound's verdict on a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DeadEnd {
     /// It was not asked.
@@ -105,7 +105,7 @@ enum DeadEnd {
 
 const ROOT: u32 = u32::MAX;
 
-/// What a turn of the search brought.
+/// The result of one expansion step of the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Turn {
     /// The choices that lead to a state in which the goal holds.

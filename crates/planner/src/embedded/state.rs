@@ -298,7 +298,7 @@ pub(crate) struct Projection {
     rows: Vec<Row>,
 }
 
-/// What one start under way pushes.
+/// The distances from one pending start.
 #[derive(Clone, Debug)]
 struct Row {
     earliest: Ticks,

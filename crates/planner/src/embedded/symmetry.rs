@@ -112,7 +112,7 @@ struct Finder<'a> {
     budget: usize,
 }
 
-/// Where facts, fluents and actions go when two objects change places.
+/// The permutation of facts, fluents and actions under a swap of two objects.
 struct Images {
     facts: Vec<u32>,
     fluents: Vec<u32>,

@@ -15,7 +15,7 @@ const FINEST: i128 = 10_000_000_000;
 /// third of a unit.
 const ROUNDED: i64 = 3_000_000;
 
-/// How many ticks make a unit of time.
+/// The time grid: ticks per unit of time.
 ///
 /// The grid is chosen so that all times and constant durations that the problem mentions lie on
 /// it. Where that is impossible, or a duration that depends on the state falls between two ticks,

@@ -91,7 +91,7 @@ impl Member {
     ];
 }
 
-/// What cannot be set.
+/// An error in a tuning setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TuningError {
     /// There is no constant, technique or search of that name.

@@ -3,7 +3,7 @@
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId, Variable};
 use elbowroom_text::nearest;
 
-/// What is wrong with a name, and what to do.
+/// The error message for a name, and advice.
 pub(super) type Objection = (String, Option<String>);
 
 fn did_you_mean<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<String> {

@@ -1,6 +1,6 @@
 //! A joint distribution over a few facts that a condition has coupled.
 
-/// How an effect changes the probability of a fact.
+/// The transition probabilities of a fact under an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kernel {
     /// P(true after | true before).

@@ -20,7 +20,7 @@ pub(crate) use snapshot::Snapshot;
 /// How many facts a cluster can have: 2^16 numbers.
 pub(super) const MOST_COUPLED: usize = 16;
 
-/// What is known of a fact.
+/// The belief about a fact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Record {
     /// The layer at which `p` is right; for a coupled fact, its cluster knows.

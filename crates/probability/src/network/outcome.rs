@@ -24,7 +24,7 @@ impl From<&FactEffect> for Outcome {
     }
 }
 
-/// What happens besides guarded effects.
+/// The part of a step other than guarded effects.
 pub(super) struct Pending {
     /// Unconditional effects on other facts.
     pub(super) apart: Vec<Outcome>,

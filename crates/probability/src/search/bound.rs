@@ -23,7 +23,7 @@ use super::separations::Separations;
 use crate::model::{Event, Model, Requirement, Semantics};
 use crate::network::PrunedNetwork;
 
-/// What the bound needs to know of a model, once for all searches.
+/// The data of a model that the bound uses, computed once for all searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Bounds {
     /// For each fact, the instances that change it: `None` for timed initials.
@@ -37,7 +37,7 @@ pub(crate) struct Bounds {
     goal: Vec<(usize, bool)>,
 }
 
-/// What no way to go on can exceed.
+/// An upper bound for all completions of a sequence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     /// P(A ∩ G) is at most this.
@@ -228,7 +228,7 @@ impl Bounds {
     }
 }
 
-/// How many ends are needed, and how many of them belong to actions under way.
+/// The number of required action ends, and how many of them belong to running actions.
 #[derive(Clone, Copy)]
 struct Queue {
     running: usize,

@@ -73,7 +73,7 @@ impl Cache {
     }
 }
 
-/// What was found at another time.
+/// A cached result of an earlier search.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     order: Option<TotalOrderPlan>,

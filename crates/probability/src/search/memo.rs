@@ -49,7 +49,7 @@ struct Entry {
     room: Option<Room>,
 }
 
-/// Which truth of which facts matters to what.
+/// The facts, with truth values, on which conditions depend.
 #[derive(Clone, Debug)]
 struct Needs {
     /// By instance: its start and middle; its middle and end.

@@ -8,7 +8,7 @@ use elbowroom_plan::{LinkKind, Node, NodeId};
 use crate::circumstances::Running;
 use crate::model::Model;
 
-/// What the temporal constraints of a plan are, once for all searches.
+/// The temporal constraints of a plan, computed once for all searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Separations {
     pub(crate) epsilon: Rational,

@@ -14,7 +14,7 @@ use elbowroom_plan::{InstanceId, NodeId};
 use super::Layer;
 use crate::model::{Event, Model, Requirement, is_fact};
 
-/// What is needed in one layer.
+/// The regressed conditions of one layer.
 #[derive(Clone, Debug, Default)]
 struct Needed {
     literals: BTreeSet<(usize, bool)>,

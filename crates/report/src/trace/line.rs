@@ -137,7 +137,7 @@ pub struct DecidedLine {
     pub reason: ReasonLine,
 }
 
-/// What was decided.
+/// A decision, as a trace has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum DecisionLine {
@@ -176,7 +176,7 @@ pub struct OrderLine {
     pub planned: WindowLine,
 }
 
-/// When a happening is planned.
+/// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WindowLine {
@@ -282,7 +282,7 @@ pub struct ObservedLine {
     pub remark: Option<String>,
 }
 
-/// What the world reported.
+/// An observation, as a trace has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ObservationLine {
@@ -350,7 +350,7 @@ pub struct PlanningLine {
     pub situation: SituationLine,
 }
 
-/// Where a plan begins.
+/// The state in which a plan begins.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SituationLine {
@@ -401,7 +401,7 @@ pub struct InterruptedLine {
     pub now: Exact,
 }
 
-/// What came of a run.
+/// The report on a finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReportLine {
     /// How it ended: [`Verdict::name`](elbowroom_execution::run::Verdict::name).

@@ -275,7 +275,7 @@ fn instantiate(name: &str, task: &Task) -> Result<elbowroom_model::ground::Actio
         .map_err(|error| error.to_string())
 }
 
-/// Where a replay differs from its trace.
+/// The first difference between a replay and its trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     /// The line of the trace, from 1 on.

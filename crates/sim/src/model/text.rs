@@ -378,7 +378,7 @@ impl Reader<'_> {
     }
 }
 
-/// What becomes of a fact, or of a fluent; `None` is no number.
+/// The new value of a fact or a fluent; `None` if it is not a number.
 enum Becomes {
     Truth(bool),
     Value(Option<Rational>),

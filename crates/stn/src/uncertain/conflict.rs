@@ -5,7 +5,7 @@ use elbowroom_num::Rational;
 use super::{Extended, LinkId};
 use crate::{ConstraintId, NodeId, Weight};
 
-/// What one step of a [`Conflict`] goes by.
+/// The ground of one step of a [`Conflict`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Ground {
     /// A requirement.

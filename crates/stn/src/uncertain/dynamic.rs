@@ -66,7 +66,7 @@ impl<W: Weight> UncertainNetwork<W> {
     }
 }
 
-/// How far the search has come with a node.
+/// The search state of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
     New,

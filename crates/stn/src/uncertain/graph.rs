@@ -18,7 +18,7 @@ pub(super) struct Edge<W> {
     pub(super) origin: Origin,
 }
 
-/// When an edge holds.
+/// The label of an edge: the case in which it holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Always.
@@ -29,7 +29,7 @@ pub(super) enum Kind {
     Upper(LinkId),
 }
 
-/// Where an edge comes from.
+/// The origin of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Origin {
     Requirement(ConstraintId),

@@ -26,7 +26,7 @@ pub struct Recheck<W> {
     fresh: usize,
 }
 
-/// What was known of a node before it was dealt with again.
+/// The earlier result for a node that is processed again.
 struct Before {
     node: NodeId,
     found: Vec<EdgeId>,

@@ -194,7 +194,7 @@ impl Spoiler {
     }
 }
 
-/// What is left of a network.
+/// The remaining part of a network.
 enum Rest<W> {
     /// Something has happened that cannot be made good.
     Lost,

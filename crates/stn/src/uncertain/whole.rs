@@ -15,7 +15,7 @@ pub struct WholeNetwork {
     pub unit: Unit,
 }
 
-/// What the whole numbers of a [`WholeNetwork`] are numbers of.
+/// The unit of the whole numbers of a [`WholeNetwork`].
 #[derive(Clone, Copy, Debug)]
 pub struct Unit {
     denominator: CommonDenominator,

@@ -22,7 +22,7 @@ pub(super) struct Watch {
     best: Option<Worth>,
 }
 
-/// What the last plan is worth.
+/// Makespan and metric of the last plan.
 struct Worth {
     makespan: Rational,
     metric: Option<Rational>,

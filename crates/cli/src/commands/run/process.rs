@@ -28,7 +28,7 @@ const OBEDIENCE: Duration = Duration::from_secs(5);
 /// How often it is looked whether the user has asked to end.
 const GLANCE: Duration = Duration::from_millis(50);
 
-/// How the program is treated.
+/// Limits on the behaviour of the program.
 pub(super) struct Manners {
     /// How long it may take over one answer, in seconds.
     pub(super) patience: Rational,

@@ -18,7 +18,7 @@ use elbowroom::num::Rational;
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 
-/// How the time of a world passes: `factor` of its seconds in one of the wall clock's.
+/// A simulated clock that runs `factor` times as fast as the wall clock.
 pub(super) struct Pace {
     clock: Clock,
     factor: Rational,

@@ -14,7 +14,7 @@ use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
 
-/// How far each quantity may deviate, or why that cannot be said.
+/// A robustness envelope, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeAnswer {
     /// Always the same.
@@ -43,7 +43,7 @@ pub enum EnvelopeFormat {
     Envelope,
 }
 
-/// How an answer was found.
+/// The settings with which an envelope was computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EnvelopeSettings {
     /// How boxes were looked for.
@@ -62,7 +62,7 @@ pub struct EnvelopeSettings {
     pub sharpen: bool,
 }
 
-/// What was found.
+/// The result of a search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "answer", rename_all = "lowercase")]
 pub enum EnvelopeFinding {
@@ -109,7 +109,7 @@ pub enum EnvelopeFinding {
     },
 }
 
-/// How a plan fails even if everything goes as planned.
+/// The reason why a plan fails even if nothing deviates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Failing {
@@ -170,7 +170,7 @@ pub struct Room {
     pub upper_limit: Option<String>,
 }
 
-/// Which sort of quantity a parameter is.
+/// The kind of quantity that a parameter stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum QuantityKind {
@@ -234,7 +234,7 @@ pub enum MovedEnd {
     Upper(End),
 }
 
-/// What can go wrong, with an example.
+/// A violated requirement, with values and a schedule that violate it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counterexample {
     /// What goes wrong, in words.
@@ -254,7 +254,7 @@ pub struct Counterexample {
     pub plays: Vec<String>,
 }
 
-/// When an action starts and ends.
+/// The start and end times of an action in a schedule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Happening {
     /// The label of the action's instance.
@@ -268,7 +268,7 @@ pub struct Happening {
     pub end: Option<Exact>,
 }
 
-/// When the plan is done, with everything started as early as possible.
+/// Makespans of the earliest schedules.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Makespans {
     /// With all quantities at their nominal values.

@@ -16,7 +16,7 @@ use crate::flow::FlowError;
 /// In sums of widths an end counts up to that many times the nominal value.
 const CAP: i64 = 10;
 
-/// How much larger the envelope would be for an executor that knows values in advance.
+/// The gain of knowing values in advance: the weak envelope compared with the dynamic one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Foresight {
     /// The quantities that one would have to know in advance, by name.

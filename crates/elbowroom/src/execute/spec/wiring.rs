@@ -227,7 +227,7 @@ impl RunSpec {
     }
 }
 
-/// Who plans.
+/// The planner of a run.
 enum Whom {
     Embedded,
     Nobody,

@@ -20,7 +20,7 @@ pub(super) struct Expected {
     pub(super) is_goal_possible: bool,
 }
 
-/// What is possible so far.
+/// The atoms found to be possible so far.
 #[derive(Clone, PartialEq)]
 struct Possible {
     ever_true: BTreeSet<FactId>,

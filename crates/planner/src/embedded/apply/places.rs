@@ -7,7 +7,7 @@ use super::super::time::{NEVER, Ticks};
 use super::super::tuning::Technique;
 use super::Stepper;
 
-/// When a happening may be.
+/// The time window of a happening, and the nodes that it must follow.
 pub(super) struct Place {
     pub(super) earliest: Ticks,
     pub(super) latest: Ticks,

@@ -36,7 +36,7 @@ pub(crate) enum Failure {
     Stopped,
 }
 
-/// What is asked for.
+/// The compilation's input besides the problem.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted<'a> {
     /// Where plans begin.

@@ -115,8 +115,7 @@ fn opposite(literal: Literal) -> Literal {
     Literal::new(literal.fact(), !literal.truth())
 }
 
-/// What one action contributes to the graph: it follows what it needs, and comes before what it
-/// gives.
+/// The edges of one action in the graph: it follows what it needs, and comes before what it gives.
 #[derive(Clone, Debug, Default)]
 struct Uses {
     needs: Vec<Literal>,

@@ -3,7 +3,7 @@
 use super::{Action, Change, Compressibility, Snap};
 use crate::embedded::formula::{Formula, Literal};
 
-/// Which actions need a literal.
+/// The actions that need a literal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Readers {
     None,

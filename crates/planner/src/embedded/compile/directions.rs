@@ -33,7 +33,7 @@ impl Direction {
     }
 }
 
-/// Where one happening may shift fluents.
+/// The directions in which a happening may change fluents.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shifts(Map<FluentId, Direction>);
 

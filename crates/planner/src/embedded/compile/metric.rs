@@ -18,7 +18,7 @@ use super::symbols::Symbols;
 use super::{Action, Change, Snap, Timed, Update};
 use crate::embedded::formula::{Linear, Numeric};
 
-/// What a plan shall have little of. What is to be maximized is negated here.
+/// The metric, to be minimized. What is to be maximized is negated here.
 #[derive(Clone, Debug)]
 pub(crate) struct Metric {
     /// The part that is read off `State::values`.

@@ -9,7 +9,7 @@ use super::NONE;
 use crate::embedded::formula::{Formula, Linear, Literal, Numeric, Test};
 use crate::embedded::hash::Map;
 
-/// What has been numbered so far.
+/// The facts, fluents and tests numbered so far.
 #[derive(Debug)]
 pub(super) struct Symbols {
     pub(super) facts: Vec<FactId>,

@@ -5,7 +5,7 @@ use super::super::formula::{Formula, Literal};
 use super::super::relaxed::Graph;
 use super::super::time::Ticks;
 
-/// What an operator stands for.
+/// The happening that an operator stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// An action starts, or happens if it takes no time.

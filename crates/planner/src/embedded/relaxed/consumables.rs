@@ -82,7 +82,7 @@ pub(crate) fn consumables(compiled: &Compiled) -> Vec<Consumable> {
     consumables.collect()
 }
 
-/// What the steps of a relaxed plan draw on.
+/// The consumable resources that the steps of a relaxed plan use.
 #[derive(Debug, Default)]
 pub(super) struct Consumables {
     list: Vec<Consumable>,

@@ -16,7 +16,7 @@ pub(crate) use super::numbers::Gain;
 use envelopes::{Stay, Stays};
 pub(crate) use timetables::Window;
 
-/// What an operator stands for.
+/// The happening that an operator stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Start(u32),

@@ -31,7 +31,7 @@ fn repetitions(gap: f64, gain: f64) -> Option<u32> {
     Some(times)
 }
 
-/// What a happening does to a test.
+/// The effect of a happening on a numeric test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Gain {
     /// It adds a constant to the test's difference.

@@ -23,7 +23,7 @@ struct Resource {
     feeds: Vec<(u32, f64)>,
 }
 
-/// What is missing in a relaxed plan.
+/// A shortage of a resource in a relaxed plan.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shortage {
     /// An operator that fills it up.

@@ -25,7 +25,7 @@ pub(super) struct Novelty {
     relaxed_plans: Vec<Vec<Literal>>,
 }
 
-/// How far the way to a state has come.
+/// Progress along the path to a state.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
     goals_left: u32,

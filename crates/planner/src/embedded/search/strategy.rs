@@ -40,7 +40,7 @@ pub(crate) enum NoveltyOf {
     Successors,
 }
 
-/// What a search looks for.
+/// The aim of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aim {
     /// A plan, whatever its metric, and then shorter ones. The nearest goal comes first.

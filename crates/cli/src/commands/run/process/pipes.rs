@@ -13,14 +13,14 @@ pub(super) const LONGEST_LINE: usize = 1 << 20;
 /// So many bytes may wait to be read, and so many may be said in one answer.
 pub(super) const LONGEST_ANSWER: usize = 16 << 20;
 
-/// What a program says on its standard output.
+/// The reader of a program's standard output.
 pub(super) struct Ears {
     lines: Receiver<Heard>,
     /// How many bytes have come that nobody has taken yet.
     waiting: Arc<AtomicUsize>,
 }
 
-/// What came of listening.
+/// The result of waiting for a line.
 pub(super) enum Heard {
     /// A line, without what is no UTF-8.
     Line(String),
@@ -86,13 +86,13 @@ fn listen(mut reader: impl BufRead, sender: &Sender<Heard>, waiting: &AtomicUsiz
     }
 }
 
-/// What a program is told on its standard input, which is closed when this is dropped.
+/// The writer to a program's standard input, which is closed when this is dropped.
 pub(super) struct Mouth {
     lines: Sender<String>,
     written: Receiver<io::Result<()>>,
 }
 
-/// What came of telling.
+/// The result of writing a line.
 pub(super) enum Told {
     /// It is written; whether it is read, nobody knows.
     Yes,
