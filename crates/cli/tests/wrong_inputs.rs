@@ -201,37 +201,44 @@ fn a_text_where_a_number_belongs_is_told_in_words() {
     assert!(!said.contains("u64"), "{said}");
 }
 
-/// Wagons that are shunted between many tracks: no plan is found in a megabyte.
+/// The sliding-tile puzzle with two tiles exchanged: no plan exists, and finding that out takes more
+/// than a megabyte.
 #[test]
 fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
-    let tracks: Vec<String> = (0..12).map(|n| format!("t{n}")).collect();
-    let wagons: Vec<String> = (0..10).map(|n| format!("w{n}")).collect();
     let domain = Temporary::new(
-        "shunting-domain.pddl",
-        "(define (domain shunting)
+        "tiles-domain.pddl",
+        "(define (domain tiles)
            (:requirements :typing :durative-actions)
-           (:types track wagon)
-           (:predicates (on ?w - wagon ?t - track) (free ?t - track))
-           (:durative-action shunt
-             :parameters (?w - wagon ?from ?to - track)
+           (:types cell tile)
+           (:predicates (on ?t - tile ?c - cell) (empty ?c - cell) (beside ?a ?b - cell))
+           (:durative-action slide
+             :parameters (?t - tile ?from ?to - cell)
              :duration (= ?duration 1)
-             :condition (and (at start (on ?w ?from)) (at start (free ?to)))
-             :effect (and (at start (not (on ?w ?from))) (at start (not (free ?to)))
-                          (at end (on ?w ?to)) (at end (free ?from)))))",
+             :condition (and (at start (on ?t ?from)) (at start (empty ?to))
+                             (at start (beside ?from ?to)))
+             :effect (and (at start (not (on ?t ?from))) (at start (not (empty ?to)))
+                          (at end (on ?t ?to)) (at end (empty ?from)))))",
     );
-    let on: Vec<String> = (0..10).map(|n| format!("(on w{n} t{n})")).collect();
-    let goal: Vec<String> = (0..10).map(|n| format!("(on w{n} t{})", 9 - n)).collect();
+    let mut beside = String::new();
+    for (a, b) in (0..9).flat_map(|a| (0..9).map(move |b| (a, b))) {
+        let distance = i32::abs(a / 3 - b / 3) + i32::abs(a % 3 - b % 3);
+        if distance == 1 {
+            beside += &format!(" (beside c{a} c{b})");
+        }
+    }
+    let on = |cells: [u8; 8]| {
+        let on = cells.iter().enumerate();
+        on.map(|(tile, cell)| format!(" (on t{tile} c{cell})")).collect::<String>()
+    };
     let problem = Temporary::new(
-        "shunting-problem.pddl",
+        "tiles-problem.pddl",
         &format!(
-            "(define (problem yard) (:domain shunting)
-               (:objects {} - track {} - wagon)
-               (:init {} (free t10) (free t11))
-               (:goal (and {})))",
-            tracks.join(" "),
-            wagons.join(" "),
-            on.join(" "),
-            goal.join(" ")
+            "(define (problem exchanged) (:domain tiles)
+               (:objects c0 c1 c2 c3 c4 c5 c6 c7 c8 - cell t0 t1 t2 t3 t4 t5 t6 t7 - tile)
+               (:init (empty c8){beside}{})
+               (:goal (and{})))",
+            on([0, 1, 2, 3, 4, 5, 6, 7]),
+            on([1, 0, 2, 3, 4, 5, 6, 7]),
         ),
     );
     let output = elbowroom(&["plan", domain.name(), problem.name(), "--memory", "1"]);
