@@ -49,7 +49,11 @@ impl Drop for Temporary {
 /// What the command says on standard error when it ends with this exit code.
 fn said(code: i32, arguments: &[&str]) -> String {
     let output = elbowroom(arguments);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {output:?}");
+    assert_eq!(
+        output.status.code(),
+        Some(code),
+        "{arguments:?}: {output:?}"
+    );
     String::from_utf8(output.stderr).expect("text")
 }
 
@@ -90,10 +94,7 @@ fn the_shortfall_of_a_box_is_the_same_everywhere() {
 
 #[test]
 fn a_rate_of_continuous_change_is_varied_through_the_fluent_that_says_it() {
-    let said = said(
-        2,
-        &envelope(&TANK, &["--vary", "constant drain level"]),
-    );
+    let said = said(2, &envelope(&TANK, &["--vary", "constant drain level"]));
     assert!(said.contains("`initial (outflow barrel)`"), "{said}");
 }
 
@@ -136,7 +137,10 @@ fn files_in_the_wrong_order_are_recognised() {
     let plan_first = said(2, &["check", domain, plan, problem]);
     assert!(plan_first.contains("it looks like a plan"), "{plan_first}");
     let problem_first = said(2, &["check", problem, domain]);
-    assert!(problem_first.contains("in the wrong order?"), "{problem_first}");
+    assert!(
+        problem_first.contains("in the wrong order?"),
+        "{problem_first}"
+    );
 }
 
 #[test]
@@ -184,7 +188,10 @@ fn numbers_below_zero_are_taken_for_values_and_not_for_options() {
         vec!["plan", DELIVERY[0], DELIVERY[1], "--memory", "-1"],
     ] {
         let said = said(2, &arguments);
-        assert!(!said.contains("unexpected argument"), "{arguments:?}: {said}");
+        assert!(
+            !said.contains("unexpected argument"),
+            "{arguments:?}: {said}"
+        );
         assert!(said.contains("-1"), "{arguments:?}: {said}");
     }
 }
@@ -228,7 +235,8 @@ fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     }
     let on = |cells: [u8; 8]| {
         let on = cells.iter().enumerate();
-        on.map(|(tile, cell)| format!(" (on t{tile} c{cell})")).collect::<String>()
+        on.map(|(tile, cell)| format!(" (on t{tile} c{cell})"))
+            .collect::<String>()
     };
     let problem = Temporary::new(
         "tiles-problem.pddl",

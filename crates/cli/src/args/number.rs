@@ -17,9 +17,8 @@ pub(super) fn positive(text: &str) -> Result<Rational, String> {
 
 /// A count or a seed.
 pub(super) fn whole(text: &str) -> Result<u64, String> {
-    text.parse().map_err(|_| {
-        format!("it must be a whole number from 0 to {}", u64::MAX)
-    })
+    text.parse()
+        .map_err(|_| format!("it must be a whole number from 0 to {}", u64::MAX))
 }
 
 /// A count that can be held in memory.

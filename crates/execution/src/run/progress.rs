@@ -52,10 +52,12 @@ impl Progress {
         if self.answers <= most {
             return Ok(());
         }
-        let hint = self.unintelligible.as_ref().map_or_else(
-            String::new,
-            |(said, why)| format!("; what it said last could not be understood: `{said}`: {why}"),
-        );
+        let hint = self
+            .unintelligible
+            .as_ref()
+            .map_or_else(String::new, |(said, why)| {
+                format!("; what it said last could not be understood: `{said}`: {why}")
+            });
         Err(format!(
             "its clock stands still: {most} answers have brought it from {} to {} only; when \
              nothing happens, time must pass until the moment that was asked for{hint}",
