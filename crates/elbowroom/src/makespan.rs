@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{Node, ParametrizedPlan, Valuation};
 use elbowroom_stn::{ConsistentNetwork, NodeId};
 
-/// When the last action ends if everything starts as early as it can and the parameters have
+/// The end time of the last action if everything starts as early as it can and the parameters have
 /// these values; `None` if the plan has no schedule then.
 pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Rational> {
     let network = ConsistentNetwork::try_from(plan.plan.network(valuation)).ok()?;

@@ -40,7 +40,7 @@ pub struct Widening<'a> {
     pub envelope: &'a DecoupledEnvelope,
     /// Which end moved.
     pub end: BoxEnd,
-    /// How many boxes had been checked by then.
+    /// The number of boxes checked by then.
     pub checks: usize,
 }
 
@@ -58,7 +58,7 @@ pub enum StopReason {
     Undecided,
 }
 
-/// How many boxes may be undecided before a search ends: each took long.
+/// The number of boxes that may be undecided before a search ends: each took long.
 const MOST_UNDECIDED: usize = 4;
 
 /// The reason why one end of the final box cannot move.
@@ -86,7 +86,7 @@ pub struct IrrRun {
     pub envelope: Result<DecoupledEnvelope, Objection>,
     /// How many times the box grew.
     pub widenings: usize,
-    /// How many boxes were checked.
+    /// The number of boxes checked.
     pub checks: usize,
     /// Why the search ended.
     pub stop: StopReason,

@@ -1,17 +1,17 @@
-//! Which deviations a plan survives (paper 1).
+//! Robustness envelopes: the deviations under which a plan still works (Cashmore et al., 2020).
 //!
 //! In: a [`ParametrizedPlan`](elbowroom_plan::ParametrizedPlan). Out: a box of parameter values,
 //! the *decoupled envelope*, in which the plan is guaranteed to work.
 //!
-//! - [`mod@obligations`]: what every schedule of a plan must satisfy.
-//! - [`mod@soundness`]: whether every schedule for every value in a box satisfies it.
-//! - [`Guarantee`]: what else is asked of a box: that the plan can be scheduled, and by whom.
+//! - [`mod@obligations`]: the requirements on every schedule of a plan.
+//! - [`mod@soundness`]: the check that every schedule for every value in a box satisfies them.
+//! - [`Guarantee`]: the controllability that is required in a box: weak, dynamic or strong.
 //! - [`Oracle`]: the exact box check (Algorithm 1's CHECKINENVELOPE), both together.
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
-//! - [`Objection`]: why a box is not inside, with values and a schedule that show it.
+//! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
-//! Only crates that may ask a solver can import this one: linear programs and minimum cost flows
-//! are solved here, and nothing that decides while a plan is executed depends on them.
+//! Linear programs and minimum cost flows are solved here. `elbowroom-execution` does not depend on
+//! this crate, so that an executor can run without a solver.
 //!
 //! ```
 //! use std::ops::ControlFlow;

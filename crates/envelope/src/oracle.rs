@@ -40,7 +40,7 @@ pub struct Oracle {
     soundness: Soundness,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
-    /// How many bad cases had been refuted from scratch before `around` changed last.
+    /// The number of bad cases refuted from scratch before `around` changed last.
     refuted_before: usize,
     accepted: Option<DecoupledEnvelope>,
     /// Whether `accepted` is the last box that was found inside, so that what is remembered is
@@ -125,7 +125,7 @@ impl Oracle {
         self.soundness.conditions()
     }
 
-    /// How many boxes have been checked.
+    /// The number of boxes checked.
     pub fn checks(&self) -> usize {
         self.checks
     }
@@ -135,7 +135,7 @@ impl Oracle {
         self.without_schedule
     }
 
-    /// How many bad cases have been refuted from scratch: a measure of work.
+    /// The number of bad cases refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
         self.refuted_before + self.soundness.refutations()
     }

@@ -231,7 +231,7 @@ impl Reduction {
         &self.edges
     }
 
-    /// How many classes there are.
+    /// The number of classes.
     pub fn class_count(&self) -> usize {
         self.class_count
     }

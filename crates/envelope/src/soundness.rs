@@ -47,7 +47,7 @@ pub(crate) struct Soundness {
     numbers: Option<Numbers>,
     /// The case that broke last: the likeliest to break next.
     suspect: usize,
-    /// How many bad cases have been refuted from scratch.
+    /// The number of bad cases refuted from scratch.
     refutations: usize,
 }
 
@@ -174,7 +174,7 @@ impl Soundness {
         &self.reduction
     }
 
-    /// How many bad cases have been refuted from scratch so far: a measure of work.
+    /// The number of bad cases refuted from scratch so far: a measure of work.
     pub(crate) fn refutations(&self) -> usize {
         self.refutations
     }

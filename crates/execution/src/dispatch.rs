@@ -315,7 +315,7 @@ impl Dispatch {
         &self.actions[id.index()]
     }
 
-    /// How long an instance is planned to take.
+    /// The planned duration of an instance.
     pub(crate) fn nominal_duration(&self, id: InstanceId) -> Rational {
         let [start, end] = self.ends[id.index()];
         &self.nominal[end] - &self.nominal[start]
@@ -335,7 +335,7 @@ impl Dispatch {
         }
     }
 
-    /// When a node happened, on the plan's clock.
+    /// The time at which a node happened, on the plan's clock.
     pub(crate) fn happened(&self, node: NodeId) -> Option<&Rational> {
         self.progress.happened[node.index()].as_ref()
     }
@@ -345,7 +345,7 @@ impl Dispatch {
         &self.progress.running
     }
 
-    /// When a node happens if nothing deviates, on the plan's clock.
+    /// The time at which a node happens if nothing deviates, on the plan's clock.
     pub(crate) fn nominal_time(&self, node: NodeId) -> &Rational {
         &self.nominal[node]
     }

@@ -28,7 +28,7 @@ pub enum Command {
         ticket: Ticket,
         /// What to do.
         action: Arc<Action>,
-        /// How long the plan has it take; `None` for an instantaneous action.
+        /// The planned duration; `None` for an instantaneous action.
         duration: Option<Rational>,
     },
     /// Stop an action. What it did at its start stays done; its end does not happen.
@@ -41,7 +41,7 @@ pub enum Command {
 /// Something the world reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
-    /// When it happened, by the world's clock. It may be reported later.
+    /// The time at which it happened, by the world's clock. It may be reported later.
     pub time: Rational,
     /// What happened.
     pub event: Event,

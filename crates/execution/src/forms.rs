@@ -8,7 +8,7 @@ use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
 
 use crate::horizon::{NetworkLimit, grounds};
 
-/// How many networks are remembered; an executor asks for one of a few.
+/// The number of networks remembered; an executor asks for one of a few.
 const MOST: usize = 8;
 
 /// The form of a network, or what stands against there being one.

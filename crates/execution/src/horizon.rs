@@ -81,8 +81,8 @@ impl Horizon {
         }
     }
 
-    /// When a time point that is ready may happen if nothing happens before. `Err` if it has to
-    /// wait for the end of that link, however late it comes.
+    /// The time at which a time point that is ready may happen if nothing happens before. `Err` if
+    /// it has to wait for the end of that link, however late it comes.
     pub(crate) fn earliest(&self, node: NodeId) -> Result<Option<Rational>, LinkId> {
         match self {
             Self::Whole(_) | Self::OneHop(_) => Ok(self.window(node).0),

@@ -1,18 +1,18 @@
-//! Decides what to do next while a plan is executed, watches, replans, and says why.
+//! Plan execution: dispatching, monitoring and replanning, with a reason for each decision.
 //!
 //! In: a task, a plan, and what is observed. Out: decisions, each with its [`Reason`], and in the
 //! end a [`Report`](run::Report). No clock, no input or output, no randomness: the same history
 //! leads to the same decisions, so that a simulation, a robot, a test and a stored trace all drive
 //! the same code.
 //!
-//! - [`Executor`]: chooses. [`executors::EXECUTORS`] lists them all.
-//! - [`run::Run`]: deciding, waiting, taking in what was observed, and replanning.
-//! - [`Progression`]: a state that follows what happens.
-//! - [`Recorder`]: takes the record of a run.
+//! - [`Executor`]: a dispatch policy. [`executors::EXECUTORS`] lists them all.
+//! - [`run::Run`]: the execution loop: decide, wait, take in observations, replan.
+//! - [`Progression`]: the believed state, progressed through time and observations.
+//! - [`Recorder`]: records a run.
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
 //! [`Planner`], [`Preparer`], [`Region`] (what a plan survives) and [`Odds`] (how likely it is to
-//! succeed). It does not know who stands behind them; in particular it knows no solver.
+//! succeed). It does not depend on their implementations; in particular it cannot reach a solver.
 //!
 //! ```
 //! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};

@@ -28,7 +28,7 @@ impl<P: Planner + ?Sized> Planner for Box<P> {
 pub struct Planned {
     /// The answer.
     pub answer: PlanAnswer,
-    /// How long it took, in seconds, if somebody looked at a clock.
+    /// The planning time in seconds, if it was measured.
     pub seconds: Option<Rational>,
 }
 

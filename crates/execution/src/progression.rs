@@ -54,9 +54,9 @@ pub struct Progression {
 pub struct Underway {
     /// What is being done.
     pub action: Arc<Action>,
-    /// When it started.
+    /// The time at which it started.
     pub start: Rational,
-    /// How long it is planned to take: what `?duration` means until it has ended.
+    /// The planned duration: what `?duration` means until it has ended.
     pub planned: Rational,
     /// For each end effect, whether the part of its guard that concerns start and interval holds.
     end_guards: Vec<bool>,
@@ -154,7 +154,7 @@ impl Progression {
         }
     }
 
-    /// When the next timed initials happen.
+    /// The time at which the next timed initials happen.
     pub fn next_timed(&self) -> Option<&Rational> {
         self.task.timed().get(self.timed).map(|timed| &timed.time)
     }

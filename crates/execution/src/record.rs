@@ -68,7 +68,7 @@ pub enum Entry<'a> {
     },
     /// An observation, and what was made of it.
     Taken {
-        /// When it was reported.
+        /// The time of the report.
         now: &'a Rational,
         /// The observation.
         observation: &'a Observation,
@@ -90,7 +90,7 @@ pub enum Entry<'a> {
     Planned {
         /// When, with the time that it took.
         now: &'a Rational,
-        /// How long it took in the world's time.
+        /// The time that it took, by the world's clock.
         took: &'a Rational,
         /// The plan, on the task's clock.
         plan: Option<&'a TimeTriggeredPlan>,

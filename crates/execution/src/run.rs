@@ -90,7 +90,7 @@ pub struct Run<'a> {
     news: Vec<News>,
     replans: usize,
     reasons: Vec<Reason>,
-    /// How long making a plan is expected to take.
+    /// The expected planning time.
     allowance: Rational,
     /// What was observed and believed, in order.
     history: Vec<Happened>,

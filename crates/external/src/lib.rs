@@ -2,8 +2,8 @@
 //!
 //! In: a task and a situation, the texts that it was read from, and a [`Planner`]: one of the
 //! [`REGISTRY`], an engine of unified-planning (`up:NAME`), or any command line that says where
-//! the files go. Out: a [`Report`] with one of the [`Outcome`]s, which are never confused, and on
-//! the way an [`Event`] for each plan.
+//! the files go. Out: a [`Report`] with one of the [`Outcome`]s, and meanwhile an [`Event`]
+//! for each plan.
 //!
 //! The way through the module:
 //!

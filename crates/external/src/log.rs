@@ -33,7 +33,7 @@ pub(super) struct Log {
     tail: VecDeque<u8>,
     /// What it said.
     pub(super) sayings: Sayings,
-    /// How many bytes came.
+    /// The number of bytes that came.
     pub(super) bytes: u64,
 }
 

@@ -14,7 +14,7 @@ pub struct Found {
     /// The plan, in the terms of the task that was given. In mid-execution its first steps
     /// continue what is running.
     pub plan: TimeTriggeredPlan,
-    /// When its last action ends.
+    /// The end time of its last action.
     pub makespan: Rational,
     /// The value of the problem's metric, if it has one that can be evaluated.
     pub metric: Option<Rational>,
@@ -205,11 +205,11 @@ pub struct Report {
 pub struct Statistics {
     /// From the start of the process to its end.
     pub elapsed: Duration,
-    /// When the first plan was accepted.
+    /// The time at which the first plan was accepted.
     pub first_plan: Option<Duration>,
-    /// How many plans were accepted.
+    /// The number of plans accepted.
     pub plans: usize,
-    /// How many plans were refused, or could not be read.
+    /// The number of plans that were refused or could not be read.
     pub refused: usize,
     /// The processor time that its processes were seen to use together; Linux only.
     pub work: Duration,

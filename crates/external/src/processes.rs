@@ -35,7 +35,7 @@ struct Status {
 #[derive(Debug)]
 pub(super) struct Processes {
     leader: i32,
-    /// When the leader started; older processes are none of ours.
+    /// The time at which the leader started; older processes are none of ours.
     since: Option<u64>,
     mark: String,
     page: u64,

@@ -38,7 +38,7 @@ impl<'s> Reader<'s> {
         }
     }
 
-    /// How many bytes came.
+    /// The number of bytes that came.
     pub(super) fn printed_bytes(&self) -> u64 {
         self.output.bytes + self.error.bytes
     }

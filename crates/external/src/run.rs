@@ -23,7 +23,7 @@ use super::workspace::Workspace;
 /// Settings for running a planner.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// How long it may run.
+    /// The time limit.
     pub time_limit: Option<Duration>,
     /// How much processor time all its processes may use together. Holds as it stands on a busy
     /// machine too; Linux only.

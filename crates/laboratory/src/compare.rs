@@ -31,7 +31,7 @@ pub struct Part {
     pub shard: u64,
     /// … when divided by this.
     pub shards: u64,
-    /// How many threads; 0: as many as there are processors.
+    /// The number of threads; 0: as many as processors.
     pub jobs: usize,
 }
 

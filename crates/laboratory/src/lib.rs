@@ -1,19 +1,19 @@
-//! Executors side by side: the experiments of the papers, and your own.
+//! Experiments that compare executors: those of the papers, and your own.
 //!
-//! In: an experiment file. Out: how often each executor succeeded, what it took, tables and plots.
+//! In: an experiment file. Out: success rates and costs of each executor, as tables and plots.
 //! All executors meet the same worlds (common random numbers). Trials run in parallel, on threads of
 //! this crate; the results do not depend on how many there are, and the parts of an experiment that
 //! were made on several machines add up.
 //!
-//! - [`answer`]: either of them as one request with one answer.
-//! - [`compare`]: plans on a clock (`docs/experiments.md`).
+//! - [`answer`]: an experiment of either kind as one request with one answer.
+//! - [`compare`]: temporal execution (`docs/experiments.md`).
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change by
 //!   themselves (`docs/perturbed-worlds.md`); the experiments of paper 2.
-//! - [`untimed`]: who executes plans where there is no time, and by which rules a trial goes.
+//! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.
 //!
-//! It stands above the library, and nothing that goes on board knows it: it needs threads, and holds
-//! what only an experiment asks for.
+//! It stands above the library, so that programs which embed the library need neither its threads nor
+//! what only experiments need.
 //!
 //! ```
 //! use elbowroom_laboratory::perturbed::PerturbedExperiment;

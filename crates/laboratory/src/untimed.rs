@@ -183,7 +183,8 @@ impl Stage<'_> {
         self.dead_ends.map(|_| self.is_dead_end)
     }
 
-    /// How many more steps may end in a dead end; the next one after these loses the trial.
+    /// The number of more steps that may end in a dead end; the next one after these loses the
+    /// trial.
     pub fn patience(&self) -> usize {
         self.rounds_left.saturating_sub(1)
     }

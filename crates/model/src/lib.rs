@@ -1,5 +1,5 @@
-//! What a planning problem means: problems, ground actions, states, time-triggered plans, and
-//! the judge.
+//! The semantics of temporal planning: problems, ground actions, states, time-triggered plans, and
+//! the validator (the *judge*).
 //!
 //! In: a [`Problem`] as `elbowroom-pddl` lowers it from text (or as a program builds it).
 //! Out: ground actions, states, and verdicts.
@@ -12,8 +12,8 @@
 //!    demand ([`Task::instantiate`]).
 //! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
 //! 5. [`Situation`]: the same problem in mid-execution, with actions under way.
-//! 6. [`validate()`], [`validate_from()`]: the judge. PDDL 2.1 semantics alone; it shares no code with
-//!    networks, encodings or solvers, because every other claim is attacked with it.
+//! 6. [`validate()`], [`validate_from()`]: the judge. It decides by the semantics of PDDL 2.1 alone and
+//!    shares no code with networks, encodings or solvers, because their results are tested with it.
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.

@@ -19,12 +19,12 @@ pub struct Step {
     pub start: Rational,
     /// What is done.
     pub action: Action,
-    /// How long it takes; `None` exactly for instantaneous actions.
+    /// The duration; `None` exactly for instantaneous actions.
     pub duration: Option<Rational>,
 }
 
 impl Step {
-    /// When it ends; its start, for an instantaneous action.
+    /// The end time; its start, for an instantaneous action.
     pub fn end(&self) -> Rational {
         match &self.duration {
             Some(duration) => &self.start + duration,

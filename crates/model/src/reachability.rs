@@ -48,10 +48,10 @@ use event::Symbol;
 use fixpoint::{Arguments, Reachable, fixpoint};
 use relaxation::Relaxation;
 
-/// How many steps lie between two questions whether to go on.
+/// The number of steps that lie between two questions whether to go on.
 const STEPS_PER_QUESTION: u64 = 8192;
 
-/// How many actions are made between two such questions.
+/// The number of actions made between two such questions.
 const ACTIONS_PER_QUESTION: usize = 256;
 
 /// Limits of grounding.

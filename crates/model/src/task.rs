@@ -155,12 +155,12 @@ impl Task {
         self.problem.predicates[predicate.index()].is_derived
     }
 
-    /// How many facts are in the table.
+    /// The number of facts that are in the table.
     pub fn fact_count(&self) -> usize {
         self.table().fact_count()
     }
 
-    /// How many fluents are in the table.
+    /// The number of fluents that are in the table.
     pub fn fluent_count(&self) -> usize {
         self.table().fluent_count()
     }

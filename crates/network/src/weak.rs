@@ -136,7 +136,7 @@ pub fn at(
     })
 }
 
-/// How long a link takes at that end.
+/// The duration of the link at that end.
 fn duration(link: &ContingentLink<Rational>, side: Side) -> Rational {
     match side {
         Side::Lower => link.lower.clone(),

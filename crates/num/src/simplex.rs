@@ -140,7 +140,7 @@ impl Simplex {
         variable
     }
 
-    /// How many variables there are.
+    /// The number of variables.
     pub fn variable_count(&self) -> usize {
         self.variables.len()
     }

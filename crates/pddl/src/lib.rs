@@ -15,7 +15,7 @@
 //!
 //! PDDL 2.1 levels 1 to 4 and PDDL 2.2 are read. What we do not execute ([`Feature`]) is refused
 //! by name and place, or ignored with a warning where it cannot affect validity. No bytes make
-//! the readers panic. They may not know files: who opened a text gives it a name.
+//! the readers panic. They open no files: the caller gives each text its name.
 //!
 //! ```
 //! use elbowroom_model::Task;

@@ -36,9 +36,9 @@ pub enum WriteProblemError {
     /// Not as many ends as running actions.
     #[error("{running} actions are under way, but {ends} ends are given for them")]
     EndCount {
-        /// How many actions are running.
+        /// The number of actions that are running.
         running: usize,
-        /// How many ends were given.
+        /// The number of ends given.
         ends: usize,
     },
     /// An action ends now, or should have ended.

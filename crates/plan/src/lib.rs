@@ -1,14 +1,14 @@
-//! Plans that leave room.
+//! Flexible plans: STN plans, their parameters, and boxes of parameter values.
 //!
 //! In: a task and a time-triggered plan, or an STN plan file. Out: STN plans and their parameters.
-//! What every schedule of such a plan must satisfy, and for which values of its parameters it does,
-//! is the concern of the crate `elbowroom-envelope`.
+//! The values of the parameters for which such a plan works are computed by the crate
+//! `elbowroom-envelope`.
 //!
 //! - [`StnPlan`]: action instances, time points, and bounds on their differences.
-//! - [`Parameter`], [`ParametrizedPlan`]: which quantities are left open.
-//! - [`PartialOrderPlan`]: the orderings without which an action would spoil another.
+//! - [`Parameter`], [`ParametrizedPlan`]: the uncertain quantities of a plan.
+//! - [`PartialOrderPlan`]: the orderings between interfering happenings.
 //! - [`DecoupledEnvelope`]: an interval for each parameter, a box.
-//! - [`uncertain`]: the network of a plan, with what the world decides in it.
+//! - [`uncertain`]: the network of a plan as an STNU, with contingent links.
 //! - [`mod@format`]: STN plan files.
 //!
 //! ```

@@ -31,7 +31,7 @@ pub struct Circumstances {
 pub struct Running {
     /// Which one.
     pub instance: InstanceId,
-    /// When it started; not after [`Circumstances::now`].
+    /// The time at which it started; not after [`Circumstances::now`].
     pub start: Rational,
 }
 

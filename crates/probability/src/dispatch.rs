@@ -41,7 +41,7 @@ pub struct NextHappening {
     pub node: NodeId,
     /// Its position in the order.
     pub position: usize,
-    /// When it may be.
+    /// The window in which it may happen.
     pub slot: Slot,
     /// Whether the order is new.
     pub is_new_order: bool,

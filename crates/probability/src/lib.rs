@@ -1,14 +1,14 @@
-//! How likely a plan is to succeed, and the order most likely to (Olisipo).
+//! The success probability of a plan, and the most likely order of its actions (Olisipo).
 //!
-//! In: a partially ordered plan, the likelihoods of everything that can go otherwise, and what is
-//! believed now. Out: the order most likely to succeed, and what to do next.
+//! In: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the belief
+//! about the present state. Out: the order most likely to succeed, and the next happening.
 //!
 //! 1. [`Likelihoods`]: facts that change by themselves, starts and effects that fail; read from
 //!    files by [`likelihoods`].
 //! 2. [`Model`]: a plan's happenings as steps of a stochastic process.
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
-//! 5. [`LayerDispatch`] (`PExec`): the next happening, as things stand.
+//! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
 //! 6. [`optimum`]: the best that any executor can reach in a small world, and its [`optimum::Table`].
 //!
 //! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws

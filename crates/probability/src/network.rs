@@ -150,8 +150,8 @@ impl<'m> PrunedNetwork<'m> {
         required.map(|()| probability)
     }
 
-    /// How many numeric conditions were taken for granted, because they read numbers that depend
-    /// on when things happen and not only on their order.
+    /// The number of numeric conditions that were taken for granted, because they read numbers that
+    /// depend on when things happen and not only on their order.
     pub fn assumed_conditions(&self) -> usize {
         self.assumed
     }

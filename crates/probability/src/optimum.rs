@@ -62,9 +62,9 @@ pub enum DeadEnds {
 /// The rules of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// How long a run may be.
+    /// The limit on the number of steps of a run.
     pub horizon: Horizon,
-    /// How many actions can be under way at once.
+    /// The number of actions that can be under way at once.
     pub most_running: usize,
     /// What becomes of a run where there is no plan.
     pub dead_ends: DeadEnds,
@@ -92,7 +92,7 @@ pub enum NotSmall {
     TooManyStates {
         /// How many facts matter.
         facts: usize,
-        /// How many actions there are.
+        /// The number of actions.
         actions: usize,
     },
     /// Numbers, or effects that depend on what held throughout an action.

@@ -90,14 +90,14 @@ pub struct Found {
     pub order: Option<TotalOrderPlan>,
     /// Whether it is proven to be the best.
     pub stop: SearchStop,
-    /// How many sequences were looked at; 0 if the answer was known from before.
+    /// The number of sequences looked at; 0 if the answer was known from before.
     pub sequences: usize,
 }
 
 /// Progress of a search, for its callback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// How many sequences were looked at so far.
+    /// The number of sequences looked at so far.
     pub sequences: usize,
     /// The success probability of the best order so far.
     pub best: Option<f64>,
@@ -263,8 +263,8 @@ impl OrderSearch {
         ))
     }
 
-    /// When each happening of a sequence may and can be, if it begins now; `None` if there is no
-    /// time for the sequence.
+    /// The time at which each happening of a sequence may and can be, if it begins now; `None` if
+    /// there is no time for the sequence.
     pub fn windows(&self, circumstances: &Circumstances, sequence: &[NodeId]) -> Option<Vec<Slot>> {
         let mut timing = Timing::new(&self.separations, circumstances)?;
         let now = &circumstances.now;

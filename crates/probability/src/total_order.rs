@@ -19,14 +19,14 @@ pub struct TotalOrderPlan {
     /// One more than happenings: layer `i` is what must hold before `sequence[i]` for the rest to
     /// work if nothing more goes wrong; the last is the goal.
     pub layers: Vec<Layer>,
-    /// When each happening may be, if the order begins when it was found.
+    /// The window of each happening, if the order begins when it was found.
     pub slots: Vec<Slot>,
     /// P(A): that all happenings succeed.
     pub actions_probability: f64,
     /// P(A ∩ G): that all happenings succeed and the goal holds after them.
     pub probability: f64,
-    /// How many numeric conditions were taken for granted, because the numbers they read depend on
-    /// when things happen and not only on their order.
+    /// The number of numeric conditions that were taken for granted, because the numbers they read
+    /// depend on when things happen and not only on their order.
     pub assumed_conditions: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What runs leave behind: traces, statistics, tables and plots. Text in and out; no files.
+//! Records of runs: traces, statistics, tables and plots. Text in and out; no files.
 //!
 //! - [`trace`]: the record of a run as JSON Lines (`docs/formats/trace.md`), and a world that plays
 //!   a stored one back.

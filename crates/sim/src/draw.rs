@@ -11,7 +11,7 @@ use rand_distr::{Distribution as _, Exp1, Gamma, LogNormal, Normal, Triangular};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// How long an action takes.
+    /// The duration of an action.
     Duration = 1,
     /// How long after the command an action starts.
     Delay = 2,

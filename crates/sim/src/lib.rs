@@ -1,11 +1,11 @@
 //! Seeded worlds to execute plans in.
 //!
 //! In: a world file (`docs/formats/world.md`) and a seed. Out: a [`World`](elbowroom_execution::World)
-//! that does what it is told, but in its own time.
+//! that executes commands with durations and failures of its own.
 //!
-//! - [`WorldModel`]: what a world file says: how long actions take, what they really change, how
-//!   often they fail, what happens by itself, and how well the world reports.
-//! - [`SimWorld`]: one trajectory of it. It is PDDL that happens: conditions are read in the true
+//! - [`WorldModel`]: the contents of a world file: distributions of durations and of numeric changes,
+//!   failures, exogenous events, and the reliability of reports.
+//! - [`SimWorld`]: one trajectory of it, by the semantics of PDDL: conditions are evaluated in the true
 //!   state, and an action whose conditions do not hold fails.
 //! - [`Unreliable`]: loses, repeats, delays and contradicts the reports of another world.
 //!

@@ -15,7 +15,8 @@ use crate::pattern::ActionPattern;
 pub struct WorldModel {
     /// Times and amounts are multiples of this.
     pub resolution: Rational,
-    /// How long actions take. The last rule that matches counts; without any, as long as planned.
+    /// The durations of actions. The last rule that matches counts; without any, as long as
+    /// planned.
     pub durations: Vec<(ActionPattern, Rule)>,
     /// How long after its command an action starts; without a rule, at once.
     pub delays: Vec<(ActionPattern, Rule)>,
@@ -140,7 +141,7 @@ impl WorldModel {
         text::read(&source.into(), problem).map_err(Diagnostics::from)
     }
 
-    /// How long an action takes that is planned to take `planned`.
+    /// The duration of an action whose planned duration is `planned`.
     pub fn duration(&self, action: &str, planned: &Rational, rng: &mut impl Rng) -> Rational {
         let duration = match last(&self.durations, action) {
             Some(rule) => rule.draw(planned, &self.resolution, rng),

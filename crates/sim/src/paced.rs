@@ -34,7 +34,7 @@ pub struct Begun<'a> {
     pub action: &'a Action,
     /// How many of that name had been told to start before.
     pub occurrence: u64,
-    /// How long it is planned to take; `None` if it takes no time.
+    /// The planned duration; `None` if it takes no time.
     pub planned: Option<&'a Rational>,
     /// Whether it ends when the [`Pace`] says; if not, it takes no time or is going to fail.
     pub is_open: bool,
@@ -167,7 +167,7 @@ impl<P: Pace> World for Paced<'_, P> {
 pub struct Durations {
     /// For each action's name, how long it takes the first time, the second time, …
     durations: BTreeMap<String, Vec<Rational>>,
-    /// When each action under way ends.
+    /// The time at which each action under way ends.
     ends: BTreeMap<Ticket, Rational>,
 }
 

@@ -33,7 +33,7 @@ pub struct SimWorld<'a> {
     now: Rational,
     /// What is going to happen, by time, and then in the order in which it was decided.
     agenda: BTreeMap<(Rational, u64), Coming>,
-    /// How many things were put on the agenda.
+    /// The number of things put on the agenda.
     decided: u64,
     /// What has happened and has not been told.
     untold: Vec<Observation>,

@@ -38,7 +38,7 @@ pub struct OpenBound<Q> {
 pub struct Branching<'a, Q> {
     /// The bounds that lie on cycles; others do no harm, and take time.
     pub bounds: Vec<OpenBound<Q>>,
-    /// How many time points there are.
+    /// The number of time points.
     pub node_count: usize,
     /// Whether a quantity bounds one difference only, from above and from below: no simple cycle
     /// takes both bounds.

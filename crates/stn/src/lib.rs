@@ -1,8 +1,8 @@
 //! Temporal networks: time points, bounds on their differences, and what follows from them.
 //!
 //! A simple temporal network (Dechter, Meiri & Pearl 1991) is a set of constraints
-//! `to - from <= bound`. Drawn as edges `from --bound--> to`, everything one may want to know is
-//! a question about shortest paths: the network is consistent unless it has a cycle of negative
+//! `to - from <= bound`. Drawn as edges `from --bound--> to`, all questions about it are
+//! questions about shortest paths: the network is consistent unless it has a cycle of negative
 //! length, and the tightest bound on `b - a` that follows is the distance from `a` to `b`.
 //!
 //! What flows in is a [`Network`]; it may contradict itself. [`Network::consistency`] answers
@@ -20,8 +20,9 @@
 //! - [`ConsistentNetwork::minimal`]: all implied bounds at once, for small networks;
 //! - [`MovingWindows`]: windows that follow as one time after another becomes known.
 //!
-//! Where the world decides some of the times, [`uncertain`] asks which promises can be kept, and
-//! [`branching`] whether there is a schedule for all values of quantities that bounds depend on.
+//! [`uncertain`] has networks with uncertainty (STNUs), their controllability and dispatch;
+//! [`branching`] decides whether there is a schedule for all values of quantities in the bounds (weak
+//! controllability).
 //!
 //! Bounds are [`Rational`](elbowroom_num::Rational) unless said otherwise; with
 //! [`Delta`](elbowroom_num::Delta) a bound can be strict, and other exact numbers can be a

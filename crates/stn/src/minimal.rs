@@ -19,7 +19,7 @@ impl<W: Weight> Minimal<W> {
         self.distances[from.index() * self.node_count + to.index()].as_ref()
     }
 
-    /// How many nodes there are.
+    /// The number of nodes.
     pub fn node_count(&self) -> usize {
         self.node_count
     }

@@ -114,7 +114,7 @@ impl<W: Weight> MovingWindows<W> {
         self.origin
     }
 
-    /// When the node may happen, relative to the origin.
+    /// The time at which the node may happen, relative to the origin.
     pub fn window(&self, node: NodeId) -> &Window<W> {
         &self.windows[node.index()]
     }

@@ -149,7 +149,7 @@ impl<W: Weight> Network<W> {
         self.constraints[id.index()].bound = bound;
     }
 
-    /// How many nodes there are; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
+    /// The number of nodes; the nodes are `NodeId(0)`, `NodeId(1)`, and so on.
     pub fn node_count(&self) -> usize {
         self.leaving.node_count()
     }

@@ -2,7 +2,7 @@
 
 /// Longest name that is compared; the comparison takes quadratic time.
 const LONGEST: usize = 60;
-/// How many candidates are compared at most, for the same reason.
+/// The number of candidates compared at most, for the same reason.
 const MOST_CANDIDATES: usize = 2000;
 
 /// The candidate most like `name`, if one is like it. Ignores case.

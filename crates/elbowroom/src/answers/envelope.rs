@@ -220,7 +220,7 @@ fn contains(
 struct Subject<'a> {
     request: &'a EnvelopeRequest,
     plan: &'a Arc<ParametrizedPlan>,
-    /// How many bounds were added for the dispatcher to keep to.
+    /// The number of bounds added for the dispatcher to keep to.
     enforced: usize,
     explainer: Explainer<'a>,
 }

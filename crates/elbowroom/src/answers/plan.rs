@@ -54,11 +54,11 @@ pub struct PlanAnswer {
     pub finding: PlanFinding,
     /// Why the search ended.
     pub stop: PlanStop,
-    /// How many plans were found, each better than the one before as far as the planner knows.
+    /// The number of plans found, each better than the one before as far as the planner knows.
     pub plans: usize,
-    /// How long it took.
+    /// The time taken.
     pub seconds: f64,
-    /// When the first plan was there.
+    /// The time at which the first plan was found.
     pub first_plan_seconds: Option<f64>,
     /// What else the planner counts.
     pub statistics: PlanStatistics,
@@ -110,11 +110,11 @@ pub enum PlanFinding {
 /// An action of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {
-    /// When it starts.
+    /// The start time.
     pub start: Exact,
     /// Its name: `(drive rover depot shelf)`.
     pub action: String,
-    /// How long it takes; `None` for an instantaneous action.
+    /// The duration; `None` for an instantaneous action.
     pub duration: Option<Exact>,
 }
 
@@ -163,7 +163,7 @@ pub enum PlanStatistics {
     },
     /// Another planner.
     External {
-        /// How many plans were refused, or could not be read.
+        /// The number of plans that were refused or could not be read.
         refused: usize,
         /// The most memory that its processes were seen to use together.
         peak_memory_bytes: u64,
@@ -307,7 +307,7 @@ struct Course<'a> {
     watcher: &'a mut dyn Watcher,
     begun: Duration,
     plans: usize,
-    /// When the first plan was there.
+    /// The time at which the first plan was found.
     first: Option<Duration>,
     /// Why the watcher wanted no more.
     halt: Option<Halt>,

@@ -63,7 +63,7 @@ pub enum RunFormat {
 pub struct RunProgress<'a> {
     /// What has just been recorded: a decision, a command, an observation, a plan, …
     pub entry: &'a Entry<'a>,
-    /// How many plans have been taken up.
+    /// The number of plans that have been taken up.
     pub plans: usize,
 }
 

@@ -63,20 +63,20 @@ pub struct EnvelopeProgress<'a> {
     pub envelope: &'a DecoupledEnvelope,
     /// How often it has grown.
     pub widenings: usize,
-    /// How many steps have been tried.
+    /// The number of steps that have been tried.
     pub steps: usize,
 }
 
 /// Progress of a planner.
 #[derive(Clone, Debug)]
 pub struct PlanProgress<'a> {
-    /// When the last action ends, if this is about a new plan.
+    /// The end time of the last action, if this is about a new plan.
     pub makespan: Option<&'a Rational>,
     /// The value of the problem's metric, if this is about a new plan and it has one.
     pub metric: Option<&'a Rational>,
-    /// How many plans there have been.
+    /// The number of plans so far.
     pub plans: usize,
-    /// How many states have been looked at; the embedded planner only.
+    /// The number of states that have been looked at; the embedded planner only.
     pub states: Option<u64>,
     /// How much memory is used, in bytes; other planners only.
     pub memory: Option<u64>,
@@ -85,7 +85,7 @@ pub struct PlanProgress<'a> {
 /// Progress of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrialsProgress {
-    /// How many trials have been made.
+    /// The number of trials that have been made.
     pub done: u64,
     /// Of how many.
     pub of: u64,

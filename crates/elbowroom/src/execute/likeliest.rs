@@ -45,7 +45,7 @@ pub struct Likeliest<'a> {
     pub model: WorldModel,
     /// Who makes the plans.
     pub planner: Embedded<'a>,
-    /// How long making a plan takes in the world.
+    /// The planning time, as it passes in the world.
     pub planning_time: Rational,
     quantiles: BTreeMap<(String, Rational, u64), Rational>,
 }

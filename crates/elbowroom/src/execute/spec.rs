@@ -81,7 +81,7 @@ pub struct RunSpec {
     /// What becomes of running actions when a new plan is made.
     #[serde(with = "as_text")]
     pub running: RunningRule,
-    /// How long making a plan takes in the world.
+    /// The planning time, as it passes in the world.
     #[serde(with = "as_text")]
     pub planning_time: PlanningTime,
     /// How many seconds of the world pass in one second on the wall clock; without one, there is no

@@ -22,7 +22,7 @@ pub struct Spoiling {
     /// For each action's name, its instances, in the order in which they start if nothing
     /// deviates.
     instances: BTreeMap<String, Vec<InstanceId>>,
-    /// When each node happened.
+    /// The time at which each node happened.
     happened: Vec<Option<Rational>>,
     /// Timed initials, with their times.
     timed: Vec<(NodeId, Rational)>,

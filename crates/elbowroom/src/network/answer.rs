@@ -177,7 +177,7 @@ impl From<&Rational> for Number {
 /// The success rate of simulated dispatch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Simulated {
-    /// How many runs were made.
+    /// The number of runs.
     pub runs: u64,
     /// In how many all requirements held.
     pub successes: u64,

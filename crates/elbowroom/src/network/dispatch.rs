@@ -29,7 +29,7 @@ struct Run<'a> {
     now: Rational,
 }
 
-/// When everything happens; `None` if the executor waits for ever.
+/// The time of each event; `None` if the executor waits for ever.
 pub(super) fn run(
     network: &UncertainNetwork<Rational>,
     executor: &Executor,
@@ -129,7 +129,7 @@ impl Run<'_> {
         })
     }
 
-    /// When a point's window opens, as far as what has happened says.
+    /// The time at which a point's window opens, as far as what has happened says.
     fn opens(&self, minimal: &Minimal<Rational>, node: NodeId) -> Option<Rational> {
         let happened = self.network.requirements().nodes().filter_map(|other| {
             let time = self.happened[other.index()].as_ref()?;

@@ -9,7 +9,7 @@ use elbowroom_stn::Network;
 /// The executed part of a plan.
 #[derive(Clone, Debug)]
 pub(super) struct Progress {
-    /// When each node happened, on the plan's clock.
+    /// The time at which each node happened, on the plan's clock.
     pub(super) happened: Vec<Option<Rational>>,
     /// For each node, how many of those that come before it have not happened.
     pub(super) missing: Vec<u32>,

@@ -9,7 +9,7 @@ use crate::reason::About;
 /// A start that has failed.
 #[derive(Clone, Debug)]
 pub(super) struct Retry {
-    /// When it may be tried again, on the plan's clock.
+    /// The time at which it may be tried again, on the plan's clock.
     pub(super) not_before: Rational,
     /// How often it has failed in a row.
     pub(super) failures: u32,
@@ -37,7 +37,7 @@ impl Dispatch {
         self.progress.ready.insert(start);
     }
 
-    /// When a start may be tried again, if it has failed.
+    /// The time at which a start may be tried again, if it has failed.
     pub(super) fn held_until(&self, start: NodeId) -> Option<Rational> {
         self.retries
             .get(&start)

@@ -216,7 +216,7 @@ impl Sturm {
         signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
     }
 
-    /// How many zeros lie strictly between two times.
+    /// The number of zeros that lie strictly between two times.
     fn zeros_between(&self, from: &Rational, to: &Rational) -> usize {
         let up_to = self.changes_at(from).saturating_sub(self.changes_at(to));
         up_to.saturating_sub(usize::from(self.is_zero_at(to)))

@@ -47,8 +47,8 @@ impl Progression {
         breaking.collect()
     }
 
-    /// When an over-all condition that holds now has failed, if nothing happens until then, and if
-    /// that is before `until`: the first multiple of `grid` after that moment.
+    /// The time at which an over-all condition that holds now has failed, if nothing happens until
+    /// then, and if that is before `until`: the first multiple of `grid` after that moment.
     pub fn next_break(&self, until: &Rational, grid: &Rational) -> Option<Rational> {
         let motion = self.motion().ok().filter(|motion| !motion.is_still())?;
         let length = Some(until - &self.time).filter(Rational::is_positive)?;

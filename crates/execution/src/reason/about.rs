@@ -11,9 +11,9 @@ use elbowroom_num::Rational;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum About {
-    /// How long the action takes.
+    /// The duration of the action.
     Duration,
-    /// How long what was left of the action took, when the plan went on with it.
+    /// The remaining duration of an action that was running when the plan began.
     RestOfDuration,
     /// By how much the action changes this fluent.
     Change(String),

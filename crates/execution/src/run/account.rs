@@ -54,7 +54,7 @@ pub struct ExecutedStep {
 }
 
 impl Account {
-    /// How many actions were started.
+    /// The number of actions started.
     pub fn started(&self) -> usize {
         self.entries.len()
     }

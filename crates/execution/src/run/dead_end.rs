@@ -19,7 +19,7 @@ use crate::reason::{About, Behind, Cause, Changed, Reason};
 /// Something observed that was believed.
 #[derive(Clone, Debug)]
 pub(super) struct Happened {
-    /// When it happened.
+    /// The time at which it happened.
     time: Rational,
     what: What,
 }

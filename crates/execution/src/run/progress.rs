@@ -72,7 +72,7 @@ mod tests {
     use super::{MOST_ANSWERS, Progress};
     use elbowroom_num::Rational;
 
-    /// How many answers are taken when the nth has the time `clock(n)`.
+    /// The number of answers that are taken when the nth has the time `clock(n)`.
     fn taken(most: i64, steps: usize, clock: impl Fn(i64) -> Rational) -> i64 {
         let mut progress = Progress::default();
         let mut taken = 0..most;

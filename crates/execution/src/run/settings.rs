@@ -13,13 +13,13 @@ use crate::reason::Reason;
 pub struct RunSettings {
     /// What becomes of running actions when a new plan is made.
     pub running: RunningRule,
-    /// How long making a plan takes in the world.
+    /// The planning time, as it passes in the world.
     pub planning_time: PlanningTime,
     /// How often a new plan may be made.
     pub most_replans: usize,
-    /// When an action that is silent is given up.
+    /// The rule by which an action without reports is given up.
     pub patience: Patience,
-    /// When the run ends in any case, by the world's clock.
+    /// The time limit of the run, by the world's clock.
     pub time_limit: Rational,
 }
 
@@ -206,14 +206,14 @@ pub struct Report {
     pub verdict: Verdict,
     /// When, by the world's clock.
     pub time: Rational,
-    /// How many new plans were made, or asked for.
+    /// The number of new plans made, or asked for.
     pub replans: usize,
     /// Why.
     pub reasons: Vec<Reason>,
     /// Where no plan reaches the goal any more: what can never become true again, and since when,
     /// as far as that is known ([`Run::explaining`](super::Run::explaining)).
     pub dead_end: Vec<Reason>,
-    /// How many actions were started.
+    /// The number of actions started.
     pub starts: usize,
     /// What was done, with the times and amounts observed: a plan for the judge.
     pub executed: Vec<ExecutedStep>,

@@ -23,7 +23,7 @@ const TICK: Duration = Duration::from_millis(20);
 const MEASURE: Duration = Duration::from_millis(60);
 /// How often the end is looked at when nothing is printed any more.
 const NEAR_END: Duration = Duration::from_millis(2);
-/// How long killed processes are waited for.
+/// The time that killed processes have to end.
 const LAST_WAIT: Duration = Duration::from_secs(2);
 /// How long children that go on having children are hunted.
 const HUNT: Duration = Duration::from_millis(500);

@@ -62,7 +62,7 @@ pub enum Planning {
     Another {
         /// Its name, or its command line.
         name: String,
-        /// How long it may go on to better plans; if nothing is said, its first plan is taken.
+        /// The time for finding better plans; if nothing is said, its first plan is taken.
         seconds: Option<Rational>,
     },
 }

@@ -46,7 +46,7 @@ pub struct Results {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cell {
-    /// How many runs.
+    /// The number of runs.
     pub runs: u64,
     /// How many of them reached the goal.
     pub successes: u64,

@@ -21,7 +21,7 @@ use elbowroom::execute::{
 };
 use elbowroom::flow;
 
-/// How many plans are remembered for one problem: some megabytes.
+/// The number of plans remembered for one problem: some megabytes.
 const PLANS: usize = 20_000;
 
 /// How many plans made ready are remembered for one problem and column: some megabytes.

@@ -160,7 +160,7 @@ struct Drafts<'r, 'a> {
     relaxation: &'r Relaxation<'a>,
     parameter_count: usize,
     alternatives: Vec<Draft<'a>>,
-    /// How many groups of alternatives like the current one there are.
+    /// The number of groups of alternatives like the current one.
     groups: usize,
     /// Whether to pass over what is not static.
     only_static: bool,

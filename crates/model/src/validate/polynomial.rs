@@ -228,7 +228,7 @@ impl Polynomial {
         }
     }
 
-    /// How many distinct zeros lie strictly between two numbers that are none.
+    /// The number of distinct zeros that lie strictly between two numbers that are none.
     pub(super) fn count_roots_between(&self, low: &Rational, high: &Rational) -> usize {
         let chain = self.square_free().sturm_chain();
         changes(&chain, low) - changes(&chain, high)

@@ -51,7 +51,7 @@ pub enum Mistake {
         duration: Rational,
         /// Those it may have, as far as they do not end before `now`.
         possible: Interval,
-        /// When the plan begins.
+        /// The time at which the plan begins.
         now: Rational,
     },
     /// A durative action has no duration.
@@ -186,7 +186,7 @@ pub enum Point {
 /// Why it cannot be decided whether a plan is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Undecided {
-    /// When the difficulty arises; `None` if before anything happens.
+    /// The time at which the difficulty arises; `None` if before anything happens.
     pub time: Option<Rational>,
     /// The difficulty.
     pub difficulty: Difficulty,

@@ -45,7 +45,7 @@ pub(super) struct Around {
 struct When {
     /// Parts without time specifier are filed under the time of the `at` around them.
     condition: Timed,
-    /// How many variables were in scope.
+    /// The number of variables that were in scope.
     scope: usize,
     span: Span,
 }

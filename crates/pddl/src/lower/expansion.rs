@@ -117,7 +117,7 @@ impl<'a> Sizes<'a> {
         }
     }
 
-    /// How many ways there are to choose objects for the variables.
+    /// The number of ways to choose objects for the variables.
     fn combinations(&mut self, variables: &'a [Variable]) -> u64 {
         let problem = self.problem;
         variables.iter().fold(1, |product: u64, variable| {

@@ -7,7 +7,7 @@ use elbowroom_num::Rational;
 
 /// How many digits behind the point are written at least, as planners do.
 const FEWEST_DIGITS: usize = 3;
-/// How many digits are tried before a number is written as a fraction.
+/// The number of digits tried before a number is written as a fraction.
 const MOST_DIGITS: u32 = 300;
 
 /// The plan as text that [`read_plan`](crate::read_plan) and other tools read: one

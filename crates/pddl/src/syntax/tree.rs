@@ -144,7 +144,7 @@ fn is_section(word: &str) -> bool {
 struct Builder<'s> {
     done: Vec<Node<'s>>,
     open: Vec<(Span, Vec<Node<'s>>)>,
-    /// How many lists are open beyond the deepest that is kept.
+    /// The number of lists that are open beyond the deepest that is kept.
     too_deep: usize,
 }
 

@@ -175,7 +175,7 @@ pub enum Proof {
         "no plan exists: every order in which things can happen was tried, {states} states in all"
     )]
     Exhausted {
-        /// How many states there were.
+        /// The number of states.
         states: u64,
     },
 }

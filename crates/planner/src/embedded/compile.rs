@@ -59,7 +59,7 @@ pub(crate) struct Compiled {
     /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits for
     /// them.
     pub(crate) fact_annotations: Vec<[u32; 2]>,
-    /// How many annotations there are.
+    /// The number of annotations.
     pub(crate) annotation_count: usize,
     /// The timed initials to come, by time.
     pub(crate) timed: Vec<Timed>,

@@ -40,7 +40,7 @@ pub(crate) struct Pairs<'a> {
     count: usize,
     /// For each pair the earliest time, by row.
     time: Vec<Ticks>,
-    /// When an atom of the state was brought about; [`NEVER`] if it does not hold.
+    /// The time at which an atom of the state was brought about; [`NEVER`] if it does not hold.
     since: Vec<Ticks>,
     /// For each action and atom, when both are: the action under way since a start that came later
     /// in the order of choices than the atom, or together with it.
@@ -58,7 +58,7 @@ pub(crate) struct Pairs<'a> {
     round: u32,
     /// For each atom when it can hold together with what an operator does.
     with: Vec<Ticks>,
-    /// How many pairs were looked up so far.
+    /// The number of pairs looked up so far.
     pub(crate) work: u64,
 }
 
@@ -90,7 +90,7 @@ impl<'a> Pairs<'a> {
         })
     }
 
-    /// How many timetables there are: literals that change at fixed times only.
+    /// The number of timetables: literals that change at fixed times only.
     pub(crate) fn timetable_count(&self) -> usize {
         self.graph.timetable.len()
     }

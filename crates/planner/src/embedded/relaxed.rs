@@ -173,7 +173,7 @@ impl<'a> Relaxed<'a> {
             .collect()
     }
 
-    /// How many timetables there are: literals that change at fixed times only.
+    /// The number of timetables: literals that change at fixed times only.
     pub(crate) fn timetable_count(&self) -> usize {
         self.graph.timetable.len()
     }
@@ -411,7 +411,7 @@ impl<'a> Relaxed<'a> {
     }
 }
 
-/// When the literal of a timetable last becomes false.
+/// The time at which the literal of a timetable last becomes false.
 pub(crate) fn last_end(spans: &[(Ticks, Ticks)]) -> Option<Ticks> {
     let ends = spans.iter().map(|span| span.1);
     ends.filter(|&end| end < NEVER).max()

@@ -23,7 +23,7 @@ use super::tuning::{Member, Technique};
 /// How much work lies between two reports, in operators of estimates: about ten milliseconds.
 const REPORT_WORK: u64 = 2_000_000;
 
-/// How many looked-up pairs lie between two reports at most: some milliseconds.
+/// The number of looked-up pairs that lie between two reports at most: some milliseconds.
 const REPORT_LOOKUPS: u64 = 4_000_000;
 
 /// The most turns between two reports where each state is a linear program.

@@ -72,7 +72,7 @@ pub(crate) struct Search<'a> {
     pub(crate) has_lost: bool,
     /// How much the last turn counts for.
     price: u64,
-    /// How many successors had their turn.
+    /// The number of successors that had their turn.
     drawn: u64,
     pub(crate) expanded: u64,
     pub(crate) generated: u64,

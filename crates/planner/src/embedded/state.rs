@@ -45,7 +45,7 @@ pub(crate) struct State {
 pub(crate) struct Last {
     /// Its node, or [`SETTLED`].
     pub(crate) node: NodeId,
-    /// When it happened, if that is settled; what follows does not happen earlier.
+    /// The time at which it happened, if that is settled; what follows does not happen earlier.
     pub(crate) floor: Ticks,
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct Open {
     pub(crate) action: u32,
     /// The node of its start, or [`SETTLED`].
     pub(crate) node: NodeId,
-    /// When it started, if that is settled.
+    /// The time at which it started, if that is settled.
     pub(crate) start: Ticks,
     pub(crate) least: Ticks,
     /// [`NEVER`] if there is no bound.

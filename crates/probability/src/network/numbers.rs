@@ -13,7 +13,8 @@ use crate::model::Model;
 pub(crate) struct Number {
     /// Its value apart from continuous change that goes on; `None` if that is not known.
     settled: Option<Rational>,
-    /// How many continuous effects are changing it; while any does, its value depends on time.
+    /// The number of continuous effects that are changing it; while any does, its value depends on
+    /// time.
     changing: u32,
 }
 

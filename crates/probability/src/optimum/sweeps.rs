@@ -85,7 +85,7 @@ impl Perturbed {
             .sum()
     }
 
-    /// How many tables there are.
+    /// The number of tables.
     fn layers(&self) -> usize {
         match self.settings.dead_ends {
             DeadEnds::Harmless | DeadEnds::Lost => 1,

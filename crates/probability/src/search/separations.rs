@@ -132,8 +132,8 @@ impl Separations {
         (*next == node).then_some(time)
     }
 
-    /// When the end of an action under way can be, at the earliest and at the latest. One that is
-    /// overdue has no latest end that could still be kept.
+    /// The time at which the end of an action under way can be, at the earliest and at the latest.
+    /// One that is overdue has no latest end that could still be kept.
     pub(crate) fn end_of(&self, running: &Running, now: &Rational) -> (Rational, Option<Rational>) {
         let (least, greatest) = &self.durations[running.instance.index()];
         let earliest = (&running.start + least).max(now.clone());

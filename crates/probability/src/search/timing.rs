@@ -114,7 +114,7 @@ impl<'s> Timing<'s> {
         Some(())
     }
 
-    /// When each happening of the order may and can be.
+    /// The time at which each happening of the order may and can be.
     pub(super) fn windows(&self) -> Vec<(NodeId, Rational, Option<Rational>)> {
         let windows = self.network.windows(self.zero);
         let window = |(node, own): &(NodeId, elbowroom_stn::NodeId)| {

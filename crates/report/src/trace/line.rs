@@ -55,11 +55,11 @@ pub struct PlanLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepLine {
-    /// When it starts.
+    /// The start time.
     pub start: Exact,
     /// Its name: `(drive rover depot shelf)`.
     pub action: String,
-    /// How long it takes; `None` for an instantaneous action.
+    /// The duration; `None` for an instantaneous action.
     pub duration: Option<Exact>,
 }
 
@@ -170,7 +170,7 @@ pub struct OrderLine {
     pub step: u32,
     /// Its name.
     pub action: String,
-    /// How long it is planned to take; `None` for an instantaneous action.
+    /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Exact>,
     /// When it may start.
     pub planned: WindowLine,
@@ -236,7 +236,7 @@ pub enum GivenLine {
         ticket: u64,
         /// Its name.
         action: String,
-        /// How long it is planned to take.
+        /// The planned duration.
         duration: Option<Exact>,
     },
     /// Stop an action.
@@ -272,7 +272,7 @@ pub struct LookedLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObservedLine {
-    /// When it was reported.
+    /// The time of the report.
     pub now: Exact,
     /// The observation.
     pub observation: ObservationLine,
@@ -370,9 +370,9 @@ pub struct SituationLine {
 pub struct RunningLine {
     /// Its name.
     pub action: String,
-    /// When it has started.
+    /// The time at which it has started.
     pub start: Exact,
-    /// How long it is expected to take.
+    /// The expected duration.
     pub duration: IntervalLine,
 }
 
@@ -382,7 +382,7 @@ pub struct RunningLine {
 pub struct PlannedLine {
     /// When, with the time that it took.
     pub now: Exact,
-    /// How long it took in the world's time.
+    /// The time that it took, by the world's clock.
     pub took: Exact,
     /// The plan.
     pub plan: Option<Vec<StepLine>>,
@@ -411,13 +411,13 @@ pub struct ReportLine {
     /// When, by the world's clock.
     #[serde(with = "exact")]
     pub time: Rational,
-    /// How many new plans were made, or asked for.
+    /// The number of new plans made, or asked for.
     pub replans: usize,
     /// Why.
     pub reasons: Vec<ReasonLine>,
     /// What can never become true again, where no plan reaches the goal any more.
     pub dead_end: Vec<ReasonLine>,
-    /// How many actions were started.
+    /// The number of actions started.
     pub starts: usize,
     /// What was done.
     pub executed: Vec<ExecutedLine>,
@@ -427,11 +427,11 @@ pub struct ReportLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExecutedLine {
-    /// When it started.
+    /// The time at which it started.
     pub start: Exact,
     /// Its name.
     pub action: String,
-    /// How long it took; `None` for an instantaneous action.
+    /// The time taken; `None` for an instantaneous action.
     pub duration: Option<Exact>,
     /// Which start it was.
     pub ticket: u64,

@@ -40,7 +40,7 @@ pub struct Dispatcher<W = Rational> {
 #[derive(Clone, Debug)]
 struct ActiveWait<W> {
     link: LinkId,
-    /// When it is over at the latest; `None` if only the link's end ends it.
+    /// The time at which it is over at the latest; `None` if only the link's end ends it.
     until: Option<W>,
     edge: EdgeId,
 }
@@ -96,7 +96,7 @@ impl<W: Weight> Dispatcher<W> {
         &self.form
     }
 
-    /// When a node happened.
+    /// The time at which a node happened.
     pub fn happened(&self, node: NodeId) -> Option<&W> {
         self.happened[node.index()].as_ref()
     }

@@ -60,7 +60,8 @@ pub(super) struct Graph<W> {
     pub(super) negative_into: Vec<Vec<EdgeId>>,
     /// For each node, the upper-case edges of the network that end there.
     pub(super) upper_into: Vec<Vec<EdgeId>>,
-    /// How many edges are the network's own: two for each link, after those of the requirements.
+    /// The number of edges that are the network's own: two for each link, after those of the
+    /// requirements.
     pub(super) given: usize,
 }
 

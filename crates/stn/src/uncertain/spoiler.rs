@@ -201,7 +201,7 @@ enum Rest<W> {
     Network(UncertainNetwork<W>),
 }
 
-/// When a link that is not over was activated.
+/// The time at which a link that is not over was activated.
 fn running_since(link: &ContingentLink, happened: &[Option<Rational>]) -> Option<Rational> {
     let is_over = happened[link.end.index()].is_some();
     happened[link.activation.index()]

@@ -219,7 +219,7 @@ fn meaning(rows: &[Row]) -> &'static str {
     }
 }
 
-/// When the plan is done, with everything started as early as possible.
+/// The makespan of the plan, with everything started as early as possible.
 fn makespan(makespans: &Makespans) -> String {
     let mut line = format!("Done at {} as planned", number::nearest(&makespans.nominal));
     for (time, which) in [

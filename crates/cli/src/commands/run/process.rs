@@ -19,7 +19,7 @@ use crate::interrupt::Interrupt;
 use crate::words::{excerpt, plain};
 use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
 
-/// How long a program has to end when the run is over.
+/// The time that a program has to end when the run is over.
 const FAREWELL: Duration = Duration::from_secs(1);
 
 /// How long a program has, when the user has asked to end, to obey before it is told to stop.

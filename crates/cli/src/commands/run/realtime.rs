@@ -22,7 +22,7 @@ use crate::interrupt::Interrupt;
 pub(super) struct Pace {
     clock: Clock,
     factor: Rational,
-    /// How long the world's clock was stopped, on the wall clock.
+    /// The time for which the world's clock was stopped, on the wall clock.
     stopped: Mutex<Duration>,
 }
 
@@ -40,7 +40,7 @@ impl Pace {
         *self.stopped.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How long it is until the world's clock reads `time`.
+    /// The time until the world's clock reads `time`.
     fn left(&self, time: &Rational) -> Duration {
         let passed = self.clock.elapsed().saturating_sub(self.stopped());
         on_the_wall(time, &self.factor).saturating_sub(passed)
@@ -114,7 +114,7 @@ impl World for Realtime<'_> {
 pub(super) struct PacedPlanner<'a> {
     pub(super) inner: Box<dyn Planner + 'a>,
     pub(super) pace: &'a Pace,
-    /// How long a plan takes in the world.
+    /// The planning time, as it passes in the world.
     pub(super) planning_time: &'a PlanningTime,
 }
 

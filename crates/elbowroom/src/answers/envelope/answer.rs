@@ -72,9 +72,9 @@ pub enum EnvelopeFinding {
         parameters: Vec<Room>,
         /// Why the search ended.
         stop: Stop,
-        /// How many boxes were checked.
+        /// The number of boxes checked.
         checks: usize,
-        /// How long the search took.
+        /// The time that the search took.
         seconds: f64,
         /// Each box found to be inside, in order.
         widenings: Vec<Widened>,
@@ -84,7 +84,7 @@ pub enum EnvelopeFinding {
         /// What it would be worth to know values in advance, if anything.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
-        /// When the plan is done. Not in the document.
+        /// The makespan of the plan. Not in the document.
         #[serde(skip)]
         makespans: Option<Makespans>,
     },
@@ -246,7 +246,7 @@ pub struct Counterexample {
     pub verdict: Option<String>,
     /// The parameters' values, by name.
     pub values: IndexMap<String, Exact>,
-    /// When everything happens; empty if there is no schedule for these values.
+    /// The time of each event; empty if there is no schedule for these values.
     pub schedule: Vec<Happening>,
     /// How the world beats an executor that cannot know in advance what it learns too late: one
     /// that starts everything early, and one that starts everything late.
@@ -263,7 +263,7 @@ pub struct Happening {
     pub action: String,
     /// When it starts, or happens.
     pub start: Exact,
-    /// When it ends; `None` for an instantaneous action.
+    /// The end time; `None` for an instantaneous action.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<Exact>,
 }

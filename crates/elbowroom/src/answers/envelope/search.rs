@@ -102,7 +102,7 @@ struct History<'a> {
     /// The box so far.
     envelope: DecoupledEnvelope,
     widenings: &'a mut Vec<Widened>,
-    /// How many steps have been tried.
+    /// The number of steps that have been tried.
     steps: usize,
     /// Why the watcher wanted no more.
     halt: Option<Halt>,

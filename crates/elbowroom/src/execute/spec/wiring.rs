@@ -17,7 +17,7 @@ use crate::answers::plan::EMBEDDED;
 use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
 use crate::{BoxTextError, parse_box};
 
-/// How long another planner has for its first plan.
+/// The time limit of another planner for its first plan.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A specification that cannot be run.
@@ -195,7 +195,7 @@ impl RunSpec {
         }
     }
 
-    /// How long planning is expected to take in the world; where that is measured, nobody knows
+    /// The expected planning time in the world; 0 where it is measured, because it is not known
     /// beforehand.
     fn expected_planning_time(&self) -> Rational {
         match &self.planning_time {

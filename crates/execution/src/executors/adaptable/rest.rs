@@ -292,7 +292,7 @@ impl Rest {
         !self.under_way.is_empty() && !is_overdue
     }
 
-    /// When the first of the actions under way is later than it can be.
+    /// The time at which the first of the actions under way is later than it can be.
     fn first_overdue(&self) -> Option<Rational> {
         let plan = self.chooser.search().model().plan();
         let ends = self.under_way.values().filter_map(|(instance, start)| {

@@ -37,7 +37,7 @@ impl Rest {
         }
     }
 
-    /// When an action under way reaches its limit, on the plan's clock.
+    /// The time at which an action under way reaches its limit, on the plan's clock.
     fn limit_of(&self, instance: InstanceId, limit: &Rational) -> Option<Rational> {
         let [start, end] = self.dispatch.nodes_of(instance);
         let start = self.dispatch.happened(start)?;

@@ -25,7 +25,7 @@ use crate::embedded::formula::Formula;
 use crate::embedded::time::{Scale, Ticks};
 use crate::embedded::tuning::Tuning;
 
-/// How many actions are compiled between two questions whether to go on.
+/// The number of actions compiled between two questions whether to go on.
 const ACTIONS_PER_QUESTION: usize = 256;
 
 /// Why there is no compiled problem.

@@ -33,7 +33,7 @@ pub(super) fn has_fixed_numbers(grounding: &Grounding, situation: &Situation) ->
             .all(|running| fixed(&running.action) && certain(running))
 }
 
-/// How long an action under way takes, if that is certain.
+/// The duration of a running action, if it is certain.
 pub(super) fn known_duration(running: &RunningAction) -> Option<&Rational> {
     match (&running.duration.lower, &running.duration.upper) {
         (End::Closed(least), End::Closed(most)) => (least == most).then_some(least),

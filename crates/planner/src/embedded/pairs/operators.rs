@@ -190,7 +190,7 @@ impl Pairs<'_> {
     }
 }
 
-/// When an action under way has started, at the earliest.
+/// The time at which an action under way has started, at the earliest.
 pub(super) fn start_of(state: &State, open: &Open) -> Ticks {
     if open.node == SETTLED {
         open.start

@@ -36,7 +36,7 @@ impl<'a> DeadEnds<'a> {
         }
     }
 
-    /// How many pairs have been looked up.
+    /// The number of pairs that have been looked up.
     pub(super) fn lookups(&self) -> u64 {
         self.pairs.as_ref().map_or(0, |pairs| pairs.work)
     }
@@ -71,7 +71,7 @@ impl<'a> DeadEnds<'a> {
 /// operators.
 #[derive(Clone, Copy, Debug)]
 struct CheckBudget {
-    /// How many pairs may be looked up now.
+    /// The number of pairs that may be looked up now.
     credit: u64,
     /// How many the last answer took.
     price: u64,

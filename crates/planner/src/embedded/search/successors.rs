@@ -95,7 +95,7 @@ impl Search<'_> {
         penalty
     }
 
-    /// When the successors of a state have their turn; lower ranks are earlier.
+    /// The rank of a state in the queue of its search; lower ranks come first.
     fn rank(&mut self, number: u32, estimate: u32) -> i64 {
         if let Some(novelty) = &mut self.novelty {
             let state = &self.nodes[number as usize].state;

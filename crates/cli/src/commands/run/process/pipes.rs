@@ -16,7 +16,7 @@ pub(super) const LONGEST_ANSWER: usize = 16 << 20;
 /// The reader of a program's standard output.
 pub(super) struct Ears {
     lines: Receiver<Heard>,
-    /// How many bytes have come that nobody has taken yet.
+    /// The number of bytes that have come that nobody has taken yet.
     waiting: Arc<AtomicUsize>,
 }
 
