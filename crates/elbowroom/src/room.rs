@@ -77,7 +77,7 @@ fn pinned(task: &Task, plan: &ParametrizedPlan, nominal: &Schedule) -> Option<Pa
     (!is_refused).then(|| loosened(task, with_pins(&fixed), given, &scale))
 }
 
-/// How long the longest action takes.
+/// The longest duration of an action.
 fn longest(plan: &StnPlan, nominal: &Schedule) -> Rational {
     let durations = plan.instances.iter().enumerate().map(|(index, _)| {
         let id = InstanceId::from(index);
@@ -191,7 +191,7 @@ fn loosened(
     loose
 }
 
-/// How many boxes are looked at before the rest stays as it is.
+/// The number of boxes looked at before the rest stays as it is.
 const MOST_CHECKS: usize = 2_000;
 
 /// A box that grows as long as every schedule works.

@@ -80,7 +80,7 @@ pub struct Mission {
     pub plan: ParametrizedPlan,
     /// For each step of `time_triggered`, its instance in `plan`.
     pub instances: Vec<InstanceId>,
-    /// When everything happens if nothing deviates, on the task's clock.
+    /// The time of each event if nothing deviates, on the task's clock.
     pub nominal: Schedule,
     /// In which values of the open quantities the plan is guaranteed to work.
     pub envelope: Option<DecoupledEnvelope>,
@@ -191,7 +191,7 @@ pub struct Order {
     pub step: StepId,
     /// What to do.
     pub action: Arc<Action>,
-    /// How long it is planned to take; `None` for an instantaneous action.
+    /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Rational>,
     /// When it may start.
     pub planned: Planned,

@@ -39,7 +39,7 @@ pub struct Prepared {
     pub plan: ParametrizedPlan,
     /// For each step of the plan that was made ready, its instance.
     pub instances: Vec<InstanceId>,
-    /// When everything happens if nothing deviates.
+    /// The time of each event if nothing deviates.
     pub nominal: Schedule,
     /// For which values it is guaranteed to work, if that was asked for.
     pub envelope: Option<DecoupledEnvelope>,

@@ -10,7 +10,7 @@ macro_rules! numbers_by_id {
                 Self { numbers }
             }
 
-            /// How many there are.
+            /// The number of there that are.
             pub fn len(&self) -> usize {
                 self.numbers.len()
             }
