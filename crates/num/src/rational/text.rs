@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use dashu_int::ops::BitTest;
 use dashu_int::{IBig, UBig};
 use dashu_ratio::RBig;
 
@@ -26,17 +27,41 @@ impl fmt::Debug for Rational {
     }
 }
 
-/// A text is not a number in decimal notation or a fraction.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` is not a number: write a decimal such as 12.5 or a fraction such as 25/2")]
+/// A text is not a number in decimal notation or a fraction, or has more digits than are read.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParseRationalError {
+    /// The beginning of the text.
     text: String,
+    is_too_long: bool,
 }
+
+impl fmt::Display for ParseRationalError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = &self.text;
+        if self.is_too_long {
+            write!(
+                f,
+                "`{text}` has too many digits: write at most {LONGEST_NUMERAL} characters, for a number \
+                 that has fewer than {LONGEST_NUMERAL} digits when written out"
+            )
+        } else {
+            write!(
+                f,
+                "`{text}` is not a number: write a decimal such as 12.5 or a fraction such as 25/2"
+            )
+        }
+    }
+}
+
+impl std::error::Error for ParseRationalError {}
 
 /// Longest numeral accepted; more digits than any measurement has, few enough to stay fast.
 const LONGEST_NUMERAL: usize = 400;
 /// Largest decimal exponent accepted, for the same reason.
 const LARGEST_EXPONENT: i32 = 400;
+/// The most bits that numerator and denominator may have, so that a number that was read, written as a
+/// fraction with its sign, is no longer than [`LONGEST_NUMERAL`] on either side and can be read again.
+const MOST_BITS: usize = 1_325;
 
 /// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.
 impl FromStr for Rational {
@@ -50,9 +75,22 @@ impl FromStr for Rational {
             },
             None => decimal(text),
         };
+        let is_too_long = parsed.is_some() || text.len() > LONGEST_NUMERAL;
+        let parsed = parsed.filter(has_few_digits);
         parsed.ok_or_else(|| ParseRationalError {
             text: text.chars().take(60).collect(),
+            is_too_long,
         })
+    }
+}
+
+/// Whether the number can be read again when it is written.
+fn has_few_digits(number: &Rational) -> bool {
+    match &number.0 {
+        Small(..) => true,
+        Big(big) => {
+            big.numerator().bit_len() <= MOST_BITS && big.denominator().bit_len() <= MOST_BITS
+        }
     }
 }
 
@@ -93,4 +131,40 @@ fn decimal(text: &str) -> Option<Rational> {
         }
     };
     Some(if negative { -value } else { value })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn what_was_read_can_be_written_and_read_again(
+            digits in "-?[0-9]{1,420}",
+            part in "[0-9]{0,12}",
+            exponent in -420..420_i32,
+            denominator in "[0-9]{0,30}",
+            below in -420..420_i32,
+        ) {
+            let number = format!("{digits}.{part}e{exponent}");
+            let fraction = format!("{number}/{denominator}e{below}");
+            for text in [number, fraction] {
+                if let Ok(number) = text.parse::<Rational>() {
+                    prop_assert_eq!(number.to_string().parse::<Rational>(), Ok(number));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_with_too_many_digits_is_refused_with_the_reason() {
+        for text in ["1e400".to_owned(), "1e-400".to_owned(), "7".repeat(401)] {
+            let error = text.parse::<Rational>().expect_err("too long").to_string();
+            assert!(error.contains("too many digits"), "{error}");
+        }
+        assert!("1e398".parse::<Rational>().is_ok());
+        assert!("9".repeat(398).parse::<Rational>().is_ok());
+    }
 }
