@@ -2,6 +2,7 @@
 
 mod compare;
 mod envelope;
+mod learn;
 mod network;
 mod number;
 mod plan;
@@ -15,6 +16,7 @@ use elbowroom::num::Rational;
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use envelope::{EnvelopeArgs, Growth, controllable};
+pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
 pub(crate) use plan::{EMBEDDED, PlanArgs};
@@ -84,6 +86,8 @@ pub(crate) enum Command {
     Run(Box<RunArgs>),
     /// Compare executors over many simulated runs
     Compare(CompareArgs),
+    /// Learn from logs how long actions take and how often they fail
+    Learn(LearnArgs),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
     /// Print a script that completes commands and options in a shell
@@ -102,6 +106,7 @@ impl Command {
             Self::Envelope(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
             Self::Compare(arguments) => arguments.json,
+            Self::Learn(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
             Self::Completions(_) | Self::Man(_) => false,
         }

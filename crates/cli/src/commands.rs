@@ -3,6 +3,7 @@
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod envelope;
+pub(crate) mod learn;
 pub(crate) mod network;
 pub(crate) mod plan;
 pub(crate) mod run;

@@ -41,6 +41,7 @@ fn main() -> ExitCode {
         Command::Stn(arguments) => commands::stn::run(&arguments, &mut output),
         Command::Envelope(arguments) => commands::envelope::run(&arguments, &mut output),
         Command::Compare(arguments) => commands::compare::run(&arguments, &mut output),
+        Command::Learn(arguments) => commands::learn::run(&arguments, &mut output),
         Command::Network(arguments) => commands::network::run(&arguments, &mut output),
         Command::Completions(arguments) => commands::shell::completions(&arguments),
         Command::Man(arguments) => commands::shell::man(&arguments),

@@ -14,10 +14,12 @@
 //! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
 //! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
+//! | what do logs say about the world? | [`LearnRequest`] | [`LearnAnswer`] |
 
 pub mod check;
 pub mod envelope;
 mod format;
+pub mod learn;
 pub mod plan;
 pub mod run;
 pub mod stn;
@@ -28,6 +30,7 @@ pub use check::{CheckAnswer, CheckRequest};
 pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 pub use format::Version;
+pub use learn::{LearnAnswer, LearnRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};

@@ -166,6 +166,7 @@ pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;
 pub use elbowroom_execution as execution;
 pub use elbowroom_external as external;
+pub use elbowroom_learning as learning;
 pub use elbowroom_model as model;
 pub use elbowroom_num as num;
 pub use elbowroom_pddl as pddl;

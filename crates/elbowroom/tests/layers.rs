@@ -29,6 +29,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("execution", &["num", "model", "stn", "plan", "probability"]),
     ("sim", &["text", "num", "model", "probability", "execution"]),
     ("report", &["num", "model", "plan", "execution"]),
+    ("learning", &["text", "num", "sim", "report"]),
     (
         "elbowroom",
         &[
@@ -46,6 +47,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "execution",
             "sim",
             "report",
+            "learning",
         ],
     ),
     (

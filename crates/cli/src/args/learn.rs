@@ -1,0 +1,52 @@
+//! What can be said to `elbowroom learn`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use elbowroom::num::Rational;
+
+use super::envelope::Guarantee;
+use super::number::positive;
+
+#[derive(Args, Debug)]
+pub(crate) struct LearnArgs {
+    /// Logs, oldest first: traces of `elbowroom run --trace`, or tables (docs/formats/log-csv.md)
+    #[arg(value_name = "LOG", required = true)]
+    pub(crate) logs: Vec<PathBuf>,
+    /// Write what was learnt as a world file, for `elbowroom run --world`
+    #[arg(short, long, value_name = "WORLD.toml")]
+    pub(crate) output: Option<PathBuf>,
+    /// Times in the logs are multiples of this, in seconds
+    #[arg(long, value_name = "S", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) resolution: Rational,
+    /// Report a drift where the evidence for it is N to one; in logs without drift that happens with
+    /// a probability of at most 1/N for each action
+    #[arg(long, value_name = "N", default_value = "100", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) drift: Rational,
+    /// Seed for telling equal values apart in the search for drift
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Compute intervals that hold all durations of the next execution of a plan with this probability,
+    /// whatever their distributions, and check that the plan survives all that lies in them
+    #[arg(long, value_name = "P", requires_all = ["domain", "problem", "plan"])]
+    pub(crate) inside: Option<Rational>,
+    /// The domain of that plan, in PDDL
+    #[arg(long, value_name = "FILE", requires = "inside")]
+    pub(crate) domain: Option<PathBuf>,
+    /// The problem of that plan, in PDDL
+    #[arg(long, value_name = "FILE", requires = "inside")]
+    pub(crate) problem: Option<PathBuf>,
+    /// That plan
+    #[arg(long, value_name = "FILE", requires = "inside")]
+    pub(crate) plan: Option<PathBuf>,
+    /// What it means that the plan survives the intervals
+    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic, requires = "inside")]
+    pub(crate) guarantee: Guarantee,
+    /// Minimum time between interfering happenings (epsilon)
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(requires = "inside")]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}

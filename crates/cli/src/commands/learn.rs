@@ -1,0 +1,304 @@
+//! `elbowroom learn`: what logs say about the world.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use elbowroom::answers::Unwatched;
+use elbowroom::answers::learn::{
+    ActionLearnt, ConformalBox, DriftAnswer, DurationsLearnt, FitAnswer, GroupAnswer,
+    InsideRequest, LearnAnswer, LearnRequest, Log, LogError, Settings, Verdict,
+    expectation_and_reality, learn,
+};
+use elbowroom::num::{End, Rational};
+use elbowroom::report::table::Table;
+
+use crate::args::{LearnArgs, ProblemArgs};
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::limits::push_paragraph;
+use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
+use crate::output::{self, Output};
+use crate::words::counted;
+
+/// Reads the logs, and says what they tell.
+pub(crate) fn run(arguments: &LearnArgs, output: &mut Output) -> Answer {
+    let is_on_stdout = arguments
+        .output
+        .as_ref()
+        .is_some_and(|path| path.as_os_str() == "-");
+    if is_on_stdout && arguments.json {
+        return Err(Failure::new(
+            "only one of --json and --output can go to standard output",
+            "name a file for the world",
+        ));
+    }
+    let inside = inside(arguments, output)?;
+    let mut logs = Vec::new();
+    for path in &arguments.logs {
+        let source = input::source(path, "log")?;
+        let log = Log::read(&source).map_err(|error| match error {
+            LogError::Table(mistakes) => Failure::from(mistakes),
+            error => Failure::new(
+                error,
+                "traces are what `elbowroom run --trace` writes; docs/formats/log-csv.md describes tables",
+            ),
+        })?;
+        if log.records.is_empty() {
+            output::warn(&format!("{}: no action was started in it", log.name));
+        }
+        logs.push(log);
+    }
+    let request = LearnRequest {
+        logs,
+        settings: Settings {
+            resolution: arguments.resolution.to_f64(),
+            drift_limit: arguments.drift.to_f64(),
+            seed: arguments.seed,
+        },
+        inside,
+    };
+    let answer = learn(&request, &mut Unwatched).map_err(|error| Failure::new(error, ""))?;
+    if let Some(path) = &arguments.output {
+        output::write_file(path, &answer.world)?;
+    }
+    if arguments.json {
+        output.document(&answer)?;
+    } else if !is_on_stdout {
+        output::print(&text(&request, &answer, Look::of_stdout()))?;
+    }
+    Ok(match &answer.inside {
+        Some(found) if found.verdict != Verdict::Inside => Exit::No,
+        _ => Exit::Yes,
+    })
+}
+
+fn inside(arguments: &LearnArgs, output: &mut Output) -> Result<Option<InsideRequest>, Failure> {
+    let (Some(probability), Some(domain), Some(problem), Some(plan)) = (
+        &arguments.inside,
+        &arguments.domain,
+        &arguments.problem,
+        &arguments.plan,
+    ) else {
+        return Ok(None);
+    };
+    if !probability.is_positive() || *probability >= Rational::ONE {
+        return Err(Failure::new(
+            format!("--inside takes a probability between 0 and 1, not {probability}"),
+            "write --inside 0.95, for instance",
+        ));
+    }
+    let problem = ProblemArgs {
+        domain: domain.clone(),
+        problem: problem.clone(),
+    };
+    let task = Arc::new(input::task(&problem, &arguments.epsilon, output)?);
+    let plan = input::any_plan(&task, plan, output)?;
+    Ok(Some(InsideRequest {
+        task,
+        plan,
+        guarantee: arguments.guarantee.into(),
+        probability: probability.to_f64(),
+    }))
+}
+
+fn text(request: &LearnRequest, answer: &LearnAnswer, look: Look) -> String {
+    let logs = counted(answer.logs.len(), "log");
+    let attempts = counted(answer.attempts, "attempt");
+    let title = format!("What {logs} with {attempts} say");
+    let mut text = format!("{}\n\n", styled(STRONG, &title));
+    if answer.actions.is_empty() {
+        text.push_str("No action was started.\n");
+        return text;
+    }
+    let rows = answer
+        .actions
+        .iter()
+        .flat_map(|action| rows(request, action));
+    let table = Table {
+        caption: String::new(),
+        headings: ["action", "planned", "actual", "duration", "failed"]
+            .map(str::to_owned)
+            .to_vec(),
+        keys: 1,
+        rows: rows.collect(),
+        notes: Vec::new(),
+    };
+    text.push_str(table.within(look.width).trim_start_matches('\n'));
+    for action in &answer.actions {
+        remarks(&mut text, action, look);
+    }
+    if let Some(inside) = &answer.inside {
+        conformal(&mut text, inside, look);
+    }
+    text
+}
+
+/// The rows of an action: one, or one for each ground action that is described apart.
+fn rows(request: &LearnRequest, action: &ActionLearnt) -> Vec<Vec<String>> {
+    let records = request.logs.iter().flat_map(|log| &log.records);
+    let records: Vec<_> = records.cloned().collect();
+    let (planned, actual) = match expectation_and_reality(&records, &action.action) {
+        Some((planned, actual)) => (short(planned), short(actual)),
+        None => (String::new(), String::new()),
+    };
+    let failures = &action.failures;
+    let failed = format!("{} of {}", failures.failed, failures.ended);
+    let row = |name: &str, words: String, failed: String| {
+        vec![
+            name.to_owned(),
+            planned.clone(),
+            actual.clone(),
+            words,
+            failed,
+        ]
+    };
+    match &action.durations {
+        DurationsLearnt::Unknown => vec![row(&action.action, "not known".to_owned(), failed)],
+        DurationsLearnt::Together { group } => {
+            vec![row(&action.action, distribution(group, ""), failed)]
+        }
+        DurationsLearnt::Relative { group } => {
+            let words = distribution(group, " x planned");
+            vec![row(&action.action, words, failed)]
+        }
+        DurationsLearnt::Apart { groups } => {
+            let mut rows = vec![row(&action.action, "each by itself:".to_owned(), failed)];
+            for named in groups {
+                let words = distribution(&named.group, "");
+                let name = format!("  {}", named.action);
+                rows.push(vec![
+                    name,
+                    String::new(),
+                    String::new(),
+                    words,
+                    String::new(),
+                ]);
+            }
+            rows
+        }
+    }
+}
+
+fn distribution(group: &GroupAnswer, unit: &str) -> String {
+    let mut words = fit(&group.fit);
+    words.push_str(unit);
+    let _ = write!(words, ", from {}", group.observed);
+    if group.censored > 0 {
+        let _ = write!(words, " and {} cut off", group.censored);
+    }
+    words
+}
+
+fn fit(fit: &FitAnswer) -> String {
+    let mut numbers = fit.numbers.iter().map(|(_, value)| short(*value));
+    match (fit.family.as_str(), numbers.next(), numbers.next()) {
+        ("constant", Some(value), _) => value,
+        ("uniform", Some(from), Some(to)) => format!("uniform {from} to {to}"),
+        (family, Some(mean), Some(deviation)) => format!("{family} {mean} ± {deviation}"),
+        (family, _, _) => format!("{family}, mean {}", short(fit.mean)),
+    }
+}
+
+fn remarks(text: &mut String, action: &ActionLearnt, look: Look) {
+    let mut remark = |words: String| {
+        text.push('\n');
+        push_paragraph(text, &words, look.width);
+    };
+    if let Some(delay) = &action.delay {
+        remark(format!(
+            "{} starts late: {} seconds after the command.",
+            action.action,
+            fit(delay)
+        ));
+    }
+    let drifted = |drift: &DriftAnswer, what: &str| {
+        let since = drift.since?;
+        Some(format!(
+            "{}: {} {what} drifted, noticed at number {since} of them. What was learnt mixes before and after.",
+            styled(HINT, "drift"),
+            action.action
+        ))
+    };
+    let durations = action
+        .drift
+        .as_ref()
+        .and_then(|drift| drifted(drift, "durations have"));
+    let failures = drifted(&action.failure_drift, "failures have");
+    for words in durations.into_iter().chain(failures) {
+        remark(words);
+    }
+}
+
+fn conformal(text: &mut String, inside: &ConformalBox, look: Look) {
+    let percent = short(100.0 * inside.probability);
+    let verdict = match inside.verdict {
+        Verdict::Inside => format!(
+            "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
+             intervals, and the plan survives whatever lies in them.",
+            styled(GOOD, "inside")
+        ),
+        Verdict::Outside => format!(
+            "{}: with a probability of at least {percent} %, all durations of the next run lie in these \
+             intervals, but the plan does not survive everything in them.",
+            styled(BAD, "outside")
+        ),
+        Verdict::TooFew => format!(
+            "{}: there are too few samples to promise {percent} %.",
+            styled(BAD, "too few")
+        ),
+        Verdict::NoEnvelope => format!(
+            "{}: the plan does not work even as planned; `elbowroom check` says why.",
+            styled(BAD, "no envelope")
+        ),
+    };
+    text.push('\n');
+    push_paragraph(text, &verdict, look.width);
+    if inside.intervals.is_empty() {
+        return;
+    }
+    let end = |end: &End| match end {
+        End::Infinite => "inf".to_owned(),
+        End::Closed(value) | End::Open(value) => value.to_decimal(3),
+    };
+    let rows = inside.intervals.iter().map(|interval| {
+        let samples = match interval.needed {
+            Some(needed) => format!("{} of {needed}", interval.samples),
+            None => interval.samples.to_string(),
+        };
+        vec![
+            interval.parameter.clone(),
+            interval.action.clone(),
+            interval.nominal.to_decimal(3),
+            end(&interval.lower),
+            end(&interval.upper),
+            samples,
+        ]
+    });
+    let table = Table {
+        caption: String::new(),
+        headings: ["", "action", "nominal", "lower", "upper", "samples"]
+            .map(str::to_owned)
+            .to_vec(),
+        keys: 1,
+        rows: rows.collect(),
+        notes: Vec::new(),
+    };
+    text.push('\n');
+    text.push_str(table.within(look.width).trim_start_matches('\n'));
+}
+
+/// Three significant digits or so.
+fn short(value: f64) -> String {
+    let digits = match value.abs() {
+        value if value >= 100.0 => 0,
+        value if value >= 10.0 => 1,
+        value if value >= 1.0 => 2,
+        _ => 3,
+    };
+    let text = format!("{value:.digits$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}

@@ -1,0 +1,233 @@
+//! Will the next run stay inside the plan's envelope? Intervals by split conformal prediction.
+
+use std::sync::Arc;
+
+use elbowroom_envelope::{Guarantee, Oracle};
+use elbowroom_learning::conformal::{Band, allotment, factor, fewest};
+use elbowroom_learning::learn::Learnt;
+use elbowroom_learning::survival::Sample;
+use elbowroom_model::Task;
+use elbowroom_num::{End, Interval, Rational};
+use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan, Side};
+use serde::{Deserialize, Serialize};
+
+use crate::AnyPlan;
+use crate::answers::envelope::{EnvelopeRequest, envelope};
+use crate::answers::{RequestError, Watcher, exact};
+use crate::flow::FlowError;
+
+/// Asks for intervals that hold all durations of the next execution of a plan at once, with a probability of
+/// at least `probability`, and whether they lie inside what the plan survives.
+#[derive(Clone, Debug)]
+pub struct InsideRequest {
+    /// The problem.
+    pub task: Arc<Task>,
+    /// The plan.
+    pub plan: AnyPlan,
+    /// What the plan has to survive.
+    pub guarantee: Guarantee,
+    /// The probability, greater than 0 and less than 1.
+    pub probability: f64,
+}
+
+/// The intervals, and what they are worth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConformalBox {
+    /// The probability that was asked for.
+    pub probability: f64,
+    /// Whether the plan survives whatever lies in the intervals.
+    pub verdict: Verdict,
+    /// The intervals, in the order of the plan's parameters.
+    pub intervals: Vec<ConformalInterval>,
+}
+
+/// What the intervals are worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// All durations of the next run lie in the intervals with the probability that was asked for, and the
+    /// plan survives all that lies in them.
+    Inside,
+    /// The first holds, but the plan does not survive everything in the intervals.
+    Outside,
+    /// There are too few samples for some action.
+    TooFew,
+    /// The plan does not work even as planned.
+    NoEnvelope,
+}
+
+/// The interval of one duration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConformalInterval {
+    /// The name of the parameter.
+    pub parameter: String,
+    /// The action whose duration it is.
+    pub action: String,
+    /// The planned duration.
+    #[serde(with = "exact")]
+    pub nominal: Rational,
+    /// The lower end.
+    #[serde(with = "exact::lower")]
+    pub lower: End,
+    /// The upper end.
+    #[serde(with = "exact::upper")]
+    pub upper: End,
+    /// With which probability the duration may lie outside.
+    pub miss: f64,
+    /// How far the envelope's interval was stretched around the planned duration: up to 1, the interval lies
+    /// inside the envelope. `None` if no stretching is enough.
+    pub factor: Option<f64>,
+    /// How many samples were used for it.
+    pub samples: usize,
+    /// How many would be needed, where these are too few.
+    pub needed: Option<usize>,
+}
+
+/// A duration of the plan, its room, and its samples in two halves.
+struct Duration<'a> {
+    index: usize,
+    action: &'a str,
+    band: Band,
+    training: Vec<Sample>,
+    calibration: Vec<Sample>,
+}
+
+pub(super) fn answer(
+    request: &InsideRequest,
+    learnt: &[Learnt],
+    watcher: &mut dyn Watcher,
+) -> Result<ConformalBox, RequestError> {
+    let envelope_request = EnvelopeRequest {
+        guarantee: request.guarantee,
+        ..EnvelopeRequest::new(&request.task, request.plan.clone())
+    };
+    let outcome = envelope(&envelope_request, watcher)?;
+    let (Some(plan), Some(room)) = (outcome.plan, outcome.envelope) else {
+        return Ok(ConformalBox {
+            probability: request.probability,
+            verdict: Verdict::NoEnvelope,
+            intervals: Vec::new(),
+        });
+    };
+    let durations = durations(&plan, &room, learnt);
+    let halves: Vec<(Band, Vec<Sample>)> = durations
+        .iter()
+        .map(|duration| (duration.band, duration.training.clone()))
+        .collect();
+    let shares = allotment(&halves, 1.0 - request.probability);
+    let mut intervals = Vec::new();
+    let mut boxed = DecoupledEnvelope::point(&plan.nominal());
+    let mut verdict = Verdict::Inside;
+    for (duration, miss) in durations.iter().zip(shares) {
+        let parameter = &plan.parameters[duration.index];
+        let stretching = factor(duration.band, &duration.calibration, miss);
+        let needed = fewest(miss);
+        let is_too_few = duration.calibration.len() < needed;
+        let interval = interval(
+            &parameter.nominal,
+            room.intervals()[duration.index].clone(),
+            stretching,
+        );
+        if is_too_few {
+            verdict = Verdict::TooFew;
+        }
+        intervals.push(ConformalInterval {
+            parameter: parameter.name.clone(),
+            action: duration.action.to_owned(),
+            nominal: parameter.nominal.clone(),
+            lower: interval.lower.clone(),
+            upper: interval.upper.clone(),
+            miss,
+            factor: stretching.is_finite().then_some(stretching),
+            samples: duration.training.len() + duration.calibration.len(),
+            // As many again for the other half.
+            needed: is_too_few.then(|| needed.saturating_mul(2)),
+        });
+        boxed = boxed.with_interval(duration.index.into(), interval);
+    }
+    if verdict == Verdict::Inside {
+        let mut oracle =
+            Oracle::new(&request.task, &plan, request.guarantee).map_err(FlowError::from)?;
+        let objection = oracle.objection(&boxed).map_err(FlowError::from)?;
+        if objection.is_some() {
+            verdict = Verdict::Outside;
+        }
+    }
+    Ok(ConformalBox {
+        probability: request.probability,
+        verdict,
+        intervals,
+    })
+}
+
+/// The durations that are left open, with their samples: every second one is for training.
+fn durations<'a>(
+    plan: &'a ParametrizedPlan,
+    room: &DecoupledEnvelope,
+    learnt: &[Learnt],
+) -> Vec<Duration<'a>> {
+    let mut durations = Vec::new();
+    for (index, parameter) in plan.parameters.iter().enumerate() {
+        let ParameterKind::Duration(instance) = parameter.kind else {
+            continue;
+        };
+        let action = plan.plan.instance(instance).action.name.as_str();
+        let nominal = parameter.nominal.to_f64();
+        let interval = &room.intervals()[index];
+        let end = |side: Side, infinite: f64| {
+            side.of(interval).value().map_or(infinite, Rational::to_f64)
+        };
+        let band = Band {
+            nominal,
+            lower: end(Side::Lower, f64::NEG_INFINITY),
+            upper: end(Side::Upper, f64::INFINITY),
+        };
+        let name = action.trim_matches(['(', ')']).split_whitespace().next();
+        let samples: Vec<Sample> = learnt
+            .iter()
+            .find(|learnt| Some(learnt.name.as_str()) == name)
+            .and_then(|learnt| learnt.durations.of(action, nominal))
+            .map(|(group, unit)| {
+                let samples = group.samples.iter();
+                samples.map(|sample| sample.over(1.0 / unit)).collect()
+            })
+            .unwrap_or_default();
+        let half = |parity: usize| {
+            let numbered = samples.iter().enumerate();
+            numbered
+                .filter(|(number, _)| number % 2 == parity)
+                .map(|(_, sample)| *sample)
+                .collect()
+        };
+        durations.push(Duration {
+            index,
+            action,
+            band,
+            training: half(0),
+            calibration: half(1),
+        });
+    }
+    durations
+}
+
+/// The envelope's interval, stretched around the nominal value, rounded outwards to exact numbers.
+fn interval(nominal: &Rational, room: Interval, stretching: f64) -> Interval {
+    if stretching <= 0.0 {
+        return Interval::point(nominal.clone());
+    }
+    let Some(stretching) = Rational::from_f64_exactly(stretching) else {
+        return Interval::at_least(Rational::ZERO);
+    };
+    let stretched = |end: &End| match end.value() {
+        None => End::Infinite,
+        Some(value) => End::Closed(nominal + (value - nominal) * &stretching),
+    };
+    let lower = match stretched(&room.lower) {
+        End::Closed(value) if value < Rational::ZERO => End::Closed(Rational::ZERO),
+        end => end,
+    };
+    Interval {
+        lower,
+        upper: stretched(&room.upper),
+    }
+}

@@ -1,0 +1,288 @@
+//! What is learnt from logs of worlds that are known: distributions, failures, and intervals that hold as
+//! often as they promise.
+
+use std::sync::Arc;
+
+use elbowroom::answers::Unwatched;
+use elbowroom::answers::learn::{
+    DurationsLearnt, InsideRequest, LearnAnswer, LearnRequest, Log, Settings, Verdict, learn,
+};
+use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::envelope::Guarantee;
+use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::execution::run::Verdict as Ended;
+use elbowroom::learning::records::{Outcome, Record, of_trace};
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::End;
+use elbowroom::pddl::{read_plan, read_problem};
+use elbowroom::report::trace::{Stored, TraceWriter};
+use elbowroom::sim::WorldModel;
+use elbowroom::text::Source;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::Distribution as _;
+
+const DOMAIN: &str = include_str!("../../../cases/delivery/domain.pddl");
+const PROBLEM: &str = include_str!("../../../cases/delivery/problem.pddl");
+const PLAN: &str = include_str!("../../../cases/delivery/plan.plan");
+
+/// Drives are slow now and then, the unlocking starts late, and picking can fail on the way.
+const WORLD: &str = "format = \"elbowroom-world\"\nversion = 1\n\
+    [[duration]]\naction = \"drive\"\nnormal = { mean = 1.2, deviation = 0.2 }\nrelative = true\n\
+    [[duration]]\naction = \"unlock\"\nuniform = { from = 5, to = 15 }\n\
+    [[delay]]\naction = \"unlock\"\nuniform = { from = 0, to = 2 }\n\
+    [[failure]]\naction = \"pick\"\nprobability = 0.2\nwhen = \"midway\"\n";
+
+fn spec(world: &str, seed: u64) -> RunSpec {
+    let named = |name: &str, text: &str| NamedText {
+        name: name.to_owned(),
+        text: text.to_owned(),
+    };
+    RunSpec {
+        world: Some(world.to_owned()),
+        seed,
+        has_plan: true,
+        ..RunSpec::new(named("domain.pddl", DOMAIN), named("problem.pddl", PROBLEM))
+    }
+}
+
+fn problem() -> (Arc<Task>, TimeTriggeredPlan) {
+    let (problem, _) =
+        read_problem(&Source::from(DOMAIN), &Source::from(PROBLEM)).expect("a correct test");
+    let task = Arc::new(Task::new(problem));
+    let (plan, _) = read_plan(&Source::from(PLAN), &task).expect("a correct test");
+    (task, plan)
+}
+
+/// A run in the world: its trace, and whether the goal was reached.
+fn run(world: &str, seed: u64) -> (String, bool) {
+    let (task, plan) = problem();
+    let spec = spec(world, seed);
+    let mut text = String::new();
+    let mut sink = |line: &str| text.push_str(line);
+    let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
+    writer.header(&spec).expect("texts and numbers");
+    let request = RunRequest::new(&spec, &task)
+        .beginning_with(plan)
+        .recorded_by(&mut writer);
+    let outcome = simulate(request, &mut Unwatched).expect("a world");
+    let is_done = *outcome.verdict() == Ended::GoalReached;
+    drop(writer);
+    (text, is_done)
+}
+
+fn logs(count: u64) -> Vec<Log> {
+    (0..count)
+        .map(|seed| {
+            let (trace, _) = run(WORLD, seed);
+            Log::read(&Source::new(format!("run {seed}"), trace)).expect("a trace")
+        })
+        .collect()
+}
+
+fn learnt(logs: Vec<Log>, inside: Option<InsideRequest>) -> LearnAnswer {
+    let request = LearnRequest {
+        logs,
+        settings: Settings::default(),
+        inside,
+    };
+    learn(&request, &mut Unwatched).expect("an answer")
+}
+
+#[test]
+fn the_world_behind_traces_is_found_again() {
+    let (task, _) = problem();
+    for count in [20, 50, 200] {
+        let answer = learnt(logs(count), None);
+        let of = |name: &str| {
+            let action = answer.actions.iter().find(|action| action.action == name);
+            action.expect("it was executed")
+        };
+        let DurationsLearnt::Relative { group } = &of("drive").durations else {
+            panic!("{count}: {:?}", of("drive"));
+        };
+        let error = group
+            .fit
+            .standard_error
+            .expect("a normal or lognormal distribution");
+        assert!(
+            (group.fit.mean - 1.2).abs() <= 3.5 * error,
+            "{count}: {group:?}"
+        );
+        let pick = &of("pick").failures;
+        let (lower, upper) = pick.interval.expect("picks have ended");
+        assert!(lower <= 0.2 && 0.2 <= upper, "{count}: {pick:?}");
+        assert_eq!(pick.when.as_deref(), Some("midway"), "{count}: {pick:?}");
+        assert!(of("unlock").delay.is_some(), "{count}");
+        assert!(of("drive").delay.is_none(), "{count}");
+        let drift = of("drive")
+            .drift
+            .as_ref()
+            .expect("drives are described together");
+        assert_eq!(drift.since, None);
+        // What is written can be read.
+        let source = Source::new("learnt.toml", answer.world.clone());
+        WorldModel::read(source, task.problem()).expect("a world file");
+        // The answer is data.
+        let json = serde_json::to_string(&answer).expect("texts and numbers");
+        let read: LearnAnswer = serde_json::from_str(&json).expect("an answer");
+        assert_eq!(read, answer);
+    }
+}
+
+#[test]
+fn runs_in_the_learnt_world_go_as_in_the_true_one() {
+    let learnt = learnt(logs(200), None).world;
+    let rate = |world: &str| {
+        let done = (1000..1400).filter(|&seed| run(world, seed).1).count();
+        f64::from(u32::try_from(done).expect("few runs")) / 400.0
+    };
+    let (true_rate, learnt_rate) = (rate(WORLD), rate(&learnt));
+    // Twice the deviation of the difference of two rates of 400 runs.
+    assert!(
+        (true_rate - learnt_rate).abs() < 0.07,
+        "{true_rate} {learnt_rate}"
+    );
+}
+
+/// Actions that were cut off are those that took long: without them, all look quick.
+#[test]
+fn what_was_cut_off_counts() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let drawn = rand_distr::Normal::new(10.0, 3.0).expect("a distribution");
+    let records: Vec<Record> = (0..300)
+        .map(|_| {
+            let duration: f64 = drawn.sample(&mut rng);
+            let is_cancelled = duration > 11.0;
+            Record {
+                action: "(drive a b)".to_owned(),
+                commanded: Some(0.0),
+                start: Some(0.0),
+                end: duration.min(11.0),
+                outcome: if is_cancelled {
+                    Outcome::Cancelled
+                } else {
+                    Outcome::Succeeded
+                },
+                planned: None,
+            }
+        })
+        .collect();
+    let mean = |records: Vec<Record>| {
+        let name = "log".to_owned();
+        let answer = learnt(vec![Log { name, records }], None);
+        match &answer.actions[0].durations {
+            DurationsLearnt::Together { group } => group.fit.mean,
+            other => panic!("{other:?}"),
+        }
+    };
+    let whole: Vec<Record> = records
+        .iter()
+        .filter(|record| record.outcome == Outcome::Succeeded)
+        .cloned()
+        .collect();
+    let with = mean(records);
+    let without = mean(whole);
+    assert!((with - 10.0).abs() < 0.5, "{with}");
+    assert!(without < 9.2, "{without}");
+}
+
+/// The intervals hold all durations of the next run as often as promised, and no oftener than the number of
+/// samples explains.
+#[test]
+fn conformal_intervals_hold_the_next_run() {
+    let (task, plan) = problem();
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let shape = rand_distr::LogNormal::new(0.0, 0.25).expect("a distribution");
+    let (mut held, mut answered) = (0_u32, 0_u32);
+    let repetitions = 150;
+    for _ in 0..repetitions {
+        let run = |rng: &mut ChaCha8Rng| -> Vec<Record> {
+            plan.steps
+                .iter()
+                .map(|step| {
+                    let planned = step.duration.as_ref().map(|d| d.to_f64());
+                    let duration = planned.unwrap_or(0.0) * shape.sample(rng);
+                    Record {
+                        action: step.action.name.clone(),
+                        commanded: Some(0.0),
+                        start: Some(0.0),
+                        end: duration,
+                        outcome: Outcome::Succeeded,
+                        planned,
+                    }
+                })
+                .collect()
+        };
+        let logs = (0..80).map(|number| Log {
+            name: number.to_string(),
+            records: run(&mut rng),
+        });
+        let inside = InsideRequest {
+            task: Arc::clone(&task),
+            plan: plan.clone().into(),
+            guarantee: Guarantee::Dynamic,
+            probability: 0.7,
+        };
+        let logs = logs.collect();
+        let found = learnt(logs, Some(inside)).inside.expect("it was asked");
+        assert_ne!(found.verdict, Verdict::TooFew);
+        assert_ne!(found.verdict, Verdict::NoEnvelope);
+        let next = run(&mut rng);
+        let is_held = found.intervals.iter().all(|interval| {
+            let own = next.iter().find(|record| record.action == interval.action);
+            let duration = own.expect("each action is executed").end;
+            let above = |end: &End, otherwise: f64| match end.value() {
+                Some(value) => value.to_f64(),
+                None => otherwise,
+            };
+            above(&interval.lower, 0.0) <= duration
+                && duration <= above(&interval.upper, f64::INFINITY)
+        });
+        held += u32::from(is_held);
+        answered += 1;
+    }
+    let rate = f64::from(held) / f64::from(answered);
+    let slack = 3.0 * (0.7_f64 * 0.3 / f64::from(answered)).sqrt();
+    assert!(rate >= 0.7 - slack, "{rate}");
+}
+
+#[test]
+fn too_few_samples_are_told() {
+    let (task, plan) = problem();
+    let inside = InsideRequest {
+        task,
+        plan: plan.into(),
+        guarantee: Guarantee::Dynamic,
+        probability: 0.99,
+    };
+    let found = learnt(logs(5), Some(inside)).inside.expect("it was asked");
+    assert_eq!(found.verdict, Verdict::TooFew);
+    assert!(
+        found
+            .intervals
+            .iter()
+            .all(|interval| interval.needed.is_some())
+    );
+}
+
+/// Only what was believed counts, and a log that ends early has actions that are still running.
+#[test]
+fn a_trace_that_was_cut_off_is_read_up_to_there() {
+    let (trace, _) = run(WORLD, 3);
+    let whole = of_trace(&Stored::read(&trace).expect("a trace"));
+    assert!(
+        whole
+            .iter()
+            .any(|record| record.outcome == Outcome::Succeeded)
+    );
+    for lines in 2..trace.lines().count() {
+        let part: Vec<&str> = trace.lines().take(lines).collect();
+        let records = of_trace(&Stored::read(&part.join("\n")).expect("a trace"));
+        assert!(records.len() <= whole.len());
+        for (record, later) in records.iter().zip(&whole) {
+            assert_eq!(record.action, later.action);
+            assert!(record.end <= later.end, "{record:?} {later:?}");
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! From attempts to rules of a world: which actions are described together, by which distributions, and
+//! how often they fail.
+
+use std::collections::BTreeMap;
+
+use elbowroom_report::statistics::Proportion;
+use elbowroom_sim::{Distribution, Failure};
+use rand::SeedableRng;
+
+use crate::drift::{Drift, drift};
+use crate::fit::{Fit, best};
+use crate::records::{Outcome, Record};
+use crate::survival::{Sample, SurvivalFunction, float};
+
+/// How to learn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Times in the logs are multiples of this, in seconds.
+    pub resolution: f64,
+    /// The evidence at which values are said to have drifted: the reciprocal of the probability of a false
+    /// alarm.
+    pub drift_limit: f64,
+    /// For telling equal values apart when looking for drift.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            resolution: 0.001,
+            drift_limit: 100.0,
+            seed: 0,
+        }
+    }
+}
+
+/// What logs say of the actions with one name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Learnt {
+    /// The name: `drive`.
+    pub name: String,
+    /// How many attempts there were.
+    pub attempts: usize,
+    /// How long the actions take.
+    pub durations: Durations,
+    /// How long after the command they start; `None` where no log says, or where it is always at once.
+    pub delay: Option<Fit>,
+    /// How often they fail, of those attempts that ended by themselves.
+    pub failures: Proportion,
+    /// When they fail, if they do.
+    pub when: Failure,
+    /// Whether their durations change from log to log.
+    pub drift: Drift,
+    /// Whether the frequency of their failures does.
+    pub failure_drift: Drift,
+}
+
+/// How long the actions of one name take.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Durations {
+    /// Nothing was seen to its end, or there is no duration.
+    Unknown,
+    /// All alike.
+    Together(Group),
+    /// As multiples of the planned duration.
+    Relative(Group),
+    /// Each ground action by itself.
+    Apart(BTreeMap<String, Group>),
+}
+
+/// Samples that are described by one distribution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// In the order of the logs.
+    pub samples: Vec<Sample>,
+    /// The distribution.
+    pub fit: Fit,
+}
+
+impl Group {
+    fn of(samples: Vec<Sample>, resolution: f64) -> Option<Self> {
+        let fit = best(&samples, resolution)?;
+        Some(Self { samples, fit })
+    }
+
+    /// How many samples were observed, and how many cut off.
+    pub fn counts(&self) -> (usize, usize) {
+        let censored = self.samples.iter().filter(|sample| sample.is_censored);
+        let censored = censored.count();
+        (self.samples.len() - censored, censored)
+    }
+}
+
+/// The fewest observed durations of each ground action for them to be described apart.
+const FEWEST_APART: usize = 5;
+
+/// What the attempts say, by the actions' names. They stand in the order in which they were made, log by
+/// log.
+pub fn learn(records: &[Record], settings: &Settings) -> Vec<Learnt> {
+    let mut by_name: BTreeMap<&str, Vec<&Record>> = BTreeMap::new();
+    for record in records {
+        by_name.entry(record.name()).or_default().push(record);
+    }
+    let learnt = by_name.into_iter();
+    learnt
+        .map(|(name, records)| of_name(name, &records, settings))
+        .collect()
+}
+
+fn of_name(name: &str, records: &[&Record], settings: &Settings) -> Learnt {
+    let ended = |record: &&&Record| matches!(record.outcome, Outcome::Succeeded | Outcome::Failed);
+    let mut failures = Proportion::default();
+    for record in records.iter().filter(ended) {
+        failures.add(record.outcome == Outcome::Failed);
+    }
+    let mut durations = durations(records, Outcome::is_whole, settings);
+    let when = when(records, &durations, settings);
+    if when == Failure::AtEnd {
+        // What fails at its end has shown how long it takes.
+        let shows = |outcome: Outcome| outcome.is_whole() || outcome == Outcome::Failed;
+        durations = self::durations(records, shows, settings);
+    }
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(settings.seed);
+    let observed: Vec<f64> = durations.in_order();
+    let failed: Vec<f64> = records
+        .iter()
+        .filter(ended)
+        .map(|record| f64::from(u8::from(record.outcome == Outcome::Failed)))
+        .collect();
+    Learnt {
+        name: name.to_owned(),
+        attempts: records.len(),
+        delay: delay(records, settings),
+        failures,
+        when,
+        drift: drift(&observed, settings.drift_limit, &mut rng),
+        failure_drift: drift(&failed, settings.drift_limit, &mut rng),
+        durations,
+    }
+}
+
+impl Outcome {
+    /// Whether the action was seen to its end.
+    fn is_whole(self) -> bool {
+        self == Self::Succeeded
+    }
+}
+
+/// How long an attempt took, or at least took; `None` of one that never started, and of instantaneous
+/// actions.
+fn sample(record: &Record, is_whole: impl Fn(Outcome) -> bool) -> Option<Sample> {
+    let duration = record.end - record.start?;
+    let sample = if is_whole(record.outcome) {
+        Sample::observed(duration)
+    } else {
+        Sample::censored(duration)
+    };
+    Some(sample)
+}
+
+fn durations(
+    records: &[&Record],
+    is_whole: impl Fn(Outcome) -> bool + Copy,
+    settings: &Settings,
+) -> Durations {
+    let resolution = settings.resolution;
+    let all: Vec<(&Record, Sample)> = records
+        .iter()
+        .filter_map(|record| Some((*record, sample(record, is_whole)?)))
+        .collect();
+    // Actions without any duration have none to learn.
+    if all
+        .iter()
+        .all(|(record, sample)| sample.value <= 0.0 && record.planned.is_none())
+    {
+        return Durations::Unknown;
+    }
+    let together = Group::of(all.iter().map(|(_, sample)| *sample).collect(), resolution);
+    let Some(together) = together else {
+        return Durations::Unknown;
+    };
+    let mut best = (together.fit.aicc, Durations::Together(together));
+    let planned = |record: &Record| record.planned.filter(|planned| *planned > 0.0);
+    let relative: Option<Vec<(Sample, f64)>> = all
+        .iter()
+        .map(|(record, sample)| planned(record).map(|planned| (sample.over(planned), planned)))
+        .collect();
+    if let Some(relative) = relative {
+        let samples = relative.iter().map(|(sample, _)| *sample).collect();
+        // A step of the resolution is a different share of each planned duration.
+        let mean = relative
+            .iter()
+            .map(|(_, planned)| planned.ln())
+            .sum::<f64>()
+            / float(all.len());
+        if let Some(group) = Group::of(samples, resolution / mean.exp()) {
+            // With equal criteria multiples are preferred: they also fit what was not seen yet.
+            if group.fit.aicc <= best.0 {
+                best = (group.fit.aicc, Durations::Relative(group));
+            }
+        }
+    }
+    let mut by_action: BTreeMap<&str, Vec<Sample>> = BTreeMap::new();
+    for (record, sample) in &all {
+        by_action.entry(&record.action).or_default().push(*sample);
+    }
+    if by_action.len() > 1 {
+        let groups: Option<BTreeMap<String, Group>> = by_action
+            .into_iter()
+            .map(|(action, samples)| {
+                let group = Group::of(samples, resolution)?;
+                let is_enough = group.counts().0 >= FEWEST_APART;
+                is_enough.then(|| (action.to_owned(), group))
+            })
+            .collect();
+        if let Some(groups) = groups {
+            let sum: f64 = groups.values().map(|group| group.fit.aicc).sum();
+            if sum < best.0 {
+                best = (sum, Durations::Apart(groups));
+            }
+        }
+    }
+    best.1
+}
+
+impl Durations {
+    /// The group that says how long an action takes, and the unit of its samples in seconds.
+    pub fn of(&self, action: &str, planned: f64) -> Option<(&Group, f64)> {
+        match self {
+            Self::Unknown => None,
+            Self::Together(group) => Some((group, 1.0)),
+            Self::Relative(group) => Some((group, planned)),
+            Self::Apart(groups) => groups.get(action).map(|group| (group, 1.0)),
+        }
+    }
+
+    /// The observed values, group by group; within a group in the order of the logs.
+    fn in_order(&self) -> Vec<f64> {
+        let observed = |group: &Group| {
+            let observed = group.samples.iter().filter(|sample| !sample.is_censored);
+            observed.map(|sample| sample.value).collect::<Vec<f64>>()
+        };
+        match self {
+            Self::Unknown | Self::Apart(_) => Vec::new(),
+            Self::Together(group) | Self::Relative(group) => observed(group),
+        }
+    }
+}
+
+fn delay(records: &[&Record], settings: &Settings) -> Option<Fit> {
+    let delays: Vec<Sample> = records
+        .iter()
+        .filter_map(|record| Some(Sample::observed(record.start? - record.commanded?)))
+        .collect();
+    let is_at_once = delays
+        .iter()
+        .all(|delay| delay.value <= settings.resolution / 2.0);
+    if is_at_once {
+        return None;
+    }
+    best(&delays, settings.resolution)
+}
+
+/// When the failed attempts failed: most of them before they had started, or at once; or else, whichever of
+/// *at the end* and *at a moment of the duration, all alike* makes the observed times likelier.
+fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Failure {
+    let failed: Vec<(&str, f64, Option<f64>)> = records
+        .iter()
+        .filter(|record| record.outcome == Outcome::Failed)
+        .map(|record| {
+            let duration = record.start.map_or(0.0, |start| record.end - start);
+            (record.action.as_str(), duration, record.planned)
+        })
+        .collect();
+    let early = failed
+        .iter()
+        .filter(|(_, duration, _)| *duration <= settings.resolution);
+    let early = early.count();
+    if failed.is_empty() || 2 * early > failed.len() {
+        return if failed.is_empty() {
+            Failure::AtEnd
+        } else {
+            Failure::AtStart
+        };
+    }
+    // How far into its duration an attempt failed, in units of the mean duration: at the end, that is
+    // about 1, and midway about 1/2.
+    let shares: Vec<f64> = failed
+        .iter()
+        .filter(|(_, duration, _)| *duration > settings.resolution)
+        .filter_map(|(action, duration, planned)| {
+            let (group, unit) = durations.of(action, planned.unwrap_or(1.0))?;
+            let survival = SurvivalFunction::of(&group.samples);
+            let mean = mean(&survival)?;
+            (mean > 0.0).then(|| duration / (unit * mean))
+        })
+        .collect();
+    let middle = shares.iter().sum::<f64>() / float(shares.len().max(1));
+    if shares.is_empty() || middle > 0.75 {
+        Failure::AtEnd
+    } else {
+        Failure::Midway
+    }
+}
+
+/// The mean of the observed part of a distribution.
+fn mean(survival: &SurvivalFunction) -> Option<f64> {
+    let mut before = 1.0;
+    let mut sum = 0.0;
+    for (value, after) in survival.steps() {
+        sum += value * (before - after);
+        before = *after;
+    }
+    (before < 1.0).then(|| sum / (1.0 - before))
+}
+
+/// A distribution that always has the same value, and that value.
+pub(crate) fn constant(distribution: &Distribution) -> Option<f64> {
+    match distribution {
+        Distribution::Constant(value) => Some(*value),
+        _ => None,
+    }
+}

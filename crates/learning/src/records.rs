@@ -1,0 +1,131 @@
+//! What was done, start by start, as logs tell it.
+
+use std::collections::BTreeMap;
+
+use elbowroom_num::Rational;
+use elbowroom_report::trace::line::{GivenLine, ObservationLine};
+use elbowroom_report::trace::{Line, Stored};
+
+/// How an attempt to do something ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// As it should.
+    Succeeded,
+    /// Without success, whether by chance or because a condition of it did not hold: logs tell that in
+    /// free text only.
+    Failed,
+    /// Because it was told to.
+    Cancelled,
+    /// Not before the log did.
+    Running,
+}
+
+/// One attempt to execute an action.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// The action with its objects: `(drive rover depot shelf)`.
+    pub action: String,
+    /// When it was commanded, in seconds; `None` where the log does not say.
+    pub commanded: Option<f64>,
+    /// When it started; `None` if it never did.
+    pub start: Option<f64>,
+    /// When it ended, or the log did.
+    pub end: f64,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// How long it was planned to take; `None` where the log does not say, and for instantaneous actions.
+    pub planned: Option<f64>,
+}
+
+impl Record {
+    /// The name of the action, without its objects.
+    pub fn name(&self) -> &str {
+        let inner = self.action.trim_matches(['(', ')']);
+        inner.split_whitespace().next().unwrap_or_default()
+    }
+}
+
+/// A start whose end has not been seen yet.
+struct Open {
+    action: String,
+    commanded: f64,
+    planned: Option<f64>,
+    start: Option<f64>,
+}
+
+/// The starts of a trace, in the order of the commands. What was observed and not taken at its word is left
+/// out. An action whose start was never reported has started when it was commanded, if it ended at all.
+pub fn of_trace(trace: &Stored) -> Vec<Record> {
+    let mut open: BTreeMap<u64, Open> = BTreeMap::new();
+    let mut records: Vec<(u64, Record)> = Vec::new();
+    let mut last = 0.0_f64;
+    for line in &trace.lines {
+        match line {
+            Line::Command(line) => {
+                last = last.max(float(&line.now.0));
+                if let GivenLine::Start {
+                    ticket,
+                    action,
+                    duration,
+                } = &line.command
+                {
+                    let start = Open {
+                        action: action.clone(),
+                        commanded: float(&line.now.0),
+                        planned: duration.as_ref().map(|duration| float(&duration.0)),
+                        start: None,
+                    };
+                    open.insert(*ticket, start);
+                }
+            }
+            Line::Passed(line) => last = last.max(float(&line.now.0)),
+            Line::Observed(line) if line.remark.is_none() => match &line.observation {
+                ObservationLine::Started { ticket, time, .. } => {
+                    if let Some(open) = open.get_mut(ticket) {
+                        open.start = Some(float(&time.0));
+                    }
+                }
+                ObservationLine::Ended {
+                    ticket,
+                    outcome,
+                    time,
+                    ..
+                } => {
+                    if let Some(open) = open.remove(ticket) {
+                        let outcome = match outcome.as_str() {
+                            "succeeded" => Outcome::Succeeded,
+                            "cancelled" => Outcome::Cancelled,
+                            _ => Outcome::Failed,
+                        };
+                        records.push((*ticket, closed(open, float(&time.0), outcome)));
+                    }
+                }
+                _ => {}
+            },
+            Line::Over(line) => last = last.max(float(&line.time)),
+            _ => {}
+        }
+    }
+    for (ticket, open) in open {
+        let end = last.max(open.commanded);
+        records.push((ticket, closed(open, end, Outcome::Running)));
+    }
+    records.sort_by_key(|(ticket, _)| *ticket);
+    records.into_iter().map(|(_, record)| record).collect()
+}
+
+fn closed(open: Open, end: f64, outcome: Outcome) -> Record {
+    let has_started = outcome == Outcome::Succeeded;
+    Record {
+        action: open.action,
+        commanded: Some(open.commanded),
+        start: open.start.or(has_started.then_some(open.commanded)),
+        end,
+        outcome,
+        planned: open.planned,
+    }
+}
+
+fn float(value: &Rational) -> f64 {
+    value.to_f64()
+}

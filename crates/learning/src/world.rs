@@ -1,0 +1,155 @@
+//! What was learnt, as a world file (`docs/formats/world.md`).
+
+use elbowroom_sim::{Distribution, Failure};
+use toml::{Table, Value};
+
+use crate::fit::Fit;
+use crate::learn::{Durations, Group, Learnt, constant};
+
+/// The world file, with a comment on each section that says on what it rests.
+pub fn write(learnt: &[Learnt], resolution: f64) -> String {
+    let mut text = String::from("format = \"elbowroom-world\"\nversion = 1\n");
+    text.push_str(&format!("resolution = {}\n", Value::Float(resolution)));
+    for action in learnt {
+        durations(&mut text, action);
+        if let Some(fit) = &action.delay {
+            let remark = format!("delays of {}", action.name);
+            section(&mut text, "delay", &action.name, fit, false, &remark);
+        }
+        failures(&mut text, action);
+    }
+    text
+}
+
+fn durations(text: &mut String, learnt: &Learnt) {
+    match &learnt.durations {
+        Durations::Unknown => {}
+        Durations::Together(group) => {
+            section(
+                text,
+                "duration",
+                &learnt.name,
+                &group.fit,
+                false,
+                &rests_on(group),
+            );
+        }
+        Durations::Relative(group) => {
+            // As planned needs no rule.
+            let is_as_planned =
+                constant(&group.fit.distribution).is_some_and(|share| (share - 1.0).abs() < 1e-9);
+            if !is_as_planned {
+                section(
+                    text,
+                    "duration",
+                    &learnt.name,
+                    &group.fit,
+                    true,
+                    &rests_on(group),
+                );
+            }
+        }
+        Durations::Apart(groups) => {
+            for (action, group) in groups {
+                section(
+                    text,
+                    "duration",
+                    action,
+                    &group.fit,
+                    false,
+                    &rests_on(group),
+                );
+            }
+        }
+    }
+}
+
+fn rests_on(group: &Group) -> String {
+    match group.counts() {
+        (observed, 0) => format!("from {observed} durations"),
+        (observed, censored) => {
+            format!("from {observed} durations and {censored} that were cut off")
+        }
+    }
+}
+
+fn failures(text: &mut String, learnt: &Learnt) {
+    let (Some(share), Some((lower, upper))) = (learnt.failures.share(), learnt.failures.wilson())
+    else {
+        return;
+    };
+    if learnt.failures.successes == 0 {
+        return;
+    }
+    let when = match learnt.when {
+        Failure::AtStart => "start",
+        Failure::Midway => "midway",
+        Failure::AtEnd => "end",
+    };
+    let (failed, of) = (learnt.failures.successes, learnt.failures.count);
+    text.push_str(&format!(
+        "\n# {failed} of {of}; 95 % interval {lower:.3} to {upper:.3}\n[[failure]]\n"
+    ));
+    push(text, "action", Value::String(learnt.name.clone()));
+    push(text, "probability", Value::Float(share));
+    push(text, "when", Value::String(when.to_owned()));
+}
+
+fn section(
+    text: &mut String,
+    kind: &str,
+    action: &str,
+    fit: &Fit,
+    is_relative: bool,
+    remark: &str,
+) {
+    text.push_str(&format!("\n# {remark}"));
+    if let Some(error) = fit.standard_error {
+        text.push_str(&format!("; standard error of the mean {error:.3}"));
+    }
+    text.push_str(&format!("\n[[{kind}]]\n"));
+    push(text, "action", Value::String(action.to_owned()));
+    let table = |pairs: &[(&str, f64)]| {
+        let pairs = pairs
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), Value::Float(*value)));
+        Value::Table(pairs.collect::<Table>())
+    };
+    match &fit.distribution {
+        Distribution::Constant(value) => push(text, "constant", Value::Float(*value)),
+        Distribution::Normal { mean, deviation } => {
+            push(
+                text,
+                "normal",
+                table(&[("mean", *mean), ("deviation", *deviation)]),
+            );
+        }
+        Distribution::LogNormal { mean, deviation } => {
+            push(
+                text,
+                "lognormal",
+                table(&[("mean", *mean), ("deviation", *deviation)]),
+            );
+        }
+        Distribution::Uniform { from, to } => {
+            push(text, "uniform", table(&[("from", *from), ("to", *to)]));
+        }
+        Distribution::Triangular { from, mode, to } => {
+            let numbers = [("from", *from), ("mode", *mode), ("to", *to)];
+            push(text, "triangular", table(&numbers));
+        }
+        Distribution::Empirical(values) => {
+            let values = values.iter().map(|value| Value::Float(*value)).collect();
+            push(text, "values", Value::Array(values));
+        }
+        // Nothing here is fitted by these.
+        Distribution::Exponential { .. } | Distribution::Gamma { .. } => {}
+    }
+    if is_relative {
+        push(text, "relative", Value::Boolean(true));
+    }
+}
+
+fn push(text: &mut String, key: &str, value: Value) {
+    text.push_str(&format!("{key} = {value}\n"));
+}
