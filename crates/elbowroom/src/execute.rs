@@ -22,6 +22,6 @@ pub use external::External;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
-pub use spec::{NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
+pub use spec::{EMBEDDED, NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
 pub use spoiling::Spoiling;
 pub use vary::check_vary;

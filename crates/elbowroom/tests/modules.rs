@@ -16,19 +16,8 @@ use std::path::{Path, PathBuf};
 const KNOWN: &[(&str, &[&str], &str)] = &[
     (
         "elbowroom",
-        &["answers", "execute", "flow"],
-        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps; \
-         an execution is an answer, and asks for envelopes on its way",
-    ),
-    (
-        "envelope",
-        &["guarantee", "oracle"],
-        "what each guarantee finds is an `Objection` of the oracle",
-    ),
-    (
-        "execution",
-        &["dispatch", "projection"],
-        "the projection plays the rest of a dispatch through, at the dispatch's request",
+        &["answers", "flow"],
+        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps",
     ),
     (
         "execution",
@@ -36,46 +25,9 @@ const KNOWN: &[(&str, &[&str], &str)] = &[
         "the last entry of a record is the run's report",
     ),
     (
-        "external",
-        &["processes", "supervise"],
-        "what processes have used is what their supervisor limits",
-    ),
-    (
-        "external",
-        &["run", "start"],
-        "the settings of a run say how it is started",
-    ),
-    (
         "model",
         &["expression", "ground", "problem"],
         "lifted and ground expressions are one type with different leaves",
-    ),
-    (
-        "plan",
-        &["parameter", "stn_plan"],
-        "bounds mention parameters, and parameters are durations of instances",
-    ),
-    (
-        "report",
-        &["trace", "wire"],
-        "a line of a trace holds what goes over the wire",
-    ),
-    (
-        "stn",
-        &[
-            "consistency",
-            "consistent",
-            "lists",
-            "network",
-            "paths",
-            "schedule",
-        ],
-        "a schedule is of a network, which says whether it has one",
-    ),
-    (
-        "text",
-        &["diagnostic", "record", "render"],
-        "a mistake knows how it is shown and written down",
     ),
 ];
 

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::{ControlConflict, DynamicControl, strong_conflict};
 use crate::feasibility::{Feasibility, Infeasible, MOST_BRANCHES};
+use crate::objection::Objection;
 use crate::obligations::Refusal;
-use crate::oracle::Objection;
 use crate::reduction::Reduction;
 
 /// What is guaranteed inside an envelope.

@@ -8,7 +8,8 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, Side};
 
 use crate::frontier::{Frontier, Growth};
-use crate::oracle::{Objection, Oracle};
+use crate::objection::Objection;
+use crate::oracle::Oracle;
 
 /// Settings of IRR.
 #[derive(Clone, Debug, PartialEq, Eq)]

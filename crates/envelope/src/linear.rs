@@ -154,17 +154,6 @@ impl Linear {
         Some(product)
     }
 
-    /// The same with a parameter replaced by the difference of two times, where it occurs outside
-    /// products.
-    #[must_use]
-    pub fn with_difference(&self, id: ParameterId, from: NodeId, to: NodeId) -> Self {
-        let mut replaced = self.clone();
-        if let Some(coefficient) = replaced.parameters.remove(&id) {
-            replaced.add_scaled(&Self::difference(from, to), &coefficient);
-        }
-        replaced
-    }
-
     /// The same with some parameters replaced by numbers.
     #[must_use]
     pub fn with_values(&self, values: &BTreeMap<ParameterId, Rational>) -> Self {

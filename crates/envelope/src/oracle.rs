@@ -6,9 +6,10 @@ use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan, Valuation};
 
-use crate::control::ControlConflict;
 use crate::guarantee::{Controllability, Guarantee, Uncontrollable};
+use crate::objection::Objection;
 use crate::obligations::Refusal;
+use crate::reduction::Reduction;
 use crate::soundness::{Broken, Conditions, Counterexample, Soundness};
 
 /// Decides whether a plan is guaranteed to work in a box: for all values in it there is a
@@ -37,7 +38,8 @@ pub struct Oracle {
     plan: Arc<ParametrizedPlan>,
     guarantee: Guarantee,
     controllability: Controllability,
-    soundness: Soundness,
+    /// What every schedule must satisfy; `None` while no values with a schedule are known.
+    soundness: Option<Soundness>,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
     /// The number of bad cases refuted from scratch before `around` changed last.
@@ -52,22 +54,7 @@ pub struct Oracle {
     without_schedule: usize,
 }
 
-/// Why a box is not inside the envelope.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Objection {
-    /// For these values of the parameters the plan has no schedule.
-    #[error("for some values in the box the plan has no schedule")]
-    NoSchedule(Valuation),
-    /// For some values, some schedule breaks an obligation.
-    #[error("for some values in the box a schedule breaks the plan")]
-    Broken(Broken),
-    /// For all values there is a schedule, but one that has to be known sooner than the values are.
-    #[error("{0}")]
-    Uncontrollable(ControlConflict),
-}
-
-/// The same, before the values are worked out.
+/// An [`Objection`] before the values are worked out.
 enum Reason {
     /// The plan has no schedule at these values.
     NoSchedule(Valuation),
@@ -76,11 +63,11 @@ enum Reason {
 }
 
 impl Oracle {
-    /// The oracle for a plan.
+    /// The oracle for a plan. If the plan has no schedule at its nominal values, that is what stands
+    /// against each box that holds them.
     ///
     /// # Errors
-    /// When the plan has no schedule at its nominal values, or holds something beyond exact linear
-    /// reasoning; the message names it.
+    /// When the plan holds something beyond exact linear reasoning; the message names it.
     pub fn new(
         task: &Arc<Task>,
         plan: &Arc<ParametrizedPlan>,
@@ -88,7 +75,10 @@ impl Oracle {
     ) -> Result<Self, Refusal> {
         let around = plan.nominal();
         let soundness = Soundness::around(task, plan, &around)?;
-        let controllability = Controllability::new(guarantee, plan, soundness.reduction());
+        let controllability = match &soundness {
+            Some(soundness) => Controllability::new(guarantee, plan, soundness.reduction()),
+            None => Controllability::new(guarantee, plan, &Reduction::new(plan)),
+        };
         Ok(Self {
             task: Arc::clone(task),
             plan: Arc::clone(plan),
@@ -122,7 +112,8 @@ impl Oracle {
 
     /// How the conditions that the plan has to meet are met in a box that is accepted.
     pub fn conditions(&self) -> Conditions {
-        self.soundness.conditions()
+        let known = self.soundness.as_ref();
+        known.map(Soundness::conditions).unwrap_or_default()
     }
 
     /// The number of boxes checked.
@@ -137,7 +128,8 @@ impl Oracle {
 
     /// The number of bad cases refuted from scratch: a measure of work.
     pub fn refutations(&self) -> usize {
-        self.refuted_before + self.soundness.refutations()
+        let now = self.soundness.as_ref().map_or(0, Soundness::refutations);
+        self.refuted_before + now
     }
 
     /// Takes a box for the one to widen, unless it is not inside the envelope, which the answer
@@ -203,7 +195,7 @@ impl Oracle {
         envelope: &DecoupledEnvelope,
         broken: &Broken,
     ) -> Option<Counterexample> {
-        self.soundness.worst_case(envelope, broken)
+        self.soundness.as_ref()?.worst_case(envelope, broken)
     }
 
     /// Values and a schedule in the box that show what is broken.
@@ -212,7 +204,7 @@ impl Oracle {
         envelope: &DecoupledEnvelope,
         broken: &Broken,
     ) -> Option<Counterexample> {
-        self.soundness.counterexample(envelope, broken)
+        self.soundness.as_ref()?.counterexample(envelope, broken)
     }
 
     /// The accepted box with an end moved out, and why that is refused; `None` if it is not, and
@@ -307,14 +299,19 @@ impl Oracle {
         moved: Option<BoxEnd>,
         trusted: Option<BoxEnd>,
     ) -> Result<Option<Reason>, Refusal> {
-        if !envelope.contains(&self.around)
-            && let Some(without_schedule) = self.move_to(envelope)?
-        {
-            return Ok(Some(Reason::NoSchedule(without_schedule)));
-        }
+        let is_there = self.soundness.is_some() && envelope.contains(&self.around);
+        let without_schedule = if is_there {
+            None
+        } else {
+            self.move_to(envelope)?
+        };
+        let (None, Some(soundness)) = (&without_schedule, &mut self.soundness) else {
+            self.without_schedule += 1;
+            let values = without_schedule.unwrap_or_else(|| self.around.clone());
+            return Ok(Some(Reason::NoSchedule(values)));
+        };
         // A sound box with an infeasible one rejected afterwards would leave the networks of the
         // feasibility check ahead of the accepted box, so soundness comes first.
-        let soundness = &mut self.soundness;
         if let Some(broken) = soundness.broken(&self.task, &self.plan, envelope, trusted)? {
             return Ok(Some(Reason::Broken(broken)));
         }
@@ -328,22 +325,16 @@ impl Oracle {
     /// Goes by the order that happenings have in the box from now on. The box need not hold the
     /// nominal values, and elsewhere a plan may work in another order.
     ///
-    /// Values in the box that have no schedule, if that shows already.
+    /// Values in the box that have no schedule, if that shows already; then nothing changes.
     fn move_to(&mut self, envelope: &DecoupledEnvelope) -> Result<Option<Valuation>, Refusal> {
         let nearest = envelope.nearest(&self.plan.nominal());
-        match Soundness::around(&self.task, &self.plan, &nearest) {
-            Ok(soundness) => {
-                self.refuted_before += self.soundness.refutations();
-                self.soundness = soundness;
-                self.around = nearest;
-                Ok(None)
-            }
-            Err(Refusal::NoNominalSchedule) => {
-                self.without_schedule += 1;
-                Ok(Some(nearest))
-            }
-            Err(refusal) => Err(refusal),
-        }
+        let Some(soundness) = Soundness::around(&self.task, &self.plan, &nearest)? else {
+            return Ok(Some(nearest));
+        };
+        self.refuted_before = self.refutations();
+        self.soundness = Some(soundness);
+        self.around = nearest;
+        Ok(None)
     }
 
     fn objection_of(&self, envelope: &DecoupledEnvelope, reason: Reason) -> Objection {

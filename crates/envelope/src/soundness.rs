@@ -94,7 +94,8 @@ pub fn broken_in(
     envelope: &DecoupledEnvelope,
 ) -> Result<Option<Broken>, Refusal> {
     let nearest = envelope.nearest(&plan.nominal());
-    let mut soundness = Soundness::around(task, plan, &nearest)?;
+    let soundness = Soundness::around(task, plan, &nearest)?;
+    let mut soundness = soundness.ok_or(Refusal::NoNominalSchedule)?;
     soundness.broken(task, plan, envelope, None)
 }
 
@@ -125,22 +126,23 @@ impl Soundness {
         }
     }
 
-    /// Compiles a plan's obligations for boxes that hold these values.
+    /// Compiles a plan's obligations for boxes that hold these values; `None` if it has no schedule
+    /// there.
     ///
     /// Happenings are required to keep the order that they have there. That is no restriction in a
     /// box with these values in it; in others, a different order may work as well.
     ///
     /// # Errors
-    /// When the plan has no schedule at these values ([`Refusal::NoNominalSchedule`]), or holds
-    /// something beyond exact linear reasoning.
+    /// When the plan holds something beyond exact linear reasoning.
     pub(crate) fn around(
         task: &Task,
         plan: &ParametrizedPlan,
         valuation: &Valuation,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Option<Self>, Refusal> {
         let reduction = Reduction::new(plan);
-        let schedule =
-            earliest_schedule(&reduction, valuation).ok_or(Refusal::NoNominalSchedule)?;
+        let Some(schedule) = earliest_schedule(&reduction, valuation) else {
+            return Ok(None);
+        };
         let obligations = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
         let mut direct = Vec::new();
         for (index, obligation) in obligations.direct.iter().enumerate() {
@@ -158,7 +160,7 @@ impl Soundness {
         }
         let over_all = vec![None; obligations.over_all.len()];
         let numbers = numbers(&reduction, &obligations);
-        Ok(Self {
+        Ok(Some(Self {
             reduction,
             obligations,
             direct,
@@ -166,7 +168,7 @@ impl Soundness {
             numbers,
             suspect: 0,
             refutations: 0,
-        })
+        }))
     }
 
     /// The plan's network with rigidly connected nodes taken together.

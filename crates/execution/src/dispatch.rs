@@ -8,6 +8,7 @@
 mod explain;
 mod news;
 mod progress;
+mod projection;
 mod retry;
 mod watch;
 

@@ -35,7 +35,6 @@ mod odds;
 mod planning;
 mod preparation;
 mod progression;
-mod projection;
 mod quantities;
 mod reason;
 mod record;

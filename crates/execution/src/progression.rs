@@ -308,11 +308,6 @@ impl Progression {
         }
     }
 
-    /// Whether reports contradict each other about anything.
-    pub fn is_doubtful(&self) -> bool {
-        !self.doubtful_facts.is_empty() || !self.doubtful_values.is_empty()
-    }
-
     /// The first running action whose over-all condition has not held at some moment that has
     /// passed since it started; [`Underway::broken_parts`] has what. What fails just now has not
     /// failed yet, as long as more can happen at this moment: see [`Progression::breaking`].

@@ -9,8 +9,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::time::Duration;
 
-use super::supervise::Usage;
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+
+/// Resource usage of a group of processes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Usage {
+    /// Memory, in bytes. Pages that they share count for each.
+    pub(super) memory: u64,
+    /// Processor time, that of ended children included where their parents have waited for them.
+    pub(super) work: Duration,
+}
 
 /// The variable that carries the mark.
 pub(super) const MARK: &str = "ELBOWROOM_RUN";

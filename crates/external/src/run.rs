@@ -2,7 +2,6 @@
 
 use std::io;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -16,35 +15,10 @@ use super::outcome::{Event, Found, Outcome, Report, Statistics};
 use super::reader::{Reader, Shared};
 use super::registry::Planner;
 use super::request::Request;
+use super::settings::Settings;
 use super::start::{not_started, prepare};
 use super::supervise::{Ended, Ending, Limits, supervise};
 use super::workspace::Workspace;
-
-/// Settings for running a planner.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// The time limit.
-    pub time_limit: Option<Duration>,
-    /// How much processor time all its processes may use together. Holds as it stands on a busy
-    /// machine too; Linux only.
-    pub work_limit: Option<Duration>,
-    /// How much memory all its processes may use together, in bytes.
-    pub memory_limit: Option<u64>,
-    /// Where its folder is made; by default where the system keeps temporary files.
-    pub scratch: Option<PathBuf>,
-}
-
-impl Default for Settings {
-    /// No limits.
-    fn default() -> Self {
-        Self {
-            time_limit: None,
-            work_limit: None,
-            memory_limit: None,
-            scratch: None,
-        }
-    }
-}
 
 /// How often the observer is asked whether to go on.
 const HEARTBEAT: Duration = Duration::from_millis(20);

@@ -10,7 +10,7 @@ use super::command::{Filling, find_program};
 use super::outcome::Outcome;
 use super::registry::{Kind, Planner};
 use super::request::{Question, Request};
-use super::run::Settings;
+use super::settings::Settings;
 use super::workspace::Workspace;
 
 /// The shim that speaks with unified-planning.

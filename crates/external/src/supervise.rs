@@ -19,15 +19,6 @@ pub(super) struct Limits {
     pub(super) memory: Option<u64>,
 }
 
-/// Resource usage of a group of processes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Usage {
-    /// Memory, in bytes. Pages that they share count for each.
-    pub(super) memory: u64,
-    /// Processor time, that of ended children included where their parents have waited for them.
-    pub(super) work: Duration,
-}
-
 /// The way in which a process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {

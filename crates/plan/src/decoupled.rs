@@ -2,7 +2,8 @@
 
 use elbowroom_num::{End, Interval, Rational, Side};
 
-use crate::parameter::{ParameterId, ParametrizedPlan, Valuation};
+use crate::parameter::ParametrizedPlan;
+use crate::valuation::{ParameterId, Valuation};
 
 /// An interval for each parameter, by position (ρ in paper 1, definition 3).
 ///

@@ -40,8 +40,8 @@ pub use implied::without_implied;
 pub use pin::{pin_until_sound, pinned_to, with_all_sides, with_sides_one_way, without_sides};
 
 use crate::network::{Schedule, network_node};
-use crate::parameter::Valuation;
 use crate::stn_plan::{Instance, InstanceId, Node, NodeId, StnPlan};
+use crate::valuation::Valuation;
 use order::{Order, Timeline};
 
 /// A plan with room, and a schedule of it: the original one, if it is one.

@@ -56,10 +56,12 @@ mod stn_plan;
 mod testing;
 pub mod uncertain;
 mod unknowns;
+mod valuation;
 
 pub use decoupled::{BoxEnd, DecoupledEnvelope};
 pub use elbowroom_num::Side;
 pub use network::{Origin, Schedule, network_node};
-pub use parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan, Valuation};
+pub use parameter::{Parameter, ParameterKind, ParametrizedPlan};
 pub use partial_order::{Link, LinkKind, PartialOrderPlan};
 pub use stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
+pub use valuation::{ParameterId, Valuation};

@@ -7,8 +7,8 @@ use elbowroom_num::Rational;
 use elbowroom_stn::Network;
 
 use crate::numbers::numbers_by_id;
-use crate::parameter::{ParameterId, Valuation};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
+use crate::valuation::{ParameterId, Valuation};
 
 /// A time for each node of an [`StnPlan`], by position.
 ///

@@ -7,25 +7,8 @@ use elbowroom_model::ground::{Body, Condition, Expression, FluentId};
 use elbowroom_model::problem::Unknown;
 use elbowroom_num::{Interval, Rational};
 
-use crate::numbers::numbers_by_id;
 use crate::stn_plan::{InstanceId, StnPlan};
-
-/// A parameter of a [`ParametrizedPlan`], by position in its list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ParameterId(pub u32);
-
-impl ParameterId {
-    /// The position in [`ParametrizedPlan::parameters`].
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl From<usize> for ParameterId {
-    fn from(index: usize) -> Self {
-        Self(u32::try_from(index).expect("fewer than 2^32 parameters"))
-    }
-}
+use crate::valuation::{ParameterId, Valuation};
 
 /// A quantity left open (γ in paper 1).
 #[derive(Clone, Debug, PartialEq)]
@@ -75,14 +58,6 @@ pub struct ParametrizedPlan {
     /// What must hold at the end: the task's goal, with the domain's unknowns as parameters.
     pub goal: Condition,
 }
-
-/// A value for each parameter, by position; the default is for a plan that has none.
-#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Valuation {
-    numbers: Vec<Rational>,
-}
-
-numbers_by_id!(Valuation, ParameterId);
 
 impl ParameterKind {
     /// The values such a quantity can take when nobody says otherwise, given its nominal value:

@@ -4,7 +4,7 @@ use elbowroom_model::ground::{Action, Body};
 use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 
-use crate::parameter::{ParameterId, Valuation};
+use crate::valuation::{ParameterId, Valuation};
 
 /// A time point of an [`StnPlan`], by position in [`StnPlan::nodes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -6,8 +6,9 @@ use elbowroom_stn::{ConstraintId, Network};
 
 use crate::decoupled::DecoupledEnvelope;
 use crate::network::network_node;
-use crate::parameter::{ParameterId, ParametrizedPlan};
+use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
+use crate::valuation::ParameterId;
 
 /// The meaning of a plan's constraint for an executor: a requirement or a contingent link.
 #[derive(Clone, Debug, PartialEq, Eq)]

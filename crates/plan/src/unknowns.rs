@@ -6,8 +6,9 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, Condition, Expression};
 use elbowroom_model::problem::Unknown;
 
-use crate::parameter::{ParameterId, ParameterKind};
+use crate::parameter::ParameterKind;
 use crate::stn_plan::{InstanceId, StnPlan};
+use crate::valuation::ParameterId;
 
 /// One number that a domain leaves open, as a plan meets it.
 ///

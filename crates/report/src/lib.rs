@@ -23,6 +23,7 @@
 //! ```
 
 pub mod exact;
+pub mod line;
 pub mod plot;
 pub mod statistics;
 pub mod table;

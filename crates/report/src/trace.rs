@@ -5,7 +5,6 @@
 //!
 //! Whoever reads a trace has its lines as types ([`mod@line`]), from [`Stored::read`].
 
-pub mod line;
 mod of;
 mod replay;
 
@@ -15,7 +14,7 @@ use elbowroom_execution::{Entry, Recorder};
 use elbowroom_model::Task;
 use serde::Serialize;
 
-pub use line::Line;
+pub use crate::line::{self, Line};
 pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
 
 /// What the first line says the trace is.

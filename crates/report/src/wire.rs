@@ -9,7 +9,7 @@ use elbowroom_num::Rational;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::trace::line::{GivenLine, ObservationLine};
+use crate::line::{GivenLine, ObservationLine};
 
 /// A message that cannot be understood.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

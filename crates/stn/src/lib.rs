@@ -52,6 +52,8 @@
 pub mod branching;
 mod consistency;
 mod consistent;
+mod direction;
+mod ids;
 mod implied;
 mod lists;
 mod minimal;
@@ -67,10 +69,12 @@ mod windows;
 
 pub use consistency::NegativeCycle;
 pub use consistent::{Checkpoint, ConsistentNetwork};
+pub use direction::Direction;
+pub use ids::{ConstraintId, NodeId};
 pub use minimal::Minimal;
 pub use moving::{Grounds, MovingWindows, OutOfWindow, WindowEnd};
-pub use network::{Constraint, ConstraintId, Network, NodeId};
-pub use paths::{Direction, ShortestPaths};
+pub use network::{Constraint, Network};
+pub use paths::ShortestPaths;
 pub use schedule::Schedule;
 pub use weight::Weight;
 pub use windows::{Window, Windows};

@@ -7,7 +7,8 @@ use std::collections::BinaryHeap;
 
 use elbowroom_num::Rational;
 
-use crate::paths::{Direction, ShortestPaths};
+use crate::direction::Direction;
+use crate::paths::ShortestPaths;
 use crate::{ConsistentNetwork, ConstraintId, Network, NodeId, Schedule, Weight, Window};
 
 /// A network, and the [`Window`] of each of its nodes seen from an origin, while limits on single

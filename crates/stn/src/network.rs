@@ -1,47 +1,9 @@
 //! Time points and the constraints between them.
 
-use std::fmt;
-
 use elbowroom_num::Rational;
 
 use crate::lists::Lists;
-use crate::{Direction, Schedule, Weight};
-
-/// A time point of a network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct NodeId(pub u32);
-
-impl NodeId {
-    /// The node's place in a list of all nodes.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    pub(crate) fn from_index(index: usize) -> Self {
-        Self(u32::try_from(index).expect("networks have fewer than 2^32 nodes"))
-    }
-}
-
-impl fmt::Display for NodeId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "n{}", self.0)
-    }
-}
-
-/// A constraint's place in the order in which the constraints were added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ConstraintId(pub u32);
-
-impl ConstraintId {
-    /// The constraint's place in a list of all constraints.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-
-    pub(crate) fn from_index(index: usize) -> Self {
-        Self(u32::try_from(index).expect("networks have fewer than 2^32 constraints"))
-    }
-}
+use crate::{ConstraintId, Direction, NodeId, Schedule, Weight};
 
 /// The constraint `to - from <= bound`, drawn as the edge `from --bound--> to`.
 ///
@@ -276,5 +238,16 @@ impl<W: Weight> Network<W> {
         }
         self.leaving.truncate(node_count);
         self.entering.truncate(node_count);
+    }
+}
+
+impl<W: Weight> Schedule<W> {
+    /// Whether every constraint of `network` holds.
+    pub fn holds_in(&self, network: &Network<W>) -> bool {
+        self.times().len() == network.node_count()
+            && network
+                .constraints()
+                .iter()
+                .all(|constraint| constraint.holds_in(self))
     }
 }

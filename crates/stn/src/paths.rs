@@ -5,16 +5,7 @@ use std::collections::BinaryHeap;
 
 use elbowroom_num::Rational;
 
-use crate::{ConsistentNetwork, Constraint, ConstraintId, NodeId, Schedule, Weight};
-
-/// The direction of shortest paths: from one node, or to one node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// The paths begin at the root: distances bound `node - root`.
-    FromRoot,
-    /// The paths end at the root: distances bound `root - node`.
-    ToRoot,
-}
+use crate::{ConsistentNetwork, Constraint, ConstraintId, Direction, NodeId, Schedule, Weight};
 
 /// The tightest implied bound between one node, the root, and each other node.
 #[derive(Clone, Debug, PartialEq, Eq)]

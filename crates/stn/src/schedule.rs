@@ -4,7 +4,7 @@ use std::ops::Index;
 
 use elbowroom_num::Rational;
 
-use crate::{Network, NodeId, Weight};
+use crate::{NodeId, Weight};
 
 /// A time for each node of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,15 +26,6 @@ impl<W: Weight> Schedule<W> {
     /// The times, by node.
     pub fn into_times(self) -> Vec<W> {
         self.times
-    }
-
-    /// Whether every constraint of `network` holds.
-    pub fn holds_in(&self, network: &Network<W>) -> bool {
-        self.times.len() == network.node_count()
-            && network
-                .constraints()
-                .iter()
-                .all(|constraint| constraint.holds_in(self))
     }
 
     /// The same schedule, moved as a whole so that `origin` happens at zero.

@@ -4,8 +4,6 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::record::Record;
-use crate::render;
 use crate::source::{Source, Span};
 
 /// The severity of a finding: an error makes a text unusable, a warning does not.
@@ -129,16 +127,6 @@ impl Diagnostic {
     fn position(&self) -> (usize, usize) {
         self.source().position(self.labels[0].span.start)
     }
-
-    /// The finding with an excerpt of the text, as a terminal shows it.
-    pub fn render(&self, colored: bool) -> String {
-        render::render(self, colored)
-    }
-
-    /// The finding as plain data, for programs.
-    pub fn record(&self) -> Record {
-        Record::from(self)
-    }
 }
 
 /// `name:line:column: severity: message; advice`
@@ -190,19 +178,6 @@ impl Diagnostics {
     /// The errors among them.
     pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
         self.iter().filter(|d| d.severity == Severity::Error)
-    }
-
-    /// All of them with excerpts, as a terminal shows them.
-    pub fn render(&self, colored: bool) -> String {
-        self.iter()
-            .map(|diagnostic| diagnostic.render(colored))
-            .collect::<Vec<_>>()
-            .join("\n\n")
-    }
-
-    /// All of them as plain data, for programs.
-    pub fn records(&self) -> Vec<Record> {
-        self.iter().map(Diagnostic::record).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::diagnostic::{Diagnostic, Label, Severity};
+use crate::diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 
 /// A [`Diagnostic`] as plain data: what `--json` prints, and what an editor needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +42,20 @@ pub struct RecordLabel {
     pub column: usize,
     /// How many characters the place spans on its line.
     pub length: usize,
+}
+
+impl Diagnostic {
+    /// The finding as plain data, for programs.
+    pub fn record(&self) -> Record {
+        Record::from(self)
+    }
+}
+
+impl Diagnostics {
+    /// All of them as plain data, for programs.
+    pub fn records(&self) -> Vec<Record> {
+        self.iter().map(Diagnostic::record).collect()
+    }
 }
 
 impl From<&Diagnostic> for Record {

@@ -2,7 +2,7 @@
 
 use annotate_snippets::{AnnotationKind, Element, Level, Origin, Renderer, Snippet};
 
-use crate::diagnostic::{Diagnostic, Label, Severity};
+use crate::diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 use crate::source::{Source, Span};
 
 /// Columns of a terminal. Of longer lines only what stands around the place is shown.
@@ -12,28 +12,39 @@ const LONGEST_LINE: usize = 20_000;
 /// Most lines shown of one place.
 const MOST_LINES: usize = 4;
 
-/// The diagnostic with an excerpt of its text.
-pub(crate) fn render(diagnostic: &Diagnostic, colored: bool) -> String {
-    let level = match diagnostic.severity {
-        Severity::Error => Level::ERROR,
-        Severity::Warning => Level::WARNING,
-    };
-    let mut group = level.primary_title(diagnostic.message.as_str()).elements(
-        diagnostic
-            .labels
-            .iter()
-            .enumerate()
-            .map(|(index, label)| excerpt(label, index == 0)),
-    );
-    if let Some(advice) = &diagnostic.advice {
-        group = group.element(Level::HELP.message(advice.as_str()));
+impl Diagnostic {
+    /// The finding with an excerpt of the text, as a terminal shows it.
+    pub fn render(&self, colored: bool) -> String {
+        let level = match self.severity {
+            Severity::Error => Level::ERROR,
+            Severity::Warning => Level::WARNING,
+        };
+        let mut group = level.primary_title(self.message.as_str()).elements(
+            self.labels
+                .iter()
+                .enumerate()
+                .map(|(index, label)| excerpt(label, index == 0)),
+        );
+        if let Some(advice) = &self.advice {
+            group = group.element(Level::HELP.message(advice.as_str()));
+        }
+        let renderer = if colored {
+            Renderer::styled()
+        } else {
+            Renderer::plain()
+        };
+        renderer.term_width(WIDTH).render(&[group])
     }
-    let renderer = if colored {
-        Renderer::styled()
-    } else {
-        Renderer::plain()
-    };
-    renderer.term_width(WIDTH).render(&[group])
+}
+
+impl Diagnostics {
+    /// All of them with excerpts, as a terminal shows them.
+    pub fn render(&self, colored: bool) -> String {
+        self.iter()
+            .map(|diagnostic| diagnostic.render(colored))
+            .collect::<Vec<_>>()
+            .join("\n\n")
+    }
 }
 
 /// The lines around a label, or only its position where they are too long.

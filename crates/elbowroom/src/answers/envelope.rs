@@ -9,7 +9,6 @@ mod search;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_envelope::obligations::Refusal;
 use elbowroom_envelope::{Growth, Guarantee, Method, Oracle};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
@@ -158,13 +157,12 @@ pub fn envelope(
         enforced,
         explainer: Explainer::new(&request.task, &plan),
     };
-    let oracle = match Oracle::new(&request.task, &plan, request.guarantee) {
-        Ok(oracle) => oracle,
-        Err(Refusal::NoNominalSchedule) => {
-            return Ok(subject.fails(subject.explainer.no_schedule(&plan.nominal())));
-        }
-        Err(refusal) => return Err(FlowError::Refused(refusal).into()),
-    };
+    let oracle = Oracle::new(&request.task, &plan, request.guarantee);
+    let oracle = oracle.map_err(FlowError::Refused)?;
+    let nominal = plan.nominal();
+    if plan.plan.network(&nominal).consistency().is_err() {
+        return Ok(subject.fails(subject.explainer.no_schedule(&nominal)));
+    }
     if let Some(text) = &request.contains {
         return contains(&subject, oracle, text);
     }

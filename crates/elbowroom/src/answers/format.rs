@@ -13,15 +13,18 @@ impl From<Version> for u32 {
     }
 }
 
-impl TryFrom<u32> for Version {
-    type Error = String;
+/// A document is of a version that this program does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("version {0} of this document cannot be read, only 1")]
+pub struct UnknownVersion(pub u32);
 
-    fn try_from(number: u32) -> Result<Self, String> {
+impl TryFrom<u32> for Version {
+    type Error = UnknownVersion;
+
+    fn try_from(number: u32) -> Result<Self, UnknownVersion> {
         match number {
             1 => Ok(Self),
-            other => Err(format!(
-                "version {other} of this document cannot be read, only 1"
-            )),
+            other => Err(UnknownVersion(other)),
         }
     }
 }

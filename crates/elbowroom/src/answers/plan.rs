@@ -172,8 +172,7 @@ pub enum PlanStatistics {
     },
 }
 
-/// The name by which answers mention the embedded planner.
-pub const EMBEDDED: &str = "embedded";
+pub use crate::execute::EMBEDDED;
 
 /// Has the embedded planner look for a plan.
 ///

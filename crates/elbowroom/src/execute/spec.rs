@@ -17,7 +17,6 @@ use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
 use super::Embedded;
-use crate::answers::plan::EMBEDDED;
 use crate::flow;
 use text_form::{as_text, listed, positive, required};
 
@@ -25,6 +24,9 @@ pub use wiring::{SpecError, SpoilerError};
 
 /// The name of the planner that plans nothing.
 pub const NOBODY: &str = "none";
+
+/// The name by which specifications and answers mention the embedded planner.
+pub const EMBEDDED: &str = "embedded";
 
 /// Everything that a run depends on, but for the plan that it begins with and what the world does.
 ///

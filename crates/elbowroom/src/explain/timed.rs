@@ -21,10 +21,9 @@ impl Explainer<'_> {
         }
     }
 
-    /// The deadline behind a bound that a plan puts on a node's absolute time, if there is one:
-    /// the first timed initial at or after it that takes away what the node needs, unless the bound
-    /// is much stricter than that asks for. Plans keep some distance from their deadlines, and round
-    /// it off: up to a hundredth of the deadline's time counts as that, in whatever unit.
+    /// A bound that a plan puts on a node's absolute time, by the deadline behind it if there is
+    /// one: the first timed initial at or after it that takes away what the node needs. If the bound
+    /// keeps more distance from that than interfering happenings have to, both are named.
     pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
         let (index, timed) = self
             .task
@@ -33,12 +32,13 @@ impl Explainer<'_> {
             .enumerate()
             .filter(|(_, timed)| timed.time >= *bound)
             .find(|(index, _)| self.lost(node, *index).is_some())?;
-        let distance = &timed.time - bound;
-        let hundredth = &timed.time / Rational::from(100);
-        if distance > hundredth.max(self.task.epsilon().clone()) {
-            return None;
+        let deadline = self.deadline(node, index);
+        if &timed.time - bound <= *self.task.epsilon() {
+            return Some(deadline);
         }
-        Some(self.deadline(node, index))
+        let node = self.plan.plan.node_words(self.task, node);
+        let bound = bound.to_decimal(6);
+        Some(format!("{deadline} ({node} at {bound} or before)"))
     }
 
     /// What the timed initials do, as far as it concerns the node: `(open w) becomes false`.

@@ -4,11 +4,11 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, network_node};
 use elbowroom_stn::WindowEnd;
 
+use super::projection;
 use super::{Dispatch, explain};
 use crate::event::Ending;
 use crate::executor::{Moment, News};
 use crate::horizon::{Horizon, Missed};
-use crate::projection;
 use crate::reason::{About, Behind, Cause, Reason};
 
 impl Dispatch {

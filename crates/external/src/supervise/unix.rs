@@ -15,7 +15,8 @@ use rustix::process::{
 };
 
 use super::super::clock::Clock;
-use super::{Ended, Ending, Limits, Stream, Usage, Watcher};
+use super::{Ended, Ending, Limits, Stream, Watcher};
+use crate::processes::{MARK, Processes, Usage};
 
 /// How often limits are looked at.
 const TICK: Duration = Duration::from_millis(20);
@@ -41,7 +42,7 @@ pub(super) fn supervise(
     let clock = Clock::start();
     let mark = mark();
     #[cfg(target_os = "linux")]
-    command.env(super::super::processes::MARK, &mark);
+    command.env(MARK, &mark);
     let child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -81,7 +82,7 @@ struct Run {
     usage: Usage,
     measured: Option<Duration>,
     #[cfg(target_os = "linux")]
-    processes: super::super::processes::Processes,
+    processes: Processes,
     is_output_open: bool,
     is_error_open: bool,
     /// Whether somebody else waits for its end.
@@ -103,7 +104,7 @@ impl Run {
             usage: Usage::default(),
             measured: None,
             #[cfg(target_os = "linux")]
-            processes: super::super::processes::Processes::of(pid, mark),
+            processes: Processes::of(pid, mark),
             is_output_open: child.stdout.is_some(),
             is_error_open: child.stderr.is_some(),
             is_left: false,

@@ -4,8 +4,8 @@ use elbowroom_num::Rational;
 use elbowroom_stn::ConsistentNetwork;
 
 use crate::network::{Schedule, network_node};
-use crate::parameter::Valuation;
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, Reason, StnPlan};
+use crate::valuation::Valuation;
 
 /// Adds constraints that hold in the nominal schedule until the oracle finds nothing wrong.
 ///

@@ -4,9 +4,10 @@ use elbowroom_num::Rational;
 
 use super::{DeorderError, Deordered, deorder, pin_until_sound, pinned_to};
 use crate::format;
-use crate::parameter::{ParametrizedPlan, Valuation};
+use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, NodeId, Reason};
 use crate::testing::{number, rover};
+use crate::valuation::Valuation;
 
 /// A plan of the rover: `start: action [duration]` on each line.
 fn plan(text: &str) -> (elbowroom_model::Task, TimeTriggeredPlan) {

@@ -7,8 +7,9 @@ use elbowroom_stn::{ConsistentNetwork, Network};
 
 use crate::durations;
 use crate::network::{Schedule, network_node};
-use crate::parameter::{ParameterId, ParameterKind};
+use crate::parameter::ParameterKind;
 use crate::stn_plan::{Bound, InstanceId, NodeId, StnPlan};
+use crate::valuation::ParameterId;
 
 /// A parameter whose nominal value may still be missing.
 #[derive(Debug)]

@@ -9,9 +9,10 @@ use elbowroom_text::Report;
 use super::nominal::{self, Draft};
 use super::syntax::{File, Limit, ParameterItem};
 use super::tokens::Span;
-use crate::parameter::{Parameter, ParameterId, ParameterKind};
+use crate::parameter::{Parameter, ParameterKind};
 use crate::stn_plan::{Bound, Constraint, InstanceId, StnPlan};
 use crate::unknowns::{self, OpenNumber};
+use crate::valuation::ParameterId;
 
 /// What each declared parameter stands for, judging by the constraints in which it occurs.
 pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {

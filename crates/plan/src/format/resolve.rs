@@ -9,9 +9,10 @@ use elbowroom_text::{Report, nearest};
 use super::syntax::{BoundText, ConstraintItem, File, InstanceItem, Limit, limit};
 use super::tokens::{Span, Token};
 use super::{did_you_mean, parameters};
-use crate::parameter::{ParameterId, ParametrizedPlan};
+use crate::parameter::ParametrizedPlan;
 use crate::stn_plan::{Bound, Constraint, Instance, Node, NodeId, Reason, StnPlan};
 use crate::unknowns;
+use crate::valuation::ParameterId;
 
 /// The plan, or `None` after noting mistakes.
 ///

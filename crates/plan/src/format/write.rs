@@ -9,9 +9,10 @@ use elbowroom_num::{End, Rational};
 
 use super::syntax::limit;
 use super::tokens::tokens;
-use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use crate::parameter::{Parameter, ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, Constraint, Node, NodeId, StnPlan};
 use crate::unknowns;
+use crate::valuation::ParameterId;
 
 /// A plan cannot be written as an STN plan file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

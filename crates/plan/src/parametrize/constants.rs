@@ -7,7 +7,7 @@ use elbowroom_model::ground::{
 use elbowroom_model::problem::{self, FunctionId, Unknown};
 use elbowroom_num::Rational;
 
-use crate::parameter::ParameterId;
+use crate::valuation::ParameterId;
 
 /// In which expressions of an action to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,9 +9,10 @@ use elbowroom_num::{End, Interval, Rational};
 use super::constants::Place;
 use super::{ParametrizeError, Target, VarySpec, select};
 use crate::network::Schedule;
-use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use crate::parameter::{Parameter, ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, InstanceId, NodeId, Reason};
 use crate::unknowns::{self, OpenNumber};
+use crate::valuation::ParameterId;
 
 /// A quantity that at most one parameter stands for.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,8 +8,9 @@ use elbowroom_num::Rational;
 use super::constants::{self, Place};
 use super::opening::{Opening, Quantity};
 use super::{ConstantTarget, ParametrizeError, VarySpec, nothing, select};
-use crate::parameter::{Parameter, ParameterId, ParameterKind};
+use crate::parameter::{Parameter, ParameterKind};
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason};
+use crate::valuation::ParameterId;
 
 impl Opening<'_> {
     pub(super) fn open_durations(

@@ -1,6 +1,6 @@
 //! Time as whole numbers of ticks.
 
-use elbowroom_num::Rational;
+use elbowroom_num::{CommonDenominator, Rational};
 
 /// A time or a span of time, in ticks.
 pub(crate) type Ticks = i64;
@@ -9,7 +9,7 @@ pub(crate) type Ticks = i64;
 pub(crate) const NEVER: Ticks = i64::MAX / 4;
 
 /// The finest grid worth having: times up to some hundred million units still fit.
-const FINEST: i128 = 10_000_000_000;
+const FINEST: i64 = 10_000_000_000;
 
 /// The grid used when the exact one would be too fine: it fits times of milliseconds and of a
 /// third of a unit.
@@ -29,24 +29,21 @@ pub(crate) struct Scale {
 impl Scale {
     /// The coarsest grid that holds all of these numbers, or a fine one if there is none.
     pub(crate) fn of<'a>(numbers: impl Iterator<Item = &'a Rational>) -> Self {
-        let mut common: i128 = 1;
+        let mut common = CommonDenominator::default();
         let mut largest = 1.0_f64;
         for number in numbers {
             largest = largest.max(number.to_f64().abs());
-            let Some(denominator) = number.denominator() else {
-                return Self::rounded();
-            };
-            let denominator = i128::from(denominator);
-            common = common / gcd(common, denominator) * denominator;
-            if common > FINEST {
+            if common.include(number).is_none() || common.get() > FINEST {
                 return Self::rounded();
             }
         }
         #[allow(clippy::cast_precision_loss, reason = "an estimate of magnitudes")]
-        let is_too_large = largest * common as f64 > 1e14;
-        match i64::try_from(common) {
-            Ok(ticks_per_unit) if !is_too_large => Self { ticks_per_unit },
-            _ => Self::rounded(),
+        let is_too_large = largest * common.get() as f64 > 1e14;
+        if is_too_large {
+            return Self::rounded();
+        }
+        Self {
+            ticks_per_unit: common.get(),
         }
     }
 
@@ -89,13 +86,6 @@ impl Scale {
     pub(crate) fn units(self, ticks: Ticks) -> Rational {
         Rational::new(ticks, self.ticks_per_unit)
     }
-}
-
-fn gcd(mut a: i128, mut b: i128) -> i128 {
-    while b != 0 {
-        (a, b) = (b, a % b);
-    }
-    a
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Constraints that bind less than they did.
 
 use super::{MovingWindows, Source, WindowEnd};
-use crate::paths::Direction;
+use crate::direction::Direction;
 use crate::{ConstraintId, NodeId, Weight};
 
 impl<W: Weight> MovingWindows<W> {

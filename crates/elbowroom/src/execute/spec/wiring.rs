@@ -12,8 +12,7 @@ use elbowroom_num::Rational;
 use elbowroom_sim::{Paced, SimWorld, WorldModel};
 use elbowroom_text::Diagnostics;
 
-use super::{NOBODY, RunSpec};
-use crate::answers::plan::EMBEDDED;
+use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
 use crate::{BoxTextError, parse_box};
 

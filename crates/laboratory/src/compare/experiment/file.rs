@@ -1,5 +1,6 @@
 //! Experiment files as they stand.
 
+use elbowroom::execute::EMBEDDED;
 use elbowroom_execution::run::{PlanningTime, RunSettings, RunningRule};
 use elbowroom_num::Rational;
 use elbowroom_text::Span;
@@ -161,9 +162,6 @@ impl File {
         Ok(settings)
     }
 }
-
-/// The planner that is always there.
-const EMBEDDED: &str = "embedded";
 
 /// Whether there is such a planner; if not, which there are.
 fn known(name: &str) -> Result<(), String> {

@@ -5,9 +5,10 @@ use proptest::prelude::*;
 
 use super::{PAPER, parsed};
 use crate::format::{read, write};
-use crate::parameter::{Parameter, ParameterId, ParameterKind, ParametrizedPlan};
+use crate::parameter::{Parameter, ParameterKind, ParametrizedPlan};
 use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, NodeId, Reason, StnPlan};
 use crate::testing::rover;
+use crate::valuation::ParameterId;
 
 /// Plans that files can express, as reading them gives them.
 fn plans() -> impl Strategy<Value = ParametrizedPlan> {

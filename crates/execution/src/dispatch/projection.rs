@@ -6,7 +6,7 @@ use elbowroom_model::ground::Action;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
-use crate::dispatch::{Dispatch, in_words, is_instantaneous};
+use super::{Dispatch, in_words, is_instantaneous};
 use crate::event::Ticket;
 use crate::executor::Moment;
 use crate::progression::Progression;
@@ -38,7 +38,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
             Node::Start(id) | Node::Instant(id) => {
                 let action = dispatch.action(id);
                 let duration = dispatch.nominal_duration(id);
-                if let Some(reason) = crate::dispatch::unmet(action, &duration, &state) {
+                if let Some(reason) = super::unmet(action, &duration, &state) {
                     return Some(Failure {
                         action: reason.action,
                         condition: reason
