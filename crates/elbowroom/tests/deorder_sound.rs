@@ -212,6 +212,23 @@ fn examine_all(plans: &[[PathBuf; 3]]) -> Count {
     count
 }
 
+/// Domain, problem and plan of the cases that come with the project.
+fn our_plans() -> Vec<[PathBuf; 3]> {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
+    let folders = files(&cases).into_iter();
+    let with_plan = folders.filter(|folder| folder.join("plan.plan").exists());
+    with_plan
+        .map(|folder| ["domain.pddl", "problem.pddl", "plan.plan"].map(|file| folder.join(file)))
+        .collect()
+}
+
+#[test]
+fn our_own_plans_are_sound_when_deordered_and_so_are_their_schedules() {
+    let count = examine_all(&our_plans());
+    assert!(count.plans >= 7, "{}", count.plans);
+    assert_eq!((count.unsupported, count.invalid), (0, 0));
+}
+
 #[test]
 fn valid_plans_of_the_benchmarks_are_sound_when_deordered_and_so_are_their_schedules() {
     let Some(data) = shared::data() else { return };

@@ -6,11 +6,16 @@
 mod shared;
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
 
+use elbowroom::flow;
 use elbowroom_envelope::{Guarantee, Oracle, Settings, irr};
 use elbowroom_model::validate::{self, validate};
-use elbowroom_plan::{ParametrizedPlan, format};
+use elbowroom_model::{Task, Verdict};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_pddl::read_plan;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan, Valuation, format};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use shared::draw;
@@ -59,26 +64,73 @@ fn attack(instance: &Instance) -> bool {
     let bytes = std::fs::read(&instance.plan).expect("a plan file");
     let plan: ParametrizedPlan = format::read(&bytes, &task).expect("a readable plan");
     let (task, plan) = (Arc::new(task), Arc::new(plan));
-    let mut oracle = Oracle::new(&task, &plan, Guarantee::Weak).expect("within reach");
+    let Some(envelope) = envelope(&task, &plan) else {
+        return false;
+    };
+    if let Some((valuation, verdict)) = refuted(&task, &plan, &envelope) {
+        panic!("{}: {valuation:?} {verdict:?}", instance.name);
+    }
+    true
+}
+
+/// The box that the search finds; `None` if the plan does not work at its nominal values.
+fn envelope(task: &Arc<Task>, plan: &Arc<ParametrizedPlan>) -> Option<DecoupledEnvelope> {
+    let mut oracle = Oracle::new(task, plan, Guarantee::Weak).expect("within reach");
     let run = irr(&mut oracle, &Settings::default(), &mut |_| {
         ControlFlow::Continue(())
     })
     .expect("within reach");
-    let Ok(envelope) = run.envelope else {
-        return false;
-    };
+    run.envelope.ok()
+}
+
+/// Values in a box for which the plan has no schedule (`None`), or one that the judge rejects.
+fn refuted(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> Option<(Valuation, Option<Verdict>)> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for _ in 0..samples() {
-        let valuation = draw::valuation(&envelope, &mut rng);
-        let schedule = draw::schedule(&plan.plan, &valuation, &mut rng)
-            .unwrap_or_else(|| panic!("{}: no schedule at {valuation:?}", instance.name));
+    (0..samples()).find_map(|_| {
+        let valuation = draw::valuation(envelope, &mut rng);
+        let Some(schedule) = draw::schedule(&plan.plan, &valuation, &mut rng) else {
+            return Some((valuation, None));
+        };
         let fixed = plan.plan.at(&valuation).scheduled(&schedule);
-        let verdict = validate(&task, &fixed, &validate::Settings::default());
-        assert!(
-            verdict.is_valid(),
-            "{}: {valuation:?} {verdict:?}",
-            instance.name
-        );
+        let verdict = validate(task, &fixed, &validate::Settings::default());
+        (!verdict.is_valid()).then_some((valuation, Some(verdict)))
+    })
+}
+
+/// What is asked of the papers' instances, of the cases that come with the project. That the attack
+/// can succeed is seen by a box that is too large: some of its values break the plan.
+#[test]
+fn values_and_schedules_in_the_boxes_of_our_cases_pass_the_judge() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases");
+    let (mut attacked, mut broken) = (0, 0);
+    for entry in std::fs::read_dir(cases).expect("the cases") {
+        let folder = entry.expect("an entry").path();
+        if !folder.join("plan.plan").exists() {
+            continue;
+        }
+        let task = shared::task(&folder.join("domain.pddl"), &folder.join("problem.pddl"));
+        let task = Arc::new(task.expect("a readable problem"));
+        let plan = shared::source(&folder.join("plan.plan"));
+        let (plan, _) = read_plan(&plan, &task).expect("a readable plan");
+        let freed = flow::free(&task, &plan).expect("a valid plan");
+        let plan = Arc::new(flow::open(&task, freed, &[]).expect("all durations"));
+        let envelope = envelope(&task, &plan).expect("the plan works as it is");
+        if let Some((valuation, verdict)) = refuted(&task, &plan, &envelope) {
+            panic!("{}: {valuation:?} {verdict:?}", folder.display());
+        }
+        attacked += 1;
+        let most = Rational::from(1000);
+        let everything = |_: &Interval| Interval::closed(Rational::ZERO, most.clone());
+        let everything = envelope.intervals().iter().map(everything).collect();
+        let everything = DecoupledEnvelope::new(&plan, everything).expect("an interval for each");
+        if refuted(&task, &plan, &everything).is_some() {
+            broken += 1;
+        }
     }
-    true
+    assert!(attacked >= 7, "only {attacked} boxes were attacked");
+    assert!(broken >= 5, "only {broken} boxes that are too large were refuted");
 }

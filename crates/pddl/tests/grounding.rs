@@ -111,3 +111,30 @@ fn each_action_of_a_valid_plan_is_reached() {
     }
     assert!(compared > 50, "only {compared} plans could be compared");
 }
+
+/// What the property asks of the benchmarks, of the cases that come with the project.
+#[test]
+fn each_action_of_our_own_plans_is_reached() {
+    let cases = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases"));
+    let mut compared = 0;
+    for entry in std::fs::read_dir(&cases).expect("the cases") {
+        let folder = entry.expect("an entry").path();
+        let task = read(&folder, "domain.pddl", "problem.pddl");
+        let task = task.unwrap_or_else(|| panic!("{}", folder.display()));
+        let Answer::Complete(grounding) = ground(&task, &Settings::default()) else {
+            panic!("{} passes a limit", folder.display());
+        };
+        assert!(grounding.unreachable_goals.is_empty(), "{}", folder.display());
+        if !folder.join("plan.plan").exists() {
+            continue;
+        }
+        let (plan, _) = read_plan(&load(&folder, "plan.plan"), &task).expect("a plan");
+        for step in &plan.steps {
+            let mut actions = grounding.actions.iter();
+            let name = &step.action.name;
+            assert!(actions.any(|action| action.name == *name), "{name}");
+        }
+        compared += 1;
+    }
+    assert!(compared >= 7, "only {compared} plans were compared");
+}

@@ -63,6 +63,27 @@ fn every_benchmark_is_the_same_problem_after_writing_and_reading() {
     assert!(count > 700, "only {count} were compared");
 }
 
+/// What the property asks of the benchmarks, of the cases that come with the project.
+#[test]
+fn our_own_cases_are_the_same_problems_after_writing_and_reading() {
+    let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases");
+    let mut count = 0;
+    for entry in std::fs::read_dir(cases).expect("the cases") {
+        let folder = entry.expect("an entry").path();
+        let domain = survey::source(&folder, "domain.pddl");
+        let (problem, _) = read_problem(&domain, &survey::source(&folder, "problem.pddl"))
+            .expect("a case without mistakes");
+        let expected = normalized(problem.clone());
+        let task = Task::new(problem);
+        let text = write_problem(&task, &Situation::initial(&task), &ProblemText::default())
+            .expect("nothing is running");
+        let (again, _) = read_problem(&domain, &Source::new("written", text)).expect("as written");
+        assert!(normalized(again) == expected, "{}", folder.display());
+        count += 1;
+    }
+    assert!(count >= 8, "only {count} were compared");
+}
+
 /// A rover that drives, digs and charges, and a base that closes.
 const ROVER: &str = "(define (domain rover)
     (:types place - object)

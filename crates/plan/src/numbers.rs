@@ -10,7 +10,7 @@ macro_rules! numbers_by_id {
                 Self { numbers }
             }
 
-            /// The number of there that are.
+            /// The number of entries.
             pub fn len(&self) -> usize {
                 self.numbers.len()
             }
