@@ -63,7 +63,7 @@ pub(crate) const FAINT: Style = Style::new().dimmed();
 pub(crate) const GOOD: Style = AnsiColor::Green.on_default().bold();
 /// For bad news.
 pub(crate) const BAD: Style = AnsiColor::Red.on_default().bold();
-/// For what somebody should look at.
+/// The style of what needs attention.
 pub(crate) const WARNING: Style = AnsiColor::Yellow.on_default().bold();
 /// For advice.
 pub(crate) const HINT: Style = AnsiColor::Cyan.on_default().bold();

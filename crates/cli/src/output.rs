@@ -74,7 +74,7 @@ impl Output {
     }
 }
 
-/// Writes text to standard error. There is nobody to tell when that fails.
+/// Writes text to standard error. A failure to write it is ignored, as there is no other channel.
 pub(crate) fn tell(text: &str) {
     let mut stderr = anstream::stderr().lock();
     let _ = writeln!(stderr, "{text}");

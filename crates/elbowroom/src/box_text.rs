@@ -60,7 +60,7 @@ pub enum BoxTextError {
 /// Reads a box: intervals for some of the parameters, separated by spaces. The other parameters
 /// keep their nominal value.
 ///
-/// A parameter goes by its name (`dur_0`), and a duration also by its action,
+/// A parameter is written as its name (`dur_0`), and a duration also as its action,
 /// `(drive rover depot shelf)`, or the action's label (`n0`); `all` is every parameter that is not
 /// named itself. After `=` stands an interval `[5,12]`, one value `12`, or a deviation from the
 /// nominal value, `±10%` or `±2` (`+-` will do for `±`), which ends where the parameter's natural

@@ -181,7 +181,7 @@ fn links_of(plan: &ParametrizedPlan, network: &PlanNetwork) -> Vec<Option<LinkId
     links
 }
 
-/// Why no times fixed beforehand do for all values.
+/// The reason why no fixed schedule works for all values.
 pub(crate) fn strong_conflict(
     plan: &ParametrizedPlan,
     envelope: &DecoupledEnvelope,

@@ -20,7 +20,7 @@ pub struct Settings {
     pub precision: Rational,
     /// How steps change after a success.
     pub growth: Growth,
-    /// The search ends after so many box checks.
+    /// The limit on box checks.
     pub most_checks: Option<usize>,
 }
 

@@ -100,7 +100,7 @@ impl Oracle {
         &self.plan
     }
 
-    /// What it checks.
+    /// The guarantee that it checks.
     pub fn guarantee(&self) -> Guarantee {
         self.guarantee
     }

@@ -236,7 +236,7 @@ impl Reduction {
         self.class_count
     }
 
-    /// How many nodes the plan has.
+    /// The number of nodes of the plan.
     pub fn node_count(&self) -> usize {
         self.places.len()
     }

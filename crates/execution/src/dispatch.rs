@@ -311,7 +311,7 @@ impl Dispatch {
         &self.plan
     }
 
-    /// What is done in an instance.
+    /// The action of an instance.
     pub(crate) fn action(&self, id: InstanceId) -> &Arc<Action> {
         &self.actions[id.index()]
     }

@@ -37,7 +37,7 @@ impl StepId {
 /// Chooses what to do next. No clock, no input or output, no randomness: the same history leads to
 /// the same decisions.
 pub trait Executor: Send {
-    /// What it needs to know of a plan.
+    /// The form of a plan that it requires.
     fn need(&self) -> Need;
 
     /// Takes up a plan, and forgets the one before.
@@ -59,9 +59,9 @@ pub trait Executor: Send {
 /// The time window of a happening.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planned {
-    /// Not before.
+    /// The earliest time; `None` if there is no lower bound.
     pub earliest: Option<Rational>,
-    /// Not after.
+    /// The latest time; `None` if there is no upper bound.
     pub latest: Option<Rational>,
 }
 

@@ -62,7 +62,7 @@ pub struct Registered {
 pub struct Means {
     /// The whole envelope.
     pub region: Box<dyn Region>,
-    /// How likely everything is.
+    /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
     /// For those that look for likelier plans ([`ExecutorSpec::asks_odds`]); without, they do not
     /// look.
@@ -215,7 +215,7 @@ impl FromStr for ExecutorSpec {
 }
 
 impl Registered {
-    /// How one asks for it: `guarded`, `fixed:X`, `live[:X]`.
+    /// Its syntax in specifications: `guarded`, `fixed:X`, `live[:X]`.
     pub fn usage(&self) -> String {
         match self.argument {
             Some(_) if self.is_optional => format!("{}[:X]", self.name),

@@ -114,7 +114,7 @@ impl Progression {
         &self.time
     }
 
-    /// What is under way.
+    /// The running actions.
     pub fn running(&self) -> &BTreeMap<Ticket, Underway> {
         &self.running
     }

@@ -74,7 +74,7 @@ pub enum Entry<'a> {
         observation: &'a Observation,
         /// When that was planned.
         planned: &'a Planned,
-        /// What is wrong with it, if it was not taken at its word.
+        /// The objection, if the report was ignored or corrected.
         remark: Option<&'a str>,
     },
     /// A plan is being made.

@@ -244,7 +244,7 @@ impl<'a> Run<'a> {
         command
     }
 
-    /// Waits until the executor wants to be asked again, or somebody's patience ends.
+    /// Waits until the executor's next decision time, or until the patience with an action ends.
     fn wait(&mut self, until: Option<Rational>) -> Result<(), Stop> {
         let silence = self.next_silence();
         // More of what happens now may still come in; if not, some condition has failed.

@@ -159,7 +159,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// What a signal is called.
+/// The name of a signal.
 pub(super) fn signal_name(signal: i32) -> String {
     #[cfg(unix)]
     {

@@ -27,7 +27,7 @@ pub struct Registered {
 /// Words, in lower case, by which a planner says how it ended without a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Habits {
-    /// There is no plan. This is the planner's claim; nobody checks it.
+    /// There is no plan. This is the planner's claim, which is not checked.
     pub unsolvable: &'static [&'static str],
     /// It has given up, or used up a limit of its own.
     pub gave_up: &'static [&'static str],
@@ -185,7 +185,7 @@ pub enum Kind {
     },
 }
 
-/// A planner that nobody knows.
+/// An unknown planner.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlannerError {
     /// The name is not in the registry.

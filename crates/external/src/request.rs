@@ -17,7 +17,7 @@ pub struct Request<'a> {
     pub problem: &'a Source,
 }
 
-/// Numbers without a finite decimal get so many digits in files for other programs.
+/// The number of digits of numbers without a finite decimal, in files for other programs.
 const DIGITS: u32 = 9;
 
 /// The problem as the planner gets it.

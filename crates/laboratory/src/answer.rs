@@ -183,7 +183,7 @@ impl CompareAnswer {
         }
     }
 
-    /// Whether somebody ended it before all trials were made.
+    /// Whether it was interrupted before all trials were made.
     pub fn is_interrupted(&self) -> bool {
         match self {
             Self::Timed(results) => results.is_interrupted,

@@ -42,7 +42,7 @@ pub use shortest::Shortest;
 
 /// A world without time: a port.
 pub trait UntimedWorld {
-    /// What is true, as everyone sees it.
+    /// The true state.
     fn state(&self) -> &State;
 
     /// Tries to start an action whose start condition holds; says whether it has started. An
@@ -178,7 +178,7 @@ impl Stage<'_> {
         self.is_lost || self.tally.steps() >= self.most_steps
     }
 
-    /// Whether the last step has ended in a dead end; `None` if nobody looks out for them.
+    /// Whether the last step has ended in a dead end; `None` if dead ends are not watched for.
     pub fn is_dead_end(&self) -> Option<bool> {
         self.dead_ends.map(|_| self.is_dead_end)
     }

@@ -12,7 +12,7 @@ use crate::problem::{FunctionId, ObjectId, PredicateId};
 /// The facts and fluents met so far, numbered in the order in which they were met, and the rules
 /// of the derived facts among them.
 ///
-/// It only grows: a number once given means the same for ever.
+/// It only grows: a number never changes its meaning.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     facts: Set<(PredicateId, Vec<ObjectId>)>,

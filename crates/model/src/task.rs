@@ -69,7 +69,7 @@ impl Task {
         &self.problem
     }
 
-    /// The least separation of interfering happenings (ε) of a task for which nobody says otherwise.
+    /// The default of the least separation of interfering happenings (ε).
     pub fn default_epsilon() -> Rational {
         Rational::new(1, 1000)
     }
@@ -98,7 +98,7 @@ impl Task {
         &self.timed
     }
 
-    /// What must hold at the end.
+    /// The goal condition.
     pub fn goal(&self) -> &Condition {
         &self.goal
     }

@@ -89,7 +89,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What VAL does when called with `-t tolerance`.
+    /// The settings that correspond to VAL's `-t tolerance`.
     pub fn like_val(tolerance: Rational) -> Self {
         Self {
             needs_separation: false,
@@ -131,7 +131,7 @@ impl Verdict {
         matches!(self, Self::Valid(_))
     }
 
-    /// What is wrong, if something is.
+    /// The violation, if the plan is invalid.
     pub fn violation(&self) -> Option<&Violation> {
         match self {
             Self::Invalid(violation) => Some(violation),

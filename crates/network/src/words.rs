@@ -33,7 +33,7 @@ impl NetworkFile {
         self.bound_in_words(constraint.from, constraint.to, &constraint.bound)
     }
 
-    /// That a link may end so early.
+    /// The sentence that a link may end as early as its lower bound.
     pub fn early_in_words(&self, id: LinkId) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));
@@ -41,7 +41,7 @@ impl NetworkFile {
         format!("{end} may come as early as {lower} after {begin}")
     }
 
-    /// That a link may end so late.
+    /// The sentence that a link may end as late as its upper bound.
     pub fn late_in_words(&self, id: LinkId) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));
@@ -53,7 +53,7 @@ impl NetworkFile {
         }
     }
 
-    /// That a link takes so long.
+    /// The sentence that a link takes this long.
     pub fn duration_in_words(&self, id: LinkId, duration: &Rational) -> String {
         let link = self.network.link(id);
         let (begin, end) = (self.point(link.activation), self.point(link.end));

@@ -51,7 +51,7 @@ impl Feature {
         Self::UnknownRequirements,
     ];
 
-    /// What the feature is called.
+    /// The name of the feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Processes => "processes",
@@ -70,7 +70,7 @@ impl Feature {
         }
     }
 
-    /// What programs know it by: the [`code`](Diagnostic::code) of diagnostics about it.
+    /// Its identifier: the [`code`](Diagnostic::code) of diagnostics about it.
     pub fn code(self) -> &'static str {
         match self {
             Self::Processes => "processes",
@@ -96,7 +96,7 @@ impl Feature {
         all.find(|feature| feature.code() == code)
     }
 
-    /// How it is written, and what becomes of it.
+    /// Its syntax, and how it is treated.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Processes => "PDDL+ `:process`: refused",

@@ -6,7 +6,7 @@ use elbowroom_text::Source;
 use elbowroom_text::nearest;
 use elbowroom_text::{Diagnostic, Label, Severity};
 
-/// More would help nobody; a text with so many mistakes is not PDDL.
+/// The limit on mistakes reported: a text with more of them is not PDDL.
 const MOST_DIAGNOSTICS: usize = 200;
 
 /// The texts being read, and what was found in them so far.

@@ -20,7 +20,7 @@ impl Belief {
         }
     }
 
-    /// How likely the fact is to hold.
+    /// The probability that the fact holds.
     pub fn probability(&self, fact: FactId) -> f64 {
         self.probabilities.get(&fact).copied().unwrap_or(0.0)
     }

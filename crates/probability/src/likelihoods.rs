@@ -116,7 +116,7 @@ impl Likelihoods {
         }
     }
 
-    /// How a fact changes by itself.
+    /// The probabilities of a spontaneous change of a fact.
     ///
     /// # Errors
     /// When nothing is said of it.
@@ -139,7 +139,7 @@ impl Likelihoods {
         })
     }
 
-    /// How likely an attempt to start an action is to succeed.
+    /// The probability that an attempt to start an action succeeds.
     ///
     /// # Errors
     /// When nothing is said of it.
@@ -158,7 +158,7 @@ impl Likelihoods {
             .or(self.defaults.start)
     }
 
-    /// How likely an effect of an action on a fact is to take place.
+    /// The probability that an effect of an action on a fact takes place.
     ///
     /// # Errors
     /// When nothing is said of it.

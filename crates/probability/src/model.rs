@@ -115,7 +115,7 @@ impl Model {
         &self.plan
     }
 
-    /// How effects and spontaneous changes go together.
+    /// The semantics of failed effects and of spontaneous changes.
     pub fn semantics(&self) -> Semantics {
         self.semantics
     }

@@ -41,7 +41,7 @@ pub use small_world::Table;
 /// The number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Horizon {
-    /// At most so many.
+    /// At most this many.
     Steps(usize),
     /// As many as it takes.
     Unlimited,

@@ -149,7 +149,7 @@ impl OrderSearch {
         &self.model
     }
 
-    /// How it searches.
+    /// Its settings.
     pub fn settings(&self) -> &SearchSettings {
         &self.settings
     }

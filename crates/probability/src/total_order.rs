@@ -46,9 +46,9 @@ pub struct Layer {
 pub struct Slot {
     /// Which one.
     pub node: NodeId,
-    /// Not before.
+    /// The earliest time.
     pub earliest: Rational,
-    /// Not after; `None` if as late as one likes.
+    /// The latest time; `None` if there is no upper bound.
     pub latest: Option<Rational>,
 }
 

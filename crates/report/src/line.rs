@@ -180,9 +180,9 @@ pub struct OrderLine {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WindowLine {
-    /// Not before.
+    /// The earliest time; `None` if there is no lower bound.
     pub earliest: Option<Exact>,
-    /// Not after.
+    /// The latest time; `None` if there is no upper bound.
     pub latest: Option<Exact>,
 }
 
@@ -278,7 +278,7 @@ pub struct ObservedLine {
     pub observation: ObservationLine,
     /// When that was planned.
     pub planned: WindowLine,
-    /// What is wrong with it, if it was not taken at its word.
+    /// The objection, if the report was ignored or corrected.
     pub remark: Option<String>,
 }
 

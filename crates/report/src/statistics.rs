@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// So many of so many.
+/// A proportion: successes out of a count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Proportion {

@@ -85,7 +85,8 @@ pub struct Exogenous {
     pub probability: f64,
     /// What happens.
     pub change: ExogenousChange,
-    /// Whether the world says so. If not, it shows only where somebody looks, or stumbles over it.
+    /// Whether the world reports it. If not, it is noticed only when the world is asked to look, or
+    /// when an action fails because of it.
     pub is_reported: bool,
 }
 

@@ -162,7 +162,7 @@ impl<P: Pace> World for Paced<'_, P> {
     }
 }
 
-/// Actions take as long as was decided beforehand, each time that they are started.
+/// A pace with durations that are fixed in advance, for each start of an action.
 #[derive(Clone, Debug, Default)]
 pub struct Durations {
     /// For each action's name, how long it takes the first time, the second time, …

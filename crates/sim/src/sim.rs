@@ -89,7 +89,7 @@ impl<'a> SimWorld<'a> {
         world
     }
 
-    /// What is true.
+    /// The true state.
     pub fn truth(&self) -> &Progression {
         &self.truth
     }

@@ -45,7 +45,7 @@ pub struct Branching<'a, Q> {
     pub is_pair: &'a dyn Fn(Q) -> bool,
     /// The least and the greatest value of a quantity.
     pub value: &'a dyn Fn(Q, Side) -> Rational,
-    /// After so many branches the question is given up.
+    /// The limit on branches.
     pub most_branches: usize,
 }
 

@@ -15,7 +15,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// An empty list for each of so many nodes.
+    /// An empty list for each of `node_count` nodes.
     pub(crate) fn with_nodes(node_count: usize) -> Self {
         Self {
             ends: vec![None; node_count],

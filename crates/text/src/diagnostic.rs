@@ -119,7 +119,7 @@ impl Diagnostic {
         self.position().1
     }
 
-    /// How many characters the place spans on its line; 0 where something is missing.
+    /// The number of characters that the place spans on its line; 0 where something is missing.
     pub fn length(&self) -> usize {
         self.source().length(&self.labels[0].span)
     }

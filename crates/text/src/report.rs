@@ -15,7 +15,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// More findings than this are not kept: they would help nobody.
+    /// The limit on findings that are kept.
     pub const MOST: usize = 100;
 
     /// Nothing was found yet.

@@ -68,7 +68,7 @@ impl Source {
         (line, self.text()[start..at].chars().count() + 1)
     }
 
-    /// How many characters a place spans on the line on which it begins.
+    /// The number of characters that a place spans on the line on which it begins.
     pub fn length(&self, span: &Span) -> usize {
         let start = self.boundary(span.start);
         let (line, _) = self.position(start);
@@ -76,7 +76,7 @@ impl Source {
         self.text()[start..end].chars().count()
     }
 
-    /// Where a line (from 1) lies, without its line break. Empty past the end.
+    /// The span of a line (from 1), without its line break. Empty past the end.
     pub fn line(&self, line: usize) -> Span {
         let end_of_text = self.text().len();
         let Some(&start) = self.0.lines.get(line.wrapping_sub(1)) else {

@@ -86,7 +86,7 @@ impl<'a> RunRequest<'a> {
         Self { plan, ..self }
     }
 
-    /// Has somebody else make plans than whom the specification names.
+    /// Replaces the planner that the specification names.
     #[must_use]
     pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
         let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
@@ -178,7 +178,7 @@ impl RunAnswer {
 }
 
 impl RunOutcome {
-    /// How the run ended.
+    /// The verdict of the run.
     pub fn verdict(&self) -> &Verdict {
         &self.report.verdict
     }

@@ -195,7 +195,7 @@ impl<'a> Likeliest<'a> {
         verdict.is_valid().then_some(plan)
     }
 
-    /// A duration that so many in a hundred do not exceed.
+    /// The quantile of a duration, in percent.
     fn quantile(&mut self, name: &str, planned: &Rational, quantile: u64) -> Rational {
         let key = (name.to_owned(), planned.clone(), quantile);
         if let Some(known) = self.quantiles.get(&key) {

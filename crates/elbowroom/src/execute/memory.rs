@@ -63,7 +63,7 @@ pub struct RememberingPlanner<P> {
 }
 
 impl<P: Planner> RememberingPlanner<P> {
-    /// Remembers at most so many answers.
+    /// A memory for at most `most` answers.
     pub fn new(planner: P, most: usize) -> Self {
         Self {
             planner,
@@ -113,7 +113,7 @@ struct Question {
 }
 
 impl<P: Preparer> RememberingPreparer<P> {
-    /// Remembers at most so many answers.
+    /// A memory for at most `most` answers.
     pub fn new(preparer: P, most: usize) -> Self {
         Self {
             preparer,

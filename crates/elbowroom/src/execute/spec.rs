@@ -167,7 +167,7 @@ impl RunSpec {
         }
     }
 
-    /// How to run.
+    /// The settings of the run.
     pub fn settings(&self) -> RunSettings {
         RunSettings {
             running: self.running,
@@ -178,7 +178,7 @@ impl RunSpec {
         }
     }
 
-    /// What to leave open, and how to search for envelopes.
+    /// The quantities to vary, and the parameters of the search for envelopes.
     pub fn envelopes(&self) -> flow::Settings {
         let mut flow = flow::Settings {
             vary: self.vary.clone(),
@@ -205,7 +205,7 @@ impl RunSpec {
         }
     }
 
-    /// How likely everything is.
+    /// The likelihoods for the executor.
     ///
     /// # Errors
     /// When the likelihood file cannot be read.

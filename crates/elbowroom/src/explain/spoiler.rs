@@ -8,7 +8,7 @@ use elbowroom_stn::{ConsistentNetwork, Constraint, MovingWindows, OutOfWindow};
 
 use super::Explainer;
 
-/// A play is given up after so many rounds: it goes on for ever only if nothing has a limit.
+/// The limit on rounds of a play, which is endless only if nothing has a limit.
 const MOST_ROUNDS: usize = 10_000;
 
 /// The time at which an executor without foresight starts an action: the earliest or the latest.

@@ -15,7 +15,8 @@ pub(super) struct Retry {
     pub(super) failures: u32,
 }
 
-/// After so many failures in a row the wait does not grow any more: ε · 2⁴⁰ is 35 years.
+/// The number of failures in a row after which the wait does not grow any more: ε · 2⁴⁰ is 35
+/// years.
 const MOST_DOUBLINGS: u32 = 40;
 
 impl Dispatch {

@@ -12,7 +12,7 @@ use crate::progression::Progression;
 use crate::reason::{About, Cause, Reason};
 
 impl Dispatch {
-    /// What to do now, when everything new has been taken note of.
+    /// The decision at this moment, after all news have been taken in.
     pub(crate) fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if self.progress.left == 0 {
             return at_the_end(moment);

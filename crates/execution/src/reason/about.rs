@@ -94,7 +94,7 @@ pub enum About {
     TooLittleTime,
     /// What the rest of the plan does to numbers fails when the action takes longer.
     LaterNumbers,
-    /// What somebody else says: the world, of a failure; who knows the envelope, of an objection.
+    /// A message from outside: of the world, about a failure; of an oracle, about its objection.
     Said(String),
 }
 

@@ -42,7 +42,7 @@ const MOST_STEPS: u64 = 10_000_000;
 const MOST_NAMED: usize = 3;
 
 impl Run<'_> {
-    /// Notes something for the case that somebody asks why.
+    /// Records an event, for a later explanation of a dead end.
     pub(super) fn note(&mut self, time: &Rational, what: What) {
         if self.is_explaining {
             self.history.push(Happened {
@@ -80,7 +80,7 @@ struct Past<'a> {
     history: &'a [Happened],
     account: &'a Account,
     now: &'a Rational,
-    /// What was out of reach after so many events.
+    /// The conditions that were out of reach, by the number of events before.
     known: BTreeMap<usize, Option<Vec<Condition>>>,
 }
 
@@ -204,7 +204,7 @@ impl Past<'_> {
         }
     }
 
-    /// What was believed after so many events.
+    /// The belief after `count` events.
     fn after(&self, count: usize) -> Progression {
         let mut state = Progression::new(Arc::clone(self.task));
         for happened in &self.history[..count] {

@@ -119,7 +119,7 @@ impl Run<'_> {
         }
     }
 
-    /// What time it is, by the world's clock.
+    /// The present time, by the world's clock.
     pub fn now(&self) -> &Rational {
         &self.now
     }

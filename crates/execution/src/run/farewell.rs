@@ -20,7 +20,7 @@ pub(super) struct Closing {
 }
 
 impl Run<'_> {
-    /// Whether somebody wants the run to end.
+    /// Whether the run was asked to end.
     pub(super) fn heed(&mut self) -> Result<(), Stop> {
         if !(self.is_to_end)() {
             return Ok(());

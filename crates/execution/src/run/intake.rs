@@ -222,7 +222,7 @@ impl Run<'_> {
         measured.iter().map(amount).collect()
     }
 
-    /// Two reports exclude each other: nobody knows what the action's end has done.
+    /// Two reports exclude each other: the effects of the action's end are unknown.
     fn contradict(&mut self, ticket: Ticket) {
         let Some(entry) = self.account.get(ticket) else {
             return;

@@ -84,7 +84,7 @@ impl FromStr for RunningRule {
 pub enum PlanningTime {
     /// As long as the planner says it took.
     Measured,
-    /// Always so many seconds.
+    /// A fixed number of seconds.
     Seconds(Rational),
 }
 
@@ -163,11 +163,11 @@ pub enum Verdict {
         /// Why.
         why: String,
     },
-    /// One more new plan would have been one too many.
+    /// The limit on new plans was reached.
     ReplanLimit,
-    /// The time was up.
+    /// The time limit was reached.
     TimeLimit,
-    /// Somebody asked the run to end.
+    /// The run was asked to end.
     Interrupted,
     /// The outside world failed.
     WorldFailed {
@@ -190,7 +190,7 @@ impl Verdict {
         }
     }
 
-    /// What there is to add.
+    /// Details of the verdict, if there are any.
     pub fn why(&self) -> Option<&str> {
         match self {
             Self::NoPlan { why } | Self::WorldFailed { why } => Some(why),

@@ -85,7 +85,7 @@ struct Run {
     processes: Processes,
     is_output_open: bool,
     is_error_open: bool,
-    /// Whether somebody else waits for its end.
+    /// Whether another thread waits for its end.
     is_left: bool,
 }
 

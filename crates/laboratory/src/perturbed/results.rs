@@ -25,7 +25,7 @@ pub struct PerturbedResults {
     pub shards: u64,
     /// Which parts are in here.
     pub parts: Vec<u64>,
-    /// Whether somebody ended it before all trials of these parts were made.
+    /// Whether it was interrupted before all trials of these parts were made.
     #[serde(default, skip_serializing_if = "parts::is_false")]
     pub is_interrupted: bool,
     /// The rows: case by case, world by world.

@@ -31,7 +31,7 @@ pub struct Registered {
 pub struct Means<'m> {
     /// The problem.
     pub task: Arc<Task>,
-    /// How likely everything is.
+    /// The likelihoods of failures and spontaneous changes.
     pub likelihoods: Arc<Likelihoods>,
     /// The table of the sound world, made when it is first asked for.
     pub foresight: &'m dyn Fn() -> Result<Foresighted, NoForesight>,

@@ -3,7 +3,7 @@
 use super::{Bound, Infeasible, Simplex, VariableId};
 use crate::{Delta, Rational};
 
-/// After so many pivots per row, Bland's rule takes over, which cannot run in circles.
+/// The number of pivots per row after which Bland's rule takes over, which cannot cycle.
 const GREEDY_PIVOTS_PER_ROW: usize = 2;
 
 impl Simplex {

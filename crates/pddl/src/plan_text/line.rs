@@ -23,7 +23,7 @@ pub enum LineKind {
 }
 
 impl LineKind {
-    /// What this line is.
+    /// The kind of this line.
     pub fn of(text: &str) -> Self {
         match line(text.trim_end(), 0) {
             Line::Blank => Self::Blank,

@@ -51,7 +51,7 @@ pub enum ParametrizeError {
         /// How to say which.
         advice: &'static str,
     },
-    /// The domain leaves a number open and nobody says what it is nominally.
+    /// The domain leaves a number open, and its nominal value is not given.
     #[error("the domain leaves `{name}` open: give its nominal value with `--vary '{name}=VALUE'`")]
     NoNominal {
         /// The number.

@@ -8,7 +8,7 @@ use indexmap::IndexMap;
 pub(crate) type Map<K, V> = IndexMap<K, V, BuildHasherDefault<Mixer>>;
 
 /// Multiplies and rotates, as the hash of the Firefox and rustc code bases does. The keys come
-/// from one problem; nobody profits from making them collide.
+/// from one problem; collision attacks are not a concern.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Mixer(u64);
 

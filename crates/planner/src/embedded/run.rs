@@ -226,7 +226,7 @@ impl Planner<'_> {
         reasons::pairs_proof(names, compiled, &mut goes_on)
     }
 
-    /// Lets a search look at so many states.
+    /// Lets a search evaluate `budget` states.
     fn work(&mut self, search: &mut Search<'_>, budget: u64) -> Outcome {
         self.progress.phase = if self.best.is_some() {
             Phase::Improving

@@ -97,7 +97,7 @@ struct Node {
 enum DeadEnd {
     /// It was not asked.
     Unchecked,
-    /// There may be a plan, or nobody asks any more.
+    /// There may be a plan, or such checks have been given up.
     Unproved,
     /// No plan goes through the state.
     Proved,

@@ -216,7 +216,7 @@ constants! {
     /// How many turns the preferred successors get for a better estimate. The value of LAMA (Richter
     /// & Westphal, JAIR 2010); not measured here.
     boost: i64 = 1_000;
-    /// One of so many turns goes to the successor that has waited longest, in the complete search.
+    /// In the complete search, one turn in this many goes to the successor that has waited longest.
     /// Not measured; any number keeps the search from losing itself where states are endlessly many.
     exploration_interval: u64 = 32;
     /// How many states that differ in times only are kept by compressing searches. Not measured.

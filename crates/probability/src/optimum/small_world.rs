@@ -17,7 +17,7 @@ use crate::model::{Model, Semantics};
 use crate::search::{OrderSearch, SearchSettings};
 use crate::total_order::Slot;
 
-/// At most so many actions are thought to be under way at once.
+/// The limit on actions running at once.
 const MOST_RUNNING: usize = 3;
 
 /// Worlds with more states, those of facts times those of actions under way, are not tabulated: a

@@ -308,7 +308,7 @@ impl Replay {
         .looking_ahead()
     }
 
-    /// Whether somebody asked the run to end at the point that the replay has reached.
+    /// Whether the run was asked to end at the point that the replay has reached.
     pub fn interruption(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.is_to_end)
     }

@@ -4,7 +4,7 @@ use super::graph::{EdgeId, Graph, Kind, Origin};
 use super::{Extended, Ground, LinkId, Step, UncertainNetwork};
 use crate::{Constraint, Network, NodeId, Weight};
 
-/// Why an edge is there is told in at most so many steps.
+/// The limit on the steps in the explanation of an edge.
 const MOST_STEPS: usize = 1_000;
 
 /// A dynamically controllable network with all edges that executing it needs: what an event means

@@ -14,7 +14,7 @@ use crate::{NodeId, Weight, WindowEnd};
 /// - a point may happen when all that must come before it have happened, its window has opened, and
 ///   none of its waits is on any more;
 /// - a wait is over when the end that it waits for has happened, or when its time is up;
-/// - an event moves the windows of its neighbours, and of nobody else.
+/// - an event updates the windows of its neighbours only.
 ///
 /// It has no clock: it is told what happens, and asked what may. An event costs time in proportion
 /// to the edges at its node.
@@ -91,7 +91,7 @@ impl<W: Weight> Dispatcher<W> {
         }
     }
 
-    /// What it executes.
+    /// The dispatchable network that it executes.
     pub fn form(&self) -> &Dispatchable<W> {
         &self.form
     }

@@ -31,7 +31,7 @@ use super::graph::{Edge, EdgeId, Graph, Kind, Origin, Way, WayId};
 use super::{LinkId, UncertainNetwork};
 use crate::{NodeId, Weight};
 
-/// A conflict is spelt out up to so many steps.
+/// The limit on the steps of a conflict.
 const MOST_STEPS: usize = 10_000;
 
 impl<W: Weight> UncertainNetwork<W> {

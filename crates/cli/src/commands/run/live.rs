@@ -11,7 +11,7 @@ use crate::number;
 use crate::progress::Progress;
 use crate::words::{counted, tame};
 
-/// Of what is under way, only so many actions are named.
+/// The limit on running actions that are named.
 const MOST_NAMED: usize = 3;
 
 /// Keeps a record and, on a terminal, shows the time, what is under way, and when a plan is made.

@@ -81,7 +81,7 @@ pub(super) struct Realtime<'a> {
     pub(super) interrupt: &'a Interrupt,
 }
 
-/// How long to sleep until somebody looks whether to go on.
+/// The interval at which a sleep checks for an interrupt.
 const NAP: Duration = Duration::from_millis(50);
 
 impl World for Realtime<'_> {

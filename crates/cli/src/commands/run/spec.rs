@@ -77,7 +77,7 @@ pub(super) fn of(
     Ok((spec, world))
 }
 
-/// On a wall clock, making plans takes time unless somebody says otherwise.
+/// On a wall clock, planning takes time unless the arguments say otherwise.
 fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
     match (&arguments.planning_time, &arguments.realtime) {
         (Some(text), _) => text.parse().map_err(|_| {

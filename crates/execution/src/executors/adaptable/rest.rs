@@ -209,7 +209,7 @@ impl Rest {
         lately
     }
 
-    /// What to do now.
+    /// The decision at this moment.
     pub(super) fn next(&mut self, moment: &Moment<'_>) -> Decided {
         if !self.let_go.is_empty() {
             return wait(None, About::EndOfCancelled);

@@ -10,13 +10,13 @@ use std::time::Duration;
 /// A line with more bytes is no message.
 pub(super) const LONGEST_LINE: usize = 1 << 20;
 
-/// So many bytes may wait to be read, and so many may be said in one answer.
+/// The limit on bytes that wait to be read, and on those in one answer.
 pub(super) const LONGEST_ANSWER: usize = 16 << 20;
 
 /// The reader of a program's standard output.
 pub(super) struct Ears {
     lines: Receiver<Heard>,
-    /// The number of bytes that have come that nobody has taken yet.
+    /// The number of bytes that have come and are not taken yet.
     waiting: Arc<AtomicUsize>,
 }
 
@@ -26,7 +26,7 @@ pub(super) enum Heard {
     Line(String),
     /// More than [`LONGEST_LINE`] bytes without a line feed.
     EndlessLine,
-    /// More than [`LONGEST_ANSWER`] bytes that nobody had asked for yet.
+    /// More than [`LONGEST_ANSWER`] bytes without being asked.
     TooMuch,
     /// Nothing in time.
     Nothing,
@@ -94,9 +94,9 @@ pub(super) struct Mouth {
 
 /// The result of writing a line.
 pub(super) enum Told {
-    /// It is written; whether it is read, nobody knows.
+    /// It is written; whether the program has read it is not known.
     Yes,
-    /// The pipe is full, and nobody reads.
+    /// The pipe is full: the program does not read.
     NobodyReads,
     /// Nobody is there any more.
     End,
