@@ -117,7 +117,7 @@
 //! # }
 //! ```
 //!
-//! # What there is
+//! # Contents
 //!
 //! The [`tutorial`] goes through planning, envelopes, execution and probability. Each
 //! question of the command line is a request with an answer in [`answers`]; an answer is plain data,
@@ -127,11 +127,13 @@
 //! - [`flow`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
 //! - [`graph`]: networks as graphs for Graphviz.
-//! - [`Explainer`]: says in words what limits an envelope, and why a plan does not work.
-//! - [`parse_box`], [`write_box`]: boxes as text. [`AnyPlan`]: a plan of either kind.
-//! - [`earliest_end`]: when a plan is over at the earliest.
+//! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
+//!   [`Shortfall`]).
+//! - [`parse_box`], [`write_box`]: boxes as text ([`BoxTextError`]).
+//! - [`AnyPlan`], [`PlanKind`]: a plan of either kind, with fixed times or as a network.
+//! - [`earliest_end`]: the makespan of a plan's earliest schedule.
 //!
-//! The crates below, re-exported:
+//! The crates that it re-exports:
 //!
 //! - [`text`]: texts, source positions, diagnostics.
 //! - [`num`]: exact rationals and intervals.
@@ -149,7 +151,7 @@
 //!
 //! Experiments that compare executors are a crate of their own, `elbowroom-laboratory`.
 //!
-//! The library looks at no clock and no file, and prints nothing.
+//! The library reads no clock and no files, and prints nothing.
 
 pub mod answers;
 mod box_text;
