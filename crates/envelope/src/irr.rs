@@ -73,7 +73,7 @@ pub enum Limit {
     Objection {
         /// The box that was refused.
         refused: DecoupledEnvelope,
-        /// Why.
+        /// The reason.
         objection: Objection,
     },
     /// Whether the box with this end moved out is inside the envelope cannot be told.

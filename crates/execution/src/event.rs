@@ -52,30 +52,30 @@ pub struct Observation {
 pub enum Event {
     /// An action has started.
     Started {
-        /// Which.
+        /// The ticket of its start.
         ticket: Ticket,
         /// By how much its start really changed fluents, where that was measured.
         measured: Vec<Measured>,
     },
     /// An action has ended.
     Ended {
-        /// Which.
+        /// The ticket of its start.
         ticket: Ticket,
-        /// How.
+        /// The outcome.
         ending: Ending,
         /// By how much its end really changed fluents, where that was measured.
         measured: Vec<Measured>,
     },
     /// A fact is seen to be true or false.
     Fact {
-        /// Which.
+        /// The fact.
         fact: FactId,
         /// Whether it is true.
         truth: bool,
     },
     /// A fluent is seen to have a value.
     Value {
-        /// Which.
+        /// The fluent.
         fluent: FluentId,
         /// Its value.
         value: Rational,
@@ -96,7 +96,7 @@ pub enum Ending {
     Succeeded,
     /// Its end effects did not happen.
     Failed {
-        /// Why, in words; may be empty.
+        /// The reason as text; may be empty.
         why: String,
     },
     /// It was cancelled; its end effects did not happen.

@@ -110,20 +110,20 @@ pub struct Moment<'a> {
 pub enum News {
     /// An action has started.
     Started {
-        /// Which.
+        /// The step of the plan.
         step: StepId,
-        /// When.
+        /// The time.
         time: Rational,
         /// Amounts measured.
         measured: Vec<Amount>,
     },
     /// An action has ended.
     Ended {
-        /// Which.
+        /// The step of the plan.
         step: StepId,
-        /// When.
+        /// The time.
         time: Rational,
-        /// How.
+        /// The outcome.
         ending: Ending,
         /// Amounts measured.
         measured: Vec<Amount>,
@@ -134,12 +134,12 @@ pub enum News {
     Value(FluentId),
     /// Reports on an action contradict each other.
     Contradiction {
-        /// Which.
+        /// The action.
         action: String,
     },
     /// Nothing has been heard of an action for longer than the run's patience.
     Silence {
-        /// Which.
+        /// The action.
         action: String,
         /// Since when it should have ended.
         since: Rational,
@@ -162,7 +162,7 @@ pub struct Amount {
 pub struct Decided {
     /// What to do.
     pub decision: Decision,
-    /// Why.
+    /// The reason.
     pub reason: Reason,
 }
 

@@ -94,7 +94,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
 /// An executor as one asks for it: `guarded`, `fixed:30`.
 #[derive(Clone)]
 pub struct ExecutorSpec {
-    /// Which.
+    /// The executor.
     pub registered: &'static Registered,
     /// The number after the colon.
     pub argument: Option<Rational>,

@@ -45,7 +45,7 @@ pub(crate) struct OneHop {
 pub(crate) struct Missed {
     /// The end that was missed.
     pub(crate) end: WindowEnd,
-    /// By how much.
+    /// The amount by which it is missed.
     pub(crate) by: Rational,
 }
 

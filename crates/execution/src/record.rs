@@ -36,16 +36,16 @@ pub enum Entry<'a> {
     Mission(&'a Mission),
     /// The executor decided.
     Decided {
-        /// When.
+        /// The time.
         now: &'a Rational,
         /// What and why.
         decided: &'a Decided,
     },
     /// The world was given a command.
     Command {
-        /// When.
+        /// The time.
         now: &'a Rational,
-        /// Which.
+        /// The command.
         command: &'a Command,
         /// When that was planned.
         planned: &'a Planned,
@@ -61,7 +61,7 @@ pub enum Entry<'a> {
     },
     /// What the world reported when asked to look at the goal.
     Looked {
-        /// When.
+        /// The time.
         now: &'a Rational,
         /// What it reported.
         observations: &'a [Observation],
@@ -79,16 +79,16 @@ pub enum Entry<'a> {
     },
     /// A plan is being made.
     Planning {
-        /// When.
+        /// The time.
         now: &'a Rational,
-        /// Why.
+        /// The reason.
         reason: &'a Reason,
         /// From where.
         situation: &'a Situation,
     },
     /// A plan has been made, or not.
     Planned {
-        /// When, with the time that it took.
+        /// The time, planning time included.
         now: &'a Rational,
         /// The time that it took, by the world's clock.
         took: &'a Rational,
@@ -101,7 +101,7 @@ pub enum Entry<'a> {
     },
     /// Somebody asked the run to end.
     Interrupted {
-        /// When.
+        /// The time.
         now: &'a Rational,
     },
     /// The run is over.

@@ -27,7 +27,7 @@ pub struct Found {
 pub enum Event<'a> {
     /// It is still running.
     Running {
-        /// How long.
+        /// The time since its start.
         elapsed: Duration,
         /// How much memory it uses, in bytes; 0 where that cannot be measured.
         memory: u64,
@@ -36,14 +36,14 @@ pub enum Event<'a> {
     Plan {
         /// The plan.
         found: &'a Found,
-        /// When.
+        /// The time.
         elapsed: Duration,
     },
     /// It printed a plan that the judge refuses, or that is none.
     Refused {
-        /// Why.
+        /// The reason.
         reason: &'a str,
-        /// When.
+        /// The time.
         elapsed: Duration,
     },
 }
@@ -93,7 +93,7 @@ pub enum Outcome {
     },
     /// There is no such program, or it cannot be started, or this situation cannot be told to it.
     NotStarted {
-        /// Why.
+        /// The reason.
         reason: String,
         /// What to do about it.
         help: String,

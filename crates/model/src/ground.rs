@@ -163,7 +163,7 @@ pub enum Change {
     Delete(FactId),
     /// The fluent changes.
     Update {
-        /// How.
+        /// The assignment operator.
         operator: UpdateOperator,
         /// Which fluent.
         fluent: FluentId,

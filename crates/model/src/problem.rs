@@ -289,7 +289,7 @@ pub enum Change {
     Delete(Atom),
     /// The fluent changes.
     Update {
-        /// How.
+        /// The assignment operator.
         operator: UpdateOperator,
         /// Which fluent.
         fluent: Fluent,

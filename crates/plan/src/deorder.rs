@@ -66,7 +66,7 @@ pub enum DeorderError {
         first: String,
         /// The other.
         second: String,
-        /// When.
+        /// The time.
         time: String,
     },
     /// No times satisfy the constraints that keep the plan's order.

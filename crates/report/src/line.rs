@@ -39,7 +39,7 @@ pub enum Line {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanLine {
-    /// When.
+    /// The time.
     pub now: Exact,
     /// What the world's clock reads at the plan's time 0.
     pub origin: Exact,
@@ -129,11 +129,11 @@ pub type IntervalLine = (Option<Exact>, Option<Exact>);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DecidedLine {
-    /// When.
+    /// The time.
     pub now: Exact,
-    /// What.
+    /// The decision.
     pub decision: DecisionLine,
-    /// Why.
+    /// The reason.
     pub reason: ReasonLine,
 }
 
@@ -143,7 +143,7 @@ pub struct DecidedLine {
 pub enum DecisionLine {
     /// To start actions.
     Start {
-        /// Which.
+        /// The actions to start.
         orders: Vec<OrderLine>,
     },
     /// To wait.
@@ -153,7 +153,7 @@ pub enum DecisionLine {
     },
     /// To stop actions.
     Cancel {
-        /// Which.
+        /// The steps to cancel.
         steps: Vec<u32>,
     },
     /// To give up the plan.
@@ -218,9 +218,9 @@ pub struct ReasonLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandLine {
-    /// When.
+    /// The time.
     pub now: Exact,
-    /// Which.
+    /// The command.
     pub command: GivenLine,
     /// When that was planned.
     pub planned: WindowLine,
@@ -262,7 +262,7 @@ pub struct PassedLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LookedLine {
-    /// When.
+    /// The time.
     pub now: Exact,
     /// What it reported.
     pub observations: Vec<ObservationLine>,
@@ -292,7 +292,7 @@ pub enum ObservationLine {
         ticket: u64,
         /// Amounts, by fluent.
         measured: IndexMap<String, Exact>,
-        /// When.
+        /// The time.
         time: Exact,
     },
     /// An action has ended.
@@ -306,7 +306,7 @@ pub enum ObservationLine {
         /// Why it failed; where it has.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         why: Option<String>,
-        /// When.
+        /// The time.
         time: Exact,
     },
     /// A fact is seen.
@@ -315,7 +315,7 @@ pub enum ObservationLine {
         fact: String,
         /// Whether it is true.
         becomes: bool,
-        /// When.
+        /// The time.
         time: Exact,
     },
     /// A fluent is seen.
@@ -324,7 +324,7 @@ pub enum ObservationLine {
         fluent: String,
         /// Its value.
         value: Exact,
-        /// When.
+        /// The time.
         time: Exact,
     },
     /// Something that cannot be understood.
@@ -333,7 +333,7 @@ pub enum ObservationLine {
         said: String,
         /// What is wrong with it.
         why: String,
-        /// When.
+        /// The time.
         time: Exact,
     },
 }
@@ -342,9 +342,9 @@ pub enum ObservationLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanningLine {
-    /// When.
+    /// The time.
     pub now: Exact,
-    /// Why.
+    /// The reason.
     pub reason: ReasonLine,
     /// From where.
     pub situation: SituationLine,
@@ -354,7 +354,7 @@ pub struct PlanningLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SituationLine {
-    /// When.
+    /// The time.
     pub time: Exact,
     /// What is true.
     pub facts: Vec<String>,
@@ -380,7 +380,7 @@ pub struct RunningLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedLine {
-    /// When, with the time that it took.
+    /// The time, planning time included.
     pub now: Exact,
     /// The time that it took, by the world's clock.
     pub took: Exact,
@@ -397,7 +397,7 @@ pub struct PlannedLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InterruptedLine {
-    /// When.
+    /// The time.
     pub now: Exact,
 }
 
@@ -408,12 +408,12 @@ pub struct ReportLine {
     pub verdict: String,
     /// What there is to add.
     pub why: Option<String>,
-    /// When, by the world's clock.
+    /// The time, by the world's clock.
     #[serde(with = "exact")]
     pub time: Rational,
     /// The number of new plans made, or asked for.
     pub replans: usize,
-    /// Why.
+    /// The reason.
     pub reasons: Vec<ReasonLine>,
     /// What can never become true again, where no plan reaches the goal any more.
     pub dead_end: Vec<ReasonLine>,

@@ -48,20 +48,20 @@ pub struct Rule {
 pub struct Amount {
     /// Which actions.
     pub action: ActionPattern,
-    /// Which fluents.
+    /// The fluents.
     pub fluent: ActionPattern,
-    /// By how much.
+    /// The distribution of the amount.
     pub rule: Rule,
 }
 
 /// The failure probability of actions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failing {
-    /// Which.
+    /// The action.
     pub action: ActionPattern,
-    /// How often.
+    /// The probability.
     pub probability: f64,
-    /// When.
+    /// The time.
     pub when: Failure,
 }
 
@@ -79,7 +79,7 @@ pub enum Failure {
 /// Something that happens by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exogenous {
-    /// When.
+    /// The time.
     pub time: Rule,
     /// How likely it happens at all.
     pub probability: f64,
@@ -108,7 +108,7 @@ pub struct Reports {
     pub duplicated: f64,
     /// It comes late.
     pub late: f64,
-    /// By how much.
+    /// The distribution of the delay.
     pub lateness: Rule,
     /// Before or after it comes one that says the opposite.
     pub contradicted: f64,

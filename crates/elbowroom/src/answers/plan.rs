@@ -96,13 +96,13 @@ pub enum PlanFinding {
     /// There is no plan, or the planner says so.
     #[serde(rename = "no plan")]
     NoPlan {
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// Nothing is known.
     #[serde(rename = "none")]
     None {
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }

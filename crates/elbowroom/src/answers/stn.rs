@@ -70,7 +70,7 @@ pub enum StnFinding {
     },
     /// The judge rejects the plan.
     Invalid {
-        /// Why.
+        /// The reason.
         violation: ViolationAnswer,
     },
 }

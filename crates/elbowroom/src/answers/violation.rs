@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The first violation in a plan: its time, its action and a description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViolationAnswer {
-    /// When.
+    /// The time.
     #[serde(with = "super::exact")]
     pub time: Rational,
     /// In which action; `None` if it is the goal that does not hold.

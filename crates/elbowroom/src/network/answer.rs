@@ -127,7 +127,7 @@ pub struct LinkDuration {
     pub end: String,
     /// `lower` or `upper`; `within` where it lies between.
     pub at: String,
-    /// How long.
+    /// The duration.
     pub value: Number,
 }
 

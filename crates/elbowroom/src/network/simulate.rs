@@ -20,7 +20,7 @@ const MOST_BROKEN: usize = 3;
 /// Runs to make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Simulation {
-    /// How many.
+    /// The number of runs.
     pub runs: u64,
     /// The same seed gives the same runs.
     pub seed: u64,

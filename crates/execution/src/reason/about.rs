@@ -73,7 +73,7 @@ pub enum About {
     FailedInARow {
         /// What the world says of the last failure; `None`: that it was cancelled.
         why: Option<String>,
-        /// How often.
+        /// The number of failures.
         failures: i32,
         /// With which probability it starts.
         success: f64,

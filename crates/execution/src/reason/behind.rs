@@ -43,7 +43,7 @@ pub enum Behind {
     End(String),
     /// This action has failed.
     Failed {
-        /// Which.
+        /// The action.
         action: String,
         /// What the world says of it; empty if it says nothing.
         why: String,
@@ -52,30 +52,30 @@ pub enum Behind {
     Cancelled(String),
     /// This action has started.
     Started {
-        /// Which.
+        /// The action.
         action: String,
-        /// When.
+        /// The time.
         at: Rational,
     },
     /// This action has ended.
     Ended {
-        /// Which.
+        /// The action.
         action: String,
-        /// How.
+        /// The outcome.
         ending: Ending,
-        /// When.
+        /// The time.
         at: Rational,
     },
     /// A fact was seen.
     Fact {
-        /// Which.
+        /// The fact.
         fact: String,
         /// To be what.
         truth: bool,
     },
     /// A fluent was seen.
     Value {
-        /// Which.
+        /// The fluent.
         fluent: String,
         /// To have which value, if it has one.
         value: Option<Rational>,

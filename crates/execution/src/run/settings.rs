@@ -160,7 +160,7 @@ pub enum Verdict {
     Unsolvable,
     /// There may be a plan, but there is none to go on with.
     NoPlan {
-        /// Why.
+        /// The reason.
         why: String,
     },
     /// The limit on new plans was reached.
@@ -171,7 +171,7 @@ pub enum Verdict {
     Interrupted,
     /// The outside world failed.
     WorldFailed {
-        /// How.
+        /// The reason.
         why: String,
     },
 }
@@ -204,11 +204,11 @@ impl Verdict {
 pub struct Report {
     /// How it ended.
     pub verdict: Verdict,
-    /// When, by the world's clock.
+    /// The time, by the world's clock.
     pub time: Rational,
     /// The number of new plans made, or asked for.
     pub replans: usize,
-    /// Why.
+    /// The reason.
     pub reasons: Vec<Reason>,
     /// Where no plan reaches the goal any more: what can never become true again, and since when,
     /// as far as that is known ([`Run::explaining`](super::Run::explaining)).

@@ -8,7 +8,7 @@ use crate::problem::Comparison;
 /// The first thing that is wrong with a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
-    /// When.
+    /// The time.
     pub time: Rational,
     /// The action to blame; `None` for the goal.
     pub action: Option<ActionInstance>,
@@ -162,7 +162,7 @@ pub enum Reason {
 /// Something that happens.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence {
-    /// When.
+    /// The time.
     pub time: Rational,
     /// What of the action it is.
     pub point: Point,
@@ -212,14 +212,14 @@ pub enum Difficulty {
     Quotient {
         /// The divisor.
         divisor: String,
-        /// Where.
+        /// The expression that it occurs in.
         within: String,
     },
     /// `?duration` or `total-time` stands where it means nothing.
     Misplaced {
         /// Which of the two.
         expression: String,
-        /// Where.
+        /// The expression that it occurs in.
         within: String,
     },
     /// A continuous effect depends on an over-all condition, whose truth lies in the future.

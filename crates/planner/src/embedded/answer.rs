@@ -115,7 +115,7 @@ pub enum Answer {
     },
     /// No plan exists.
     Unsolvable {
-        /// Why.
+        /// The reason.
         proof: Proof,
         /// Statistics.
         counts: Counts,

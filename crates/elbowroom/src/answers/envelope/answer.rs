@@ -115,7 +115,7 @@ pub enum EnvelopeFinding {
 pub enum Failing {
     /// The judge rejects it as it stands.
     Invalid {
-        /// Why.
+        /// The reason.
         violation: ViolationAnswer,
     },
     /// It has no schedule, or one that breaks it.

@@ -20,9 +20,9 @@ use crate::flow;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{planner}: {outcome}")]
 pub struct PlannerFailure {
-    /// Which.
+    /// The planner.
     pub planner: String,
-    /// How.
+    /// Its outcome.
     pub outcome: Outcome,
 }
 
