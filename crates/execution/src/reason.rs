@@ -186,7 +186,13 @@ impl fmt::Display for Reason {
             write!(f, ", allowed {}", short(allowed))?;
         }
         if let Some(by) = &self.by {
-            write!(f, ", missed by {}", by.to_decimal(3))?;
+            let digits = by.to_decimal(3);
+            let by = if digits == "0" && by.is_positive() {
+                "less than 0.001"
+            } else {
+                &digits
+            };
+            write!(f, ", missed by {by}")?;
         }
         if let Some(since) = &self.since {
             write!(f, ", since {}", since.to_decimal(3))?;
@@ -257,4 +263,36 @@ fn short(interval: &Interval) -> String {
         end(interval.lower.value(), "-inf"),
         end(interval.upper.value(), "inf")
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_num::{Interval, Rational};
+
+    use super::{About, Cause, Reason};
+
+    fn missed(about: About, by: Rational) -> String {
+        let reason = Reason {
+            observed: Some(Rational::ZERO),
+            allowed: Some(Interval::closed(Rational::ZERO, Rational::ONE)),
+            by: Some(by),
+            ..Reason::new(Cause::OutsideInterval).of("(mill b m1)").about(about)
+        };
+        reason.to_string()
+    }
+
+    #[test]
+    fn what_was_left_of_a_duration_is_a_quantity_in_a_sentence() {
+        assert_eq!(
+            missed(About::RestOfDuration, Rational::ONE),
+            "the remaining duration of (mill b m1) is not in its interval; observed 0, allowed \
+             [0, 1], missed by 1"
+        );
+    }
+
+    #[test]
+    fn what_is_missed_by_little_is_not_missed_by_nothing() {
+        let said = missed(About::Duration, Rational::new(1, 10_000));
+        assert!(said.ends_with("missed by less than 0.001"), "{said}");
+    }
 }
