@@ -132,5 +132,8 @@ fn values_and_schedules_in_the_boxes_of_our_cases_pass_the_judge() {
         }
     }
     assert!(attacked >= 7, "only {attacked} boxes were attacked");
-    assert!(broken >= 5, "only {broken} boxes that are too large were refuted");
+    assert!(
+        broken >= 5,
+        "only {broken} boxes that are too large were refuted"
+    );
 }

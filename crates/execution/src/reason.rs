@@ -276,7 +276,9 @@ mod tests {
             observed: Some(Rational::ZERO),
             allowed: Some(Interval::closed(Rational::ZERO, Rational::ONE)),
             by: Some(by),
-            ..Reason::new(Cause::OutsideInterval).of("(mill b m1)").about(about)
+            ..Reason::new(Cause::OutsideInterval)
+                .of("(mill b m1)")
+                .about(about)
         };
         reason.to_string()
     }

@@ -124,7 +124,11 @@ fn each_action_of_our_own_plans_is_reached() {
         let Answer::Complete(grounding) = ground(&task, &Settings::default()) else {
             panic!("{} passes a limit", folder.display());
         };
-        assert!(grounding.unreachable_goals.is_empty(), "{}", folder.display());
+        assert!(
+            grounding.unreachable_goals.is_empty(),
+            "{}",
+            folder.display()
+        );
         if !folder.join("plan.plan").exists() {
             continue;
         }
