@@ -83,6 +83,14 @@ impl AnyExperiment {
         }
     }
 
+    /// Begins the dice elsewhere. Results with another seed are those of another experiment.
+    pub fn set_seed(&mut self, seed: u64) {
+        match self {
+            Self::Timed(experiment) => experiment.seed = seed,
+            Self::Untimed(experiment) => experiment.seed = seed,
+        }
+    }
+
     /// How many trials a part of it makes, all together.
     fn count(&self, part: Part) -> u64 {
         match self {

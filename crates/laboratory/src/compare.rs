@@ -8,6 +8,7 @@
 
 mod clairvoyant;
 mod experiment;
+mod optimum;
 pub(crate) mod parts;
 mod results;
 mod trials;
@@ -17,6 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
+pub use optimum::ColumnOptimum;
 pub use results::{Cell, Pair, Results, ResultsError};
 
 use parts::Partial;
@@ -101,6 +103,10 @@ pub fn run(
             Err(_) if whole.is_interrupted => {}
             Err(error) => return Err(error),
         }
+    }
+    if experiment.optimum && !whole.is_interrupted {
+        whole.optimum = pool.install(|| optimum::of(experiment, &fillings, &goes_on))?;
+        whole.is_interrupted = !goes_on();
     }
     Ok(whole)
 }

@@ -32,6 +32,7 @@
 //! # Ok::<(), elbowroom_text::Diagnostics>(())
 //! ```
 
+mod below;
 pub mod draw;
 mod model;
 mod paced;
@@ -39,6 +40,7 @@ mod pattern;
 mod sim;
 mod unreliable;
 
+pub use below::Side;
 pub use draw::{Distribution, Purpose};
 pub use model::{Amount, Exogenous, ExogenousChange, Failing, Failure, Reports, Rule, WorldModel};
 pub use paced::{Begun, Durations, Pace, Paced};

@@ -63,6 +63,9 @@ pub struct Failing {
     pub probability: f64,
     /// The time.
     pub when: Failure,
+    /// Whether a failure after the start undoes what the start did: the facts that it made false
+    /// become true again, and those that it made true, false. If not, they stay as the start left them.
+    pub is_undone: bool,
 }
 
 /// The moment at which an action fails.
@@ -150,6 +153,16 @@ impl WorldModel {
         };
         // An action that is planned to take time takes some.
         duration.max(planned.min(&self.resolution).clone())
+    }
+
+    /// What is known of how long an action takes; `None`: as long as planned.
+    pub fn duration_rule(&self, action: &str) -> Option<&Rule> {
+        last(&self.durations, action)
+    }
+
+    /// What is known of how long after its command an action starts; `None`: it does at once.
+    pub fn delay_rule(&self, action: &str) -> Option<&Rule> {
+        last(&self.delays, action)
     }
 
     /// How long after its command an action starts.

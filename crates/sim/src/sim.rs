@@ -143,7 +143,7 @@ impl<'a> SimWorld<'a> {
             match entry.remove() {
                 Coming::Start(ticket) => self.start(ticket),
                 Coming::End(ticket) => self.end(ticket),
-                Coming::Fail(ticket) => self.fail(ticket, "it broke down"),
+                Coming::Fail(ticket) => self.break_down(ticket),
                 Coming::Exogenous(index) => self.change(index),
             }
         }
@@ -258,6 +258,38 @@ impl<'a> SimWorld<'a> {
             ending: Ending::Succeeded,
             measured,
         });
+    }
+
+    /// An action fails by itself, and what its start did may be undone.
+    fn break_down(&mut self, ticket: Ticket) {
+        let action = self.actions.get(&ticket).map(|own| Arc::clone(&own.action));
+        self.fail(ticket, "it broke down");
+        let Some(action) = action else {
+            return;
+        };
+        let failing = self.model.failing(&action.name);
+        if !failing.is_some_and(|failing| failing.is_undone) {
+            return;
+        }
+        let start = action
+            .durative()
+            .map_or(&[][..], |body| &body.start.effects);
+        let changes = start.iter().filter(|effect| effect.guard.is_trivial());
+        let changes = changes.map(|effect| &effect.change);
+        let is_added = |fact| {
+            let mut effects = start.iter();
+            effects.any(|effect| effect.change == Change::Add(fact))
+        };
+        for change in changes {
+            let (fact, truth) = match change {
+                Change::Add(fact) => (*fact, false),
+                // Where a start both deletes and adds, it makes true.
+                Change::Delete(fact) if !is_added(*fact) => (*fact, true),
+                Change::Delete(_) | Change::Update { .. } => continue,
+            };
+            self.truth.change_fact(fact, truth);
+            self.tell(Event::Fact { fact, truth });
+        }
     }
 
     fn fail(&mut self, ticket: Ticket, why: &str) {

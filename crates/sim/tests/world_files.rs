@@ -98,6 +98,11 @@ fn every_mistake_has_its_line_and_says_what_to_do() {
             "midway",
         ),
         (
+            "[[failure]]\naction = \"go\"\nprobability = 1\nwhen = \"start\"\nundone = true\n",
+            7,
+            "nothing to undo",
+        ),
+        (
             "[[event]]\nfact = \"(at _)\"\nbecomes = true\nconstant = 1\n",
             4,
             "one fact",

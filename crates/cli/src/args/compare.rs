@@ -14,6 +14,9 @@ pub(crate) struct CompareArgs {
     /// Number of trials of each problem; by default that of the experiment
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     pub(crate) trials: Option<u64>,
+    /// Where the dice begin; by default the seed of the experiment
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
     /// Number of threads; 0 for one per processor
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = count, allow_negative_numbers = true)]
     pub(crate) jobs: usize,

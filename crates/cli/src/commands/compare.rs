@@ -38,7 +38,10 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     if let Some(folder) = &arguments.output {
         make_folder(folder)?;
     }
-    let experiment = AnyExperiment::read(&text, &file)?;
+    let mut experiment = AnyExperiment::read(&text, &file)?;
+    if let Some(seed) = arguments.seed {
+        experiment.set_seed(seed);
+    }
     let answer = if arguments.merge.is_empty() {
         make(arguments, &experiment)?
     } else {

@@ -34,7 +34,7 @@ const SEED: u64 = 0x6f64_6473_0000_0000;
 /// Chooses among several plans the one that is likeliest to succeed.
 ///
 /// The plans: the one that the planner makes for the problem as it is, and those that it makes for
-/// problems in which every action takes long. How likely: the share of sampled worlds in which
+/// problems in which every action takes long, and never less than planned. How likely: the share of sampled worlds in which
 /// durations drawn from the world's distributions leave the plan's network consistent and no action
 /// fails. That is the probability that the plan can be scheduled by one who knows the durations;
 /// when one learns them on the way, it is less at times. Amounts are taken as the domain has them.
@@ -166,7 +166,9 @@ impl<'a> Likeliest<'a> {
         for schema in (0..problem.schemas.len()).map(SchemaId::from) {
             let values = RefCell::new(&mut *self);
             set_durations(task, schema, &mut problem, &|name, planned| {
-                values.borrow_mut().quantile(name, planned, quantile)
+                // A plan in which something is over too soon is none of the task.
+                let slow = values.borrow_mut().quantile(name, planned, quantile);
+                slow.max(planned.clone())
             });
         }
         let slow = Task::new(problem).with_epsilon(task.epsilon().clone());

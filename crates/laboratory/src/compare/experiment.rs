@@ -33,6 +33,8 @@ pub struct Experiment {
     pub executors: Vec<ExecutorSpec>,
     /// Whether to add a row for plans that are made knowing what will happen.
     pub clairvoyant: bool,
+    /// Whether to add a row for what the best of all executors could reach without foresight.
+    pub optimum: bool,
     /// How many trials of each problem in each column.
     pub trials: u64,
     /// Where the dice begin.
@@ -136,6 +138,7 @@ impl Experiment {
             columns,
             executors,
             clairvoyant,
+            optimum,
             seed,
             settings,
             precision,
@@ -168,7 +171,7 @@ impl Experiment {
                 json!([name, seconds.as_ref().map(ToString::to_string)])
             }
         };
-        json!([
+        let identity = json!([
             domain,
             problem,
             blanks.iter().collect::<Vec<_>>(),
@@ -186,7 +189,13 @@ impl Experiment {
             planner,
             planner_states,
             improve_states,
-        ])
+        ]);
+        // Nothing else depends on it, so results without it stay what they are.
+        if *optimum {
+            json!([identity, "optimum"])
+        } else {
+            identity
+        }
     }
 
     /// Reads an experiment. `file` gives the text of a file that it names.
@@ -281,6 +290,7 @@ impl Experiment {
             columns,
             executors,
             clairvoyant: read.clairvoyant,
+            optimum: read.optimum,
             trials: read.trials.into_inner(),
             seed: read.seed,
             settings,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
+use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
 use super::{Experiment, Part};
 
@@ -40,6 +41,9 @@ pub struct Results {
     pub cells: Vec<Vec<Cell>>,
     /// The rows compared in pairs with the first one, by row and column.
     pub pairs: Vec<Vec<Pair>>,
+    /// By column, if the experiment asks for it: what the best of all executors could reach.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub optimum: Vec<ColumnOptimum>,
 }
 
 /// The results of one executor in one column.
@@ -95,6 +99,7 @@ impl Results {
             is_interrupted: false,
             cells: vec![vec![Cell::default(); columns.len()]; rows.len()],
             pairs: vec![vec![Pair::default(); columns.len()]; rows.len()],
+            optimum: Vec::new(),
             rows,
             columns,
         }
@@ -115,7 +120,8 @@ impl Results {
         let (height, width) = (results.rows.len(), results.columns.len());
         let cells: Vec<usize> = results.cells.iter().map(Vec::len).collect();
         let pairs: Vec<usize> = results.pairs.iter().map(Vec::len).collect();
-        if cells != vec![width; height] || pairs != cells {
+        let is_for_all = results.optimum.is_empty() || results.optimum.len() == width;
+        if cells != vec![width; height] || pairs != cells || !is_for_all {
             return Err(ResultsError("rows and columns do not fit".to_owned()));
         }
         if !parts::are_possible(results.shards, &results.parts) {
@@ -158,6 +164,15 @@ impl Results {
                 headings.push("published".to_owned());
             }
         }
+        let has_published = !experiment.published.is_empty();
+        let best = (!self.optimum.is_empty()).then(|| {
+            let mut cells = vec![optimum::ROW.to_owned()];
+            for column in &self.optimum {
+                cells.extend([column.words(), "-".to_owned()]);
+                cells.extend(has_published.then(|| "-".to_owned()));
+            }
+            cells
+        });
         let rows = self.rows.iter().enumerate().map(|(index, row)| {
             let mut cells = vec![row.clone()];
             for (column, cell) in self.cells[index].iter().enumerate() {
@@ -182,10 +197,10 @@ impl Results {
         }
         Table {
             caption: format!("{} ({made})", self.title),
-            rows: rows.collect(),
+            rows: rows.chain(best).collect(),
             headings,
             keys: 1,
-            notes: notes(&self.rows),
+            notes: self.notes(),
         }
     }
 
@@ -232,6 +247,22 @@ impl Results {
     }
 }
 
+impl Results {
+    fn notes(&self) -> Vec<String> {
+        let mut notes = notes(&self.rows);
+        if !self.optimum.is_empty() {
+            notes.push(format!("`{}`: {}", optimum::ROW, optimum::SUMMARY));
+        }
+        for (name, column) in self.columns.iter().zip(&self.optimum) {
+            let reason = column.unknown.as_ref();
+            notes.extend(
+                reason.map(|why| format!("`{}` in {name} is not known: {why}", optimum::ROW)),
+            );
+        }
+        notes
+    }
+}
+
 /// What each row's executor does, as it is registered; each executor once.
 fn notes(rows: &[String]) -> Vec<String> {
     let mut notes: Vec<String> = Vec::new();
@@ -263,6 +294,10 @@ impl Partial for Results {
 
     fn add(&mut self, other: &Self) {
         self.is_interrupted |= other.is_interrupted;
+        // Every part has all of it.
+        if self.optimum.is_empty() {
+            self.optimum.clone_from(&other.optimum);
+        }
         for (mine, theirs) in self
             .cells
             .iter_mut()

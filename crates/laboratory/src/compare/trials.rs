@@ -88,10 +88,7 @@ impl Setting<'_> {
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Common<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
-        let task = match elbowroom_pddl::read_problem(&domain, &problem) {
-            Ok((problem, _)) => Task::new(problem),
-            Err(diagnostics) => return Err(ExperimentError::Text(diagnostics)),
-        };
+        let task = self.task(&domain, &problem)?;
         let situation = Situation::initial(&task);
         let mut planner = self.planner(domain, problem, goes_on)?;
         let first = match planner.plan(&task, &situation).answer {
@@ -118,8 +115,7 @@ impl Setting<'_> {
         task: &Arc<Task>,
         first: &TimeTriggeredPlan,
     ) -> Result<Place, ExperimentError> {
-        let world = Source::new(format!("world of {}", column.name), column.world.as_str());
-        let world = WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)?;
+        let world = world(column, task)?;
         let likelihoods = match &column.likelihoods {
             None => Likelihoods::certain(),
             Some(text) => {
@@ -254,6 +250,20 @@ impl Setting<'_> {
         flow
     }
 
+    fn task(&self, domain: &Source, problem: &Source) -> Result<Task, ExperimentError> {
+        let read = elbowroom_pddl::read_problem(domain, problem);
+        let (problem, _) = read.map_err(ExperimentError::Text)?;
+        Ok(Task::new(problem))
+    }
+
+    /// The problem, and the world of a column for it.
+    pub(super) fn scene(&self, column: &Column) -> Result<(Task, WorldModel), ExperimentError> {
+        let (domain, problem) = self.texts()?;
+        let task = self.task(&domain, &problem)?;
+        let world = world(column, &task)?;
+        Ok((task, world))
+    }
+
     /// The domain, and the problem with its blanks filled in.
     fn texts(&self) -> Result<(Source, Source), ExperimentError> {
         let mut text = self.experiment.problem.clone();
@@ -281,6 +291,11 @@ impl Setting<'_> {
             filling.join(", ")
         ))
     }
+}
+
+fn world(column: &Column, task: &Task) -> Result<WorldModel, ExperimentError> {
+    let world = Source::new(format!("world of {}", column.name), column.world.as_str());
+    WorldModel::read(&world, task.problem()).map_err(ExperimentError::Text)
 }
 
 /// Another program.

@@ -261,7 +261,7 @@ impl Reader<'_> {
 
     fn failing(&self, section: &Spanned<Section>) -> Read<Failing> {
         let given = section.get_ref();
-        let own = ["action", "probability", "when"];
+        let own = ["action", "probability", "when", "undone"];
         if let Some((span, message)) = given.excess("[[failure]]", &own, false) {
             return Err(self.wrong(&span, message));
         }
@@ -277,10 +277,16 @@ impl Reader<'_> {
                 _ => return Err(self.wrong(&when.span(), "write \"start\", \"midway\" or \"end\"")),
             },
         };
+        if let (Failure::AtStart, Some(undone)) = (when, &given.undone) {
+            let message =
+                "an action that does not start leaves nothing to undo; leave `undone` out";
+            return Err(self.wrong(&undone.span(), message));
+        }
         Ok(Failing {
             action: self.action(section)?,
             probability: self.probability(probability)?,
             when,
+            is_undone: given.undone.as_ref().is_some_and(|it| *it.get_ref()),
         })
     }
 

@@ -24,6 +24,8 @@ pub(super) struct File {
     pub(super) executors: Spanned<Vec<Spanned<String>>>,
     #[serde(default)]
     pub(super) clairvoyant: bool,
+    #[serde(default)]
+    pub(super) optimum: bool,
     pub(super) running: Option<Spanned<String>>,
     pub(super) planning_time: Option<Spanned<toml::Value>>,
     pub(super) max_replans: Option<usize>,

@@ -1,0 +1,216 @@
+//! The yardstick on a clock: how likely the best of all executors is to reach the goal in a world of
+//! which everything is known but what will happen.
+//!
+//! The world is a semi-Markov decision process. Its state is the truth of all facts, the actions
+//! under way with the time since each began, what has happened by itself, and the clock. The agent
+//! sees the state, and may at any moment start an action whose condition holds, cancel one that is
+//! under way, or wait. What it does not see is the future: how long an action will take, whether it
+//! fails, when something happens by itself, are drawn from the world file's distributions, given
+//! what has been seen so far. It succeeds as soon as the goal holds. Any action of the problem is
+//! available at any time, and deciding takes no time, so no executor, however it plans, does better.
+//!
+//! What the process leaves out: interfering happenings may be as close as one likes (ε is nothing),
+//! and happenings that coincide take place one after the other. A start that fails costs no time and
+//! can be tried again at once.
+//!
+//! **Bounds.** The best value is bounded from both sides on a grid of time: cells of one length.
+//!
+//! - *Above*, [`Side::Above`]: the agent is told at the beginning of a cell what will end or happen
+//!   in it, and chooses the order within the cell. What began in cell c and takes n whole cells and
+//!   something ends in cell c + n or in the next one; the agent chooses that, too. An agent in the real
+//!   world that knows less can be imitated step by step, with the remainders drawn at random, so
+//!   this is at least as good as the best.
+//! - *Below*, [`Side::Below`]: the agent decides only at the boundaries of cells, and what happens
+//!   between them happens in the order that is worst for it. That is a way to act in the real
+//!   world, so the best is at least as good.
+//!
+//! Neither takes for granted that being earlier never hurts. Where it does not (no condition asks
+//! for something to be false), fewer cases are looked at.
+//!
+//! The cells are halved until the bounds are close enough, or there are too many states.
+//! Probabilities are floating-point numbers; the bounds are widened by 1e-9, far more than rounding
+//! adds up to.
+
+mod above;
+mod below;
+mod chances;
+mod compile;
+mod graph;
+mod world;
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_sim::WorldModel;
+use serde::{Deserialize, Serialize};
+
+use chances::Chances;
+use world::TimedWorld;
+
+/// How far to go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The bounds are close enough when they are so far apart.
+    pub gap: f64,
+    /// No grid is finished on which there are more states than this, all cells together.
+    pub most_states: usize,
+    /// How many cells the first grid has.
+    pub first_cells: usize,
+    /// When a run ends at the latest; `None`: when nothing more happens by itself.
+    pub horizon: Option<Rational>,
+    /// The only actions that are available, `(name object …)`; `None`: all that there are.
+    pub only: Option<Vec<String>>,
+}
+
+impl Default for Settings {
+    /// A percentage point, and some seconds.
+    fn default() -> Self {
+        Self {
+            gap: 0.01,
+            most_states: 2_000_000,
+            first_cells: 32,
+            horizon: None,
+            only: None,
+        }
+    }
+}
+
+/// Why no finer grid was tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stop {
+    /// The bounds are close enough.
+    Close,
+    /// The next grid has too many states.
+    TooManyStates,
+    /// Whoever asked wants no more.
+    Interrupted,
+}
+
+/// What the best of all executors can reach.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimedOptimum {
+    /// It succeeds at least with this probability.
+    pub lower: f64,
+    /// And at most with this one.
+    pub upper: f64,
+    /// Each grid that was finished, coarse ones first.
+    pub grids: Vec<Grid>,
+    /// Why no finer grid was tried.
+    pub stop: Stop,
+}
+
+/// What one grid says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// The length of a cell, in seconds.
+    pub step: f64,
+    /// The bound from below.
+    pub lower: f64,
+    /// The bound from above.
+    pub upper: f64,
+    /// How many states there were at the beginnings of cells, for both bounds.
+    pub states: usize,
+}
+
+/// From where the best value is approached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// A bound from below.
+    Below,
+    /// A bound from above.
+    Above,
+}
+
+/// The world is not one for which there is a timed optimum here.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}; the optimum without foresight is only calculated without that")]
+pub struct NotTabulated {
+    /// What there is.
+    pub what: String,
+}
+
+impl NotTabulated {
+    fn new(what: impl Into<String>) -> Self {
+        Self { what: what.into() }
+    }
+}
+
+/// Bounds for what the best executor without foresight reaches in a world.
+///
+/// `goes_on` is asked now and then; what has been found until it says no is the answer.
+///
+/// # Errors
+/// When there is something in the task or in the world that the process does not know.
+pub fn optimum(
+    task: &Task,
+    model: &WorldModel,
+    settings: &Settings,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<TimedOptimum, NotTabulated> {
+    let world = TimedWorld::new(task, model, settings)?;
+    let mut answer = TimedOptimum {
+        lower: 0.0,
+        upper: 1.0,
+        grids: Vec::new(),
+        stop: Stop::Close,
+    };
+    let mut cells = settings.first_cells.max(1);
+    loop {
+        match grid(&world, cells, settings, goes_on)? {
+            Ok(grid) => {
+                answer.lower = answer.lower.max(grid.lower);
+                answer.upper = answer.upper.min(grid.upper);
+                answer.grids.push(grid);
+            }
+            Err(stop) => {
+                answer.stop = stop;
+                return Ok(answer);
+            }
+        }
+        if answer.upper - answer.lower <= settings.gap {
+            return Ok(answer);
+        }
+        cells *= 2;
+    }
+}
+
+/// Rounding errors stay far below this.
+const SLACK: f64 = 1e-9;
+
+fn grid(
+    world: &TimedWorld,
+    cells: usize,
+    settings: &Settings,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Result<Grid, Stop>, NotTabulated> {
+    if cells >= usize::from(u16::MAX) {
+        return Ok(Err(Stop::TooManyStates));
+    }
+    #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
+    let step = world.horizon / cells as f64;
+    let mut left = settings.most_states;
+    let mut bound = |side| -> Result<Result<f64, Stop>, NotTabulated> {
+        // What happens at the horizon itself begins a cell, seen from above.
+        let cells = cells + usize::from(side == Side::Above);
+        let chances = Chances::new(world, step, cells, side)?;
+        let value = match side {
+            Side::Above => graph::value(&above::Above::new(world, &chances), &mut left, goes_on),
+            Side::Below => graph::value(&below::Below::new(world, &chances), &mut left, goes_on),
+        };
+        Ok(value)
+    };
+    let upper = match bound(Side::Above)? {
+        Ok(value) => (value + SLACK).min(1.0),
+        Err(stop) => return Ok(Err(stop)),
+    };
+    let lower = match bound(Side::Below)? {
+        Ok(value) => (value - SLACK).max(0.0),
+        Err(stop) => return Ok(Err(stop)),
+    };
+    Ok(Ok(Grid {
+        step,
+        lower,
+        upper,
+        states: settings.most_states - left,
+    }))
+}

@@ -1,0 +1,241 @@
+//! The bound from below: the agent decides at the boundaries of cells, and what happens in between
+//! happens in the worst order.
+
+use indexmap::IndexSet;
+
+use super::chances::Chances;
+use super::graph::{Choice, Expansion, Hopes, Nodes, Phase, State, Target};
+use super::world::TimedWorld;
+
+/// What more than so many happenings in one cell lead to is taken to be lost.
+const MOST_ORDERED: usize = 5;
+
+pub(super) struct Below<'a> {
+    world: &'a TimedWorld<'a>,
+    chances: &'a Chances,
+}
+
+/// Something that happens in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Happening {
+    /// An action ends, well or badly.
+    End(u8, bool),
+    /// An event.
+    Event(usize),
+}
+
+/// What is being put together of one cell.
+struct Cell<'c> {
+    bound: &'c Below<'c>,
+    cell: usize,
+    /// The states in which the agent decides, those at the boundary first.
+    moments: IndexSet<State>,
+    next: &'c mut IndexSet<State>,
+    hopes: &'c mut Hopes,
+}
+
+impl<'a> Below<'a> {
+    pub(super) fn new(world: &'a TimedWorld<'a>, chances: &'a Chances) -> Self {
+        Self { world, chances }
+    }
+
+    /// What may happen in a cell, with how likely all of it is.
+    fn happenings(&self, cell: usize, state: &State) -> Vec<(f64, Vec<Happening>)> {
+        let mut all = vec![(1.0, Vec::new())];
+        let mut split = |ways: &[(f64, Option<Happening>)]| {
+            let mut longer = Vec::new();
+            for (weight, happenings) in &all {
+                for (p, way) in ways.iter().filter(|(p, _)| *p > 0.0) {
+                    let mut happenings: Vec<Happening> = happenings.clone();
+                    happenings.extend(*way);
+                    longer.push((weight * p, happenings));
+                }
+            }
+            all = longer;
+        };
+        for running in &state.running {
+            let age = cell - usize::from(running.since);
+            let (well, badly) = self.chances.ends[usize::from(running.act)][age];
+            split(&[
+                (well, Some(Happening::End(running.act, true))),
+                (badly, Some(Happening::End(running.act, false))),
+                (1.0 - well - badly, None),
+            ]);
+        }
+        for (event, hazards) in self.chances.events.iter().enumerate() {
+            if state.happened & (1 << event) == 0 {
+                let p = hazards[cell];
+                split(&[(p, Some(Happening::Event(event))), (1.0 - p, None)]);
+            }
+        }
+        all
+    }
+
+    /// What a state may be after all of these, in whatever order; `None` if that is too much.
+    fn outcomes(&self, state: &State, happenings: &[Happening]) -> Option<Vec<State>> {
+        let world = self.world;
+        if !world.is_monotone {
+            return (happenings.len() <= MOST_ORDERED).then(|| {
+                let mut outcomes = IndexSet::new();
+                self.in_all_orders(state.clone(), happenings, &mut outcomes);
+                outcomes.into_iter().collect()
+            });
+        }
+        // Where more facts are never worse, nothing is worse than harm both before and after all else.
+        let is_harm = |happening: &Happening| matches!(happening, Happening::Event(event) if world.events[*event].is_harmful());
+        let (harm, rest): (Vec<_>, Vec<_>) = happenings.iter().copied().partition(is_harm);
+        if rest.len() > MOST_ORDERED {
+            return None;
+        }
+        let harmed = |state: State| {
+            harm.iter()
+                .fold(state, |state, event| self.after(&state, *event))
+        };
+        let mut outcomes = IndexSet::new();
+        self.in_all_orders(harmed(state.clone()), &rest, &mut outcomes);
+        let outcomes: IndexSet<State> = outcomes.into_iter().map(harmed).collect();
+        Some(outcomes.into_iter().collect())
+    }
+
+    fn in_all_orders(
+        &self,
+        state: State,
+        happenings: &[Happening],
+        outcomes: &mut IndexSet<State>,
+    ) {
+        if happenings.is_empty() {
+            outcomes.insert(state);
+            return;
+        }
+        for place in 0..happenings.len() {
+            let mut others = happenings.to_vec();
+            let first = others.remove(place);
+            self.in_all_orders(self.after(&state, first), &others, outcomes);
+        }
+    }
+
+    /// An action that has failed before its end has no end.
+    fn after(&self, state: &State, happening: Happening) -> State {
+        match happening {
+            Happening::Event(event) => state.changed(self.world, event),
+            Happening::End(act, is_well) => {
+                match state.running.iter().position(|running| running.act == act) {
+                    Some(place) => state.ended(self.world, place, is_well),
+                    None => state.clone(),
+                }
+            }
+        }
+    }
+}
+
+impl Expansion for Below<'_> {
+    fn cells(&self) -> usize {
+        self.chances.cells
+    }
+
+    fn initial(&self) -> Vec<(f64, State)> {
+        let state = State {
+            facts: self.world.initial,
+            happened: 0,
+            running: Vec::new(),
+        };
+        let mut states = vec![(1.0, state)];
+        for (event, p) in self.chances.before.iter().enumerate() {
+            if *p > 0.0 {
+                let happened = states
+                    .iter()
+                    .map(|(weight, state)| (weight * p, state.changed(self.world, event)));
+                let happened: Vec<_> = happened.collect();
+                let not = states
+                    .into_iter()
+                    .map(|(weight, state)| (weight * (1.0 - p), state));
+                states = not
+                    .chain(happened)
+                    .filter(|(weight, _)| *weight > 0.0)
+                    .collect();
+            }
+        }
+        states
+    }
+
+    fn expand(
+        &self,
+        cell: usize,
+        states: &IndexSet<State>,
+        next: &mut IndexSet<State>,
+        hopes: &mut Hopes,
+    ) -> Nodes {
+        let mut here = Cell {
+            bound: self,
+            cell,
+            moments: states.clone(),
+            next,
+            hopes,
+        };
+        let mut nodes = Nodes::with_capacity(states.len());
+        while let Some(state) = here.moments.get_index(nodes.len()).cloned() {
+            nodes.push(here.choices(&state));
+        }
+        nodes
+    }
+
+    fn last(&self, state: &State) -> f64 {
+        f64::from(u8::from(self.world.goal.hold(state.facts)))
+    }
+}
+
+impl Cell<'_> {
+    fn target(&mut self, state: State) -> Target {
+        let world = self.bound.world;
+        if world.goal.hold(state.facts) {
+            return Target::Won;
+        }
+        if !state.is_hopeful(world, self.hopes) {
+            return Target::Lost;
+        }
+        Target::Here(self.moments.insert_full(state).0)
+    }
+
+    fn choices(&mut self, state: &State) -> Vec<Choice> {
+        let world = self.bound.world;
+        if world.goal.hold(state.facts) {
+            return vec![vec![(1.0, vec![Target::Won])]];
+        }
+        if !state.is_hopeful(world, self.hopes) {
+            return Vec::new();
+        }
+        let startable = state.startable(world);
+        if state.must_start(world, &startable) {
+            let after = state.started(world, startable[0], self.cell, Phase::Goes);
+            return vec![vec![(1.0, vec![self.target(after)])]];
+        }
+        let mut choices = Vec::new();
+        for (place, running) in state.running.iter().enumerate() {
+            if world.acts[usize::from(running.act)].may_be_cancelled {
+                let mut after = state.clone();
+                after.running.remove(place);
+                choices.push(vec![(1.0, vec![self.target(after)])]);
+            }
+        }
+        for act in startable {
+            let after = state.started(world, act, self.cell, Phase::Goes);
+            choices.push(vec![(1.0, vec![self.target(after)])]);
+        }
+        let mut choice = Choice::new();
+        for (p, happenings) in self.bound.happenings(self.cell, state) {
+            let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
+            let targets = outcomes.into_iter().map(|outcome| {
+                if world.goal.hold(outcome.facts) {
+                    Target::Won
+                } else if outcome.is_hopeful(world, self.hopes) {
+                    Target::Next(self.next.insert_full(outcome).0)
+                } else {
+                    Target::Lost
+                }
+            });
+            choice.push((p, targets.collect()));
+        }
+        choices.push(choice);
+        choices
+    }
+}

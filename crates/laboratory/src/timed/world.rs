@@ -1,0 +1,376 @@
+//! The world of the timed optimum: facts are bits, actions and events are numbered.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_sim::{Distribution, Rule, Side, WorldModel};
+
+use super::compile::{Compiler, actions, relevant};
+use super::{NotTabulated, Settings};
+
+/// Which facts are true.
+pub(super) type Facts = u128;
+
+/// A condition on facts.
+#[derive(Clone, Debug)]
+pub(super) enum Needs {
+    All(Vec<Needs>),
+    Any(Vec<Needs>),
+    Not(Box<Needs>),
+    Fact(Facts),
+}
+
+/// A start or an end.
+#[derive(Clone, Debug)]
+pub(super) struct Snap {
+    pub(super) needs: Needs,
+    pub(super) adds: Facts,
+    pub(super) deletes: Facts,
+}
+
+/// An action.
+#[derive(Clone, Debug)]
+pub(super) struct Act {
+    pub(super) name: String,
+    pub(super) start: Snap,
+    /// What is needed over all, and its end; `None` for instantaneous actions.
+    pub(super) rest: Option<(Needs, Snap)>,
+    pub(super) planned: Rational,
+    /// P(it fails midway), given that it starts.
+    pub(super) midway: f64,
+    /// P(it fails at its end), given that it starts.
+    pub(super) at_end: f64,
+    /// Whether what its start did is undone when it fails.
+    pub(super) is_undone: bool,
+    /// Whether it may do any good to cancel it.
+    pub(super) may_be_cancelled: bool,
+    /// Whether nothing is ever better than to start it as soon as one can.
+    pub(super) is_eager: bool,
+}
+
+/// Something that happens by itself, at most once.
+#[derive(Clone, Debug)]
+pub(super) struct Event {
+    pub(super) adds: Facts,
+    pub(super) deletes: Facts,
+    pub(super) probability: f64,
+    pub(super) time: Rule,
+}
+
+/// See [`timed`](super).
+#[derive(Debug)]
+pub(super) struct TimedWorld<'w> {
+    pub(super) model: &'w WorldModel,
+    pub(super) acts: Vec<Act>,
+    pub(super) events: Vec<Event>,
+    pub(super) initial: Facts,
+    pub(super) goal: Needs,
+    /// Whether more facts are never worse: no condition asks for something to be false.
+    pub(super) is_monotone: bool,
+    /// The facts that something may make false.
+    deletable: Facts,
+    /// In seconds.
+    pub(super) horizon: f64,
+}
+
+/// The most actions and events: they are bits of numbers.
+const MOST_ACTS: usize = 64;
+const MOST_EVENTS: usize = 32;
+
+impl<'w> TimedWorld<'w> {
+    pub(super) fn new(
+        task: &Task,
+        model: &'w WorldModel,
+        settings: &Settings,
+    ) -> Result<Self, NotTabulated> {
+        if !model.reports.is_perfect() {
+            return Err(NotTabulated::new("the world's reports are not perfect"));
+        }
+        if model.exogenous.iter().any(|event| !event.is_reported) {
+            return Err(NotTabulated::new(
+                "the world has events that it does not report",
+            ));
+        }
+        let actions = actions(task, model, settings)?;
+        let goal = task.goal().clone();
+        let compiler = Compiler {
+            task,
+            facts: relevant(&actions, &goal),
+        };
+        if compiler.facts.len() > 128 {
+            return Err(NotTabulated::new(format!(
+                "{} facts matter, and 128 is the most",
+                compiler.facts.len()
+            )));
+        }
+        let events = compiler.events(model)?;
+        if events.len() > MOST_EVENTS {
+            return Err(NotTabulated::new(format!(
+                "{} events matter, and {MOST_EVENTS} is the most",
+                events.len()
+            )));
+        }
+        let mut acts = Vec::new();
+        for action in &actions {
+            acts.extend(compiler.act(action, model)?);
+        }
+        if acts.len() > MOST_ACTS {
+            return Err(NotTabulated::new(format!(
+                "{} actions matter, and {MOST_ACTS} is the most",
+                acts.len()
+            )));
+        }
+        let goal = compiler.needs(&goal)?;
+        let initial = task.initial().facts.iter();
+        let initial = initial.fold(0, |facts, fact| facts | compiler.bit(*fact));
+        let mut world = Self {
+            horizon: horizon(&events, model, settings)?,
+            is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
+            deletable: acts.iter().fold(0, |all, act| all | act.deletes())
+                | events.iter().fold(0, |all, event| all | event.deletes),
+            model,
+            acts,
+            events,
+            initial,
+            goal,
+        };
+        if world.is_monotone {
+            for act in &mut world.acts {
+                act.may_be_cancelled = act.may_gain_by_cancelling(model);
+                // It takes nothing away, and what it gives stays. Whoever starts it later could as
+                // well have it over earlier.
+                act.is_eager =
+                    act.ends_safely() && act.deletes() == 0 && act.adds() & world.deletable == 0;
+            }
+        }
+        Ok(world)
+    }
+
+    /// Whether the goal can be reached if deletions do nothing, from these facts, with what may
+    /// still come about by itself and by what is under way.
+    pub(super) fn is_hopeful(&self, facts: Facts, under_way: u64, happened: u32) -> bool {
+        let mut facts = facts;
+        for (index, event) in self.events.iter().enumerate() {
+            if happened & (1 << index) == 0 {
+                facts |= event.adds;
+            }
+        }
+        for (index, act) in self.acts.iter().enumerate() {
+            if under_way & (1 << index) != 0 && act.is_undone {
+                facts |= act.start.deletes;
+            }
+        }
+        loop {
+            if self.goal.is_possible(facts) {
+                return true;
+            }
+            let before = facts;
+            for (index, act) in self.acts.iter().enumerate() {
+                let can_start = act.start.needs.is_possible(facts);
+                if can_start {
+                    facts |= act.start.adds;
+                }
+                if let Some((over_all, end)) = &act.rest
+                    && (can_start || under_way & (1 << index) != 0)
+                    && over_all.is_possible(facts)
+                    && end.needs.is_possible(facts)
+                {
+                    facts |= end.adds;
+                }
+            }
+            if facts == before {
+                return false;
+            }
+        }
+    }
+}
+
+impl TimedWorld<'_> {
+    /// Whether it may do any good to do this: not if more facts are never worse, and all that it
+    /// makes true is true and stays so.
+    pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {
+        let adds = self.acts[act].adds();
+        !self.is_monotone || adds & !facts != 0 || adds & self.deletable != 0
+    }
+}
+
+impl Needs {
+    pub(super) fn hold(&self, facts: Facts) -> bool {
+        match self {
+            Self::All(parts) => parts.iter().all(|part| part.hold(facts)),
+            Self::Any(parts) => parts.iter().any(|part| part.hold(facts)),
+            Self::Not(part) => !part.hold(facts),
+            Self::Fact(fact) => facts & fact != 0,
+        }
+    }
+
+    /// Whether they may hold if more facts may be false than these.
+    fn is_possible(&self, facts: Facts) -> bool {
+        match self {
+            Self::All(parts) => parts.iter().all(|part| part.is_possible(facts)),
+            Self::Any(parts) => parts.iter().any(|part| part.is_possible(facts)),
+            Self::Not(part) => part.may_fail(facts),
+            Self::Fact(fact) => facts & fact != 0,
+        }
+    }
+
+    /// Whether they may be false if more facts may be false than these; any fact may be false.
+    fn may_fail(&self, facts: Facts) -> bool {
+        match self {
+            Self::All(parts) => parts.iter().any(|part| part.may_fail(facts)),
+            Self::Any(parts) => parts.iter().all(|part| part.may_fail(facts)),
+            Self::Not(part) => part.is_possible(facts),
+            Self::Fact(_) => true,
+        }
+    }
+
+    /// The facts that must all be true, if that is all there is to it.
+    fn conjunction(&self) -> Option<Facts> {
+        match self {
+            Self::All(parts) => parts
+                .iter()
+                .try_fold(0, |all, part| Some(all | part.conjunction()?)),
+            Self::Fact(fact) => Some(*fact),
+            Self::Any(_) | Self::Not(_) => None,
+        }
+    }
+
+    fn has_negation(&self) -> bool {
+        match self {
+            Self::All(parts) | Self::Any(parts) => parts.iter().any(Self::has_negation),
+            Self::Not(_) => true,
+            Self::Fact(_) => false,
+        }
+    }
+}
+
+impl Snap {
+    /// Additions win over deletions of the same happening.
+    pub(super) fn apply(&self, facts: Facts) -> Facts {
+        (facts & !self.deletes) | self.adds
+    }
+}
+
+impl Snap {
+    /// What it made false becomes true again; starts that make something true are not undone here.
+    pub(super) fn undo(&self, facts: Facts) -> Facts {
+        facts | self.deletes
+    }
+}
+
+impl Event {
+    pub(super) fn apply(&self, facts: Facts) -> Facts {
+        (facts & !self.deletes) | self.adds
+    }
+
+    /// Whether it only makes facts false.
+    pub(super) fn is_harmful(&self) -> bool {
+        self.adds == 0
+    }
+}
+
+impl Act {
+    fn has_negation(&self) -> bool {
+        let rest = self.rest.as_ref();
+        self.start.needs.has_negation()
+            || rest
+                .is_some_and(|(over_all, end)| over_all.has_negation() || end.needs.has_negation())
+    }
+
+    /// All that it may make true.
+    fn adds(&self) -> Facts {
+        let undone = if self.is_undone {
+            self.start.deletes
+        } else {
+            0
+        };
+        self.start.adds | undone | self.rest.as_ref().map_or(0, |(_, end)| end.adds)
+    }
+
+    /// All that it may make false.
+    fn deletes(&self) -> Facts {
+        self.start.deletes | self.rest.as_ref().map_or(0, |(_, end)| end.deletes)
+    }
+
+    /// Whether its end deletes nothing that matters.
+    pub(super) fn ends_kindly(&self) -> bool {
+        self.rest
+            .as_ref()
+            .is_some_and(|(_, end)| end.deletes & !end.adds == 0)
+    }
+
+    /// Whether its end needs nothing but what it needs all the time anyway, so that no moment is better
+    /// for it to end than another.
+    fn ends_safely(&self) -> bool {
+        self.rest.as_ref().is_some_and(|(over_all, end)| {
+            let always = over_all.conjunction().unwrap_or(0);
+            end.needs
+                .conjunction()
+                .is_some_and(|needs| needs & !always == 0)
+        })
+    }
+
+    /// Whether there can be something in cancelling it where more facts are never worse: its end may
+    /// do harm, or who begins anew may be done earlier than who goes on.
+    fn may_gain_by_cancelling(&self, model: &WorldModel) -> bool {
+        !self.ends_kindly()
+            || !self.ends_safely()
+            || model
+                .duration_rule(&self.name)
+                .is_some_and(|rule| !is_fixed(rule))
+    }
+}
+
+fn is_fixed(rule: &Rule) -> bool {
+    matches!(rule.distribution, Distribution::Constant(_))
+}
+
+/// When nothing more happens by itself.
+fn horizon(events: &[Event], model: &WorldModel, settings: &Settings) -> Result<f64, NotTabulated> {
+    if let Some(horizon) = &settings.horizon {
+        return Ok(horizon.to_f64());
+    }
+    let mut latest: f64 = 0.0;
+    for event in events {
+        let beyond = |time: f64| {
+            let share = event.time.share(
+                time,
+                Side::UpTo,
+                0.0,
+                model.resolution.to_f64(),
+            );
+            share.map(|share| 1.0 - share)
+        };
+        let mut time: f64 = 1.0;
+        while beyond(time).ok_or_else(unknown_shape)? > 1e-12 {
+            time *= 2.0;
+            if time > 1e9 {
+                return Err(NotTabulated::new(
+                    "there is an event that may take more than 10^9 seconds to come",
+                ));
+            }
+        }
+        let (mut early, mut late) = (0.0, time);
+        for _ in 0..50 {
+            let middle = f64::midpoint(early, late);
+            if beyond(middle).ok_or_else(unknown_shape)? > 1e-12 {
+                early = middle;
+            } else {
+                late = middle;
+            }
+        }
+        // Up to the resolution, so that boundaries of cells are round numbers.
+        let resolution = model.resolution.to_f64();
+        latest = latest.max((late / resolution - 1e-6).ceil() * resolution);
+    }
+    if latest <= 0.0 {
+        return Err(NotTabulated::new(
+            "nothing happens by itself, so there is nothing to be late for",
+        ));
+    }
+    Ok(latest)
+}
+
+pub(super) fn unknown_shape() -> NotTabulated {
+    NotTabulated::new("there is a gamma distribution")
+}
+

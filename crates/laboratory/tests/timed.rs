@@ -1,0 +1,178 @@
+//! The timed optimum: worlds worked by hand, and a plain recursion over small ones.
+
+#[path = "timed/twin.rs"]
+mod twin;
+
+use elbowroom_laboratory::timed::{Settings, Stop, TimedOptimum, optimum};
+use elbowroom_model::Task;
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_sim::WorldModel;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use twin::SmallWorld;
+
+fn task(domain: &str, problem: &str) -> Task {
+    let source = |text: &str| Source::new("test", text);
+    let (problem, _) = read_problem(&source(domain), &source(problem)).expect("it is PDDL");
+    Task::new(problem)
+}
+
+fn bounds(domain: &str, problem: &str, world: &str, settings: &Settings) -> TimedOptimum {
+    let task = task(domain, problem);
+    let model = WorldModel::read(world, task.problem()).expect("it is a world");
+    optimum(&task, &model, settings, &|| true).expect("it can be tabulated")
+}
+
+fn experiment(name: &str, file: &str) -> String {
+    let path = format!(
+        "{}/../../experiments/{name}/{file}",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    std::fs::read_to_string(path).expect("it is there")
+}
+
+fn of_experiment(name: &str, settings: &Settings) -> TimedOptimum {
+    bounds(
+        &experiment(name, "domain.pddl"),
+        &experiment(name, "problem.pddl"),
+        &experiment(name, "world.toml"),
+        settings,
+    )
+}
+
+#[track_caller]
+fn assert_encloses(found: &TimedOptimum, value: f64) {
+    assert!(
+        found.lower <= value && value <= found.upper,
+        "{value} is outside of {found:?}"
+    );
+}
+
+#[test]
+fn machines_are_best_maintained_all_at_once() {
+    let found = of_experiment(
+        "machines",
+        &Settings {
+            most_states: 200_000,
+            ..Settings::default()
+        },
+    );
+    assert_encloses(&found, 0.9_f64.powi(3));
+    assert_eq!(found.stop, Stop::Close);
+}
+
+#[test]
+fn bounds_enclose_what_a_plain_recursion_finds() {
+    let mut close = 0;
+    for number in 0..200 {
+        let mut rng = ChaCha8Rng::seed_from_u64(number);
+        let world = SmallWorld::random(&mut rng, number % 2 == 0);
+        let best = world.best();
+        for first_cells in [twin::CLOSES / 2, twin::CLOSES] {
+            let settings = Settings {
+                first_cells: first_cells as usize,
+                // One grid and no other.
+                gap: 1.0,
+                ..Settings::default()
+            };
+            let found = bounds(&world.domain(), &world.problem(), &world.world(), &settings);
+            assert!(
+                found.lower <= best + 1e-12 && best <= found.upper + 1e-12,
+                "{number}: {best} is outside of {found:?}\n{world:#?}"
+            );
+            if first_cells == twin::CLOSES && best > 0.0 && found.upper - found.lower < 0.1 {
+                close += 1;
+            }
+        }
+    }
+    assert!(
+        close >= 20,
+        "only {close} worlds with close bounds: too few to mean something"
+    );
+}
+
+#[test]
+fn who_waits_for_the_door_goes_through_it() {
+    // The door opens at 3 for certain, and closes at a time in [5, 9]; going through takes 2. Who
+    // waits at the door is through at 5.
+    let domain = "(define (domain d) (:requirements :durative-actions)
+        (:predicates (open) (through))
+        (:durative-action go :parameters () :duration (= ?duration 2)
+          :condition (over all (open)) :effect (at end (through))))";
+    let problem = "(define (problem p) (:domain d) (:init (at 3 (open))) (:goal (through)))";
+    let world = "format = \"elbowroom-world\"\nversion = 1
+        [[event]]\nfact = \"(open)\"\nbecomes = false\nuniform = { from = 4, to = 8 }";
+    let found = bounds(domain, problem, world, &Settings::default());
+    assert_encloses(&found, 0.75);
+    assert_eq!(found.stop, Stop::Close);
+}
+
+#[test]
+fn light_that_goes_out_early_is_no_gain() {
+    // A match burns 4 or 8, each half of the time, and mending takes 5 in its light: rounding the
+    // match down or the mending up would both be wrong. There is one match, and it must burn down: who
+    // could drop it would have light for ever.
+    let domain = "(define (domain d) (:requirements :durative-actions)
+        (:predicates (unused) (light) (burnt) (mended) (day))
+        (:durative-action burn :parameters () :duration (= ?duration 4)
+          :condition (at start (unused))
+          :effect (and (at start (light)) (at start (not (unused))) (at end (not (light))) (at end (burnt))))
+        (:durative-action mend :parameters () :duration (= ?duration 5)
+          :condition (over all (light)) :effect (at end (mended))))";
+    let problem = "(define (problem p) (:domain d) (:init (unused) (day) (at 9 (not (day))))
+        (:goal (and (mended) (burnt) (day))))";
+    let world = "format = \"elbowroom-world\"\nversion = 1
+        [[duration]]\naction = \"burn\"\nvalues = [4, 8]";
+    assert_encloses(&bounds(domain, problem, world, &Settings::default()), 0.5);
+}
+
+#[test]
+fn what_the_process_does_not_know_is_refused_by_name() {
+    let refused = |domain: &str, world: &str| {
+        let task = task(
+            &format!(
+                "(define (domain d) (:requirements :durative-actions) (:predicates (a) (b)) {domain})"
+            ),
+            "(define (problem p) (:domain d) (:init (a) (at 9 (not (a)))) (:goal (b)))",
+        );
+        let world = format!("format = \"elbowroom-world\"\nversion = 1\n{world}");
+        let model = WorldModel::read(world.as_str(), task.problem()).expect("it is a world");
+        let found = optimum(&task, &model, &Settings::default(), &|| true);
+        found.expect_err("it is refused").what
+    };
+    let go = "(:durative-action go :parameters () :duration (= ?duration 2)
+        :condition () :effect (at end (b)))";
+    let chosen = go.replace("(= ?duration 2)", "(<= ?duration 2)");
+    assert_eq!(
+        refused(&chosen, ""),
+        "(go) has a duration that is to be chosen"
+    );
+    assert_eq!(
+        refused(go, "[[delay]]\naction = \"*\"\nconstant = 1"),
+        "(go) has a delay"
+    );
+    assert_eq!(
+        refused(go, "[reports]\nlost = 0.5"),
+        "the world's reports are not perfect"
+    );
+}
+
+#[test]
+fn being_quick_at_everything_is_no_match_for_taking_care() {
+    let settings = Settings {
+        most_states: 300_000,
+        gap: 0.05,
+        ..Settings::default()
+    };
+    let best = of_experiment("counter", &settings);
+    let quick = [
+        "(drive depot shelf)",
+        "(drive shelf office)",
+        "(grasp-quickly shelf)",
+        "(hand-over-quickly office)",
+    ];
+    let only = Some(quick.map(str::to_owned).into());
+    let shortest = of_experiment("counter", &Settings { only, ..settings });
+    assert!(shortest.upper < best.lower, "{shortest:?} {best:?}");
+}

@@ -1,0 +1,211 @@
+//! How likely what a world draws is to be less than something: the same rules as for drawing it,
+//! as probabilities.
+//!
+//! Floating point to some 1e-15 each; values are rounded to the world's resolution as they are when
+//! they are drawn.
+
+use elbowroom_num::Rational;
+
+use crate::draw::Distribution;
+use crate::model::{Rule, WorldModel};
+
+/// Which side of a value is meant: what is less, or also the value itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Less than the value.
+    Below,
+    /// Less than the value, or the value itself.
+    UpTo,
+}
+
+impl Distribution {
+    /// P(a drawn number < `value`), before it is cut, scaled and rounded; `None` for a gamma
+    /// distribution, for which this is not known in closed form.
+    pub fn below(&self, value: f64) -> Option<f64> {
+        let step = |at: f64| f64::from(u8::from(at < value));
+        Some(match self {
+            Self::Constant(at) => step(*at),
+            Self::Normal { mean, deviation } if *deviation > 0.0 => {
+                standard_normal_below((value - mean) / deviation)
+            }
+            Self::Normal { mean, .. } => step(*mean),
+            Self::LogNormal { mean, deviation } if *deviation > 0.0 => {
+                if value <= 0.0 {
+                    return Some(0.0);
+                }
+                let variance = (deviation / mean).powi(2).ln_1p();
+                let location = mean.ln() - variance / 2.0;
+                standard_normal_below((value.ln() - location) / variance.sqrt())
+            }
+            Self::LogNormal { mean, .. } => step(*mean),
+            Self::Uniform { from, to } if from < to => {
+                ((value - from) / (to - from)).clamp(0.0, 1.0)
+            }
+            Self::Uniform { from, .. } => step(*from),
+            Self::Triangular { from, mode, to } if from < to => {
+                let value = value.clamp(*from, *to);
+                if value <= *mode && from < mode {
+                    (value - from).powi(2) / ((to - from) * (mode - from))
+                } else if mode < to {
+                    1.0 - (to - value).powi(2) / ((to - from) * (to - mode))
+                } else {
+                    1.0
+                }
+            }
+            Self::Triangular { from, .. } => step(*from),
+            Self::Exponential { from, mean } if *mean > 0.0 => {
+                -(-(value - from).max(0.0) / mean).exp_m1()
+            }
+            Self::Exponential { from, .. } => step(*from),
+            Self::Gamma { .. } => return None,
+            Self::Empirical(values) => {
+                #[allow(
+                    clippy::cast_precision_loss,
+                    reason = "lists of measured values are far shorter than 2^52"
+                )]
+                let count = |number: usize| number as f64;
+                let below = values.iter().filter(|at| **at < value).count();
+                count(below) / count(values.len())
+            }
+        })
+    }
+}
+
+/// Φ.
+fn standard_normal_below(value: f64) -> f64 {
+    0.5 * libm::erfc(-value / std::f64::consts::SQRT_2)
+}
+
+impl Rule {
+    /// How likely a value drawn for something planned to be `planned` is on that side of `value`.
+    pub fn share(&self, value: f64, side: Side, planned: f64, resolution: f64) -> Option<f64> {
+        // What is drawn becomes the nearest multiple of the resolution.
+        let steps = value / resolution;
+        let whole = steps.round();
+        let steps = if (steps - whole).abs() < 1e-6 {
+            whole
+        } else {
+            steps
+        };
+        let edge = match side {
+            Side::Below => steps.ceil() - 0.5,
+            Side::UpTo => steps.floor() + 0.5,
+        };
+        let edge = edge * resolution;
+        let scale = if self.is_relative { planned } else { 1.0 };
+        if scale <= 0.0 {
+            return Some(f64::from(u8::from(edge > 0.0)));
+        }
+        let edge = edge / scale;
+        if self.minimum.is_some_and(|minimum| edge <= minimum) {
+            return Some(0.0);
+        }
+        if self.maximum.is_some_and(|maximum| maximum < edge) {
+            return Some(1.0);
+        }
+        self.distribution.below(edge)
+    }
+}
+
+impl WorldModel {
+    /// How likely [`duration`](Self::duration) is to be on that side of `value`, in seconds; `None`
+    /// where that is not known.
+    pub fn duration_share(
+        &self,
+        action: &str,
+        planned: &Rational,
+        value: f64,
+        side: Side,
+    ) -> Option<f64> {
+        let least = planned.min(&self.resolution).to_f64();
+        let is_beyond = |at: f64| match side {
+            Side::Below => at < value,
+            Side::UpTo => at <= value,
+        };
+        if !is_beyond(least) {
+            return Some(0.0);
+        }
+        let planned = planned.to_f64();
+        match self.duration_rule(action) {
+            Some(rule) => rule.share(value, side, planned, self.resolution.to_f64()),
+            None => Some(f64::from(u8::from(is_beyond(planned)))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use elbowroom_num::Rational;
+
+    use super::Side;
+    use crate::draw::{Distribution, Purpose, keyed};
+    use crate::model::Rule;
+
+    /// Each distribution, drawn often, is as often below as it says.
+    #[test]
+    fn shares_are_those_of_what_is_drawn() {
+        let distributions = [
+            Distribution::Constant(4.0),
+            Distribution::Normal {
+                mean: 3.0,
+                deviation: 2.0,
+            },
+            Distribution::LogNormal {
+                mean: 3.0,
+                deviation: 2.0,
+            },
+            Distribution::Uniform { from: 1.0, to: 5.0 },
+            Distribution::Triangular {
+                from: 1.0,
+                mode: 2.0,
+                to: 6.0,
+            },
+            Distribution::Triangular {
+                from: 1.0,
+                mode: 1.0,
+                to: 6.0,
+            },
+            Distribution::Triangular {
+                from: 1.0,
+                mode: 6.0,
+                to: 6.0,
+            },
+            Distribution::Exponential {
+                from: 1.0,
+                mean: 2.0,
+            },
+            Distribution::Empirical(vec![1.0, 2.5, 2.5, 4.0]),
+        ];
+        let resolution = Rational::new(1, 2);
+        let planned = Rational::from(2);
+        for distribution in distributions {
+            for (is_relative, maximum) in [(false, None), (true, Some(4.0))] {
+                let rule = Rule {
+                    distribution: distribution.clone(),
+                    minimum: Some(1.25),
+                    maximum,
+                    is_relative,
+                };
+                let mut rng = keyed(5, "test", 0, Purpose::Duration);
+                let draws: Vec<f64> = (0..20_000)
+                    .map(|_| rule.draw(&planned, &resolution, &mut rng).to_f64())
+                    .collect();
+                for value in [1.0, 1.3, 2.5, 4.0, 4.2, 8.0] {
+                    for side in [Side::Below, Side::UpTo] {
+                        let is_there = |draw: &&f64| match side {
+                            Side::Below => **draw < value,
+                            Side::UpTo => **draw <= value,
+                        };
+                        #[allow(clippy::cast_precision_loss, reason = "20,000 at most")]
+                        let found = draws.iter().filter(is_there).count() as f64 / 20_000.0;
+                        let said = rule.share(value, side, 2.0, 0.5).unwrap();
+                        assert!(
+                            (found - said).abs() < 0.015,
+                            "{rule:?} {side:?} {value}: {found}, not {said}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! What an action leaves behind when it fails.
+
+use std::sync::Arc;
+
+use elbowroom_execution::{Command, Ending, Event, Ticket, World};
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_problem};
+use elbowroom_sim::{SimWorld, WorldModel};
+
+const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions)
+    (:predicates (lies) (free) (busy) (holds))
+    (:durative-action pick :parameters () :duration (= ?duration 2)
+      :condition (and (at start (lies)) (at start (free)))
+      :effect (and (at start (not (lies))) (at start (not (free))) (at start (busy))
+                   (at end (holds)) (at end (not (busy))))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain d) (:init (lies) (free)) (:goal (holds)))";
+
+/// What is told of a pick that fails at its end, in words, and what is true afterwards.
+fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
+    let source = |text: &str| Source::new("test", text);
+    let (problem, _) = read_problem(&source(DOMAIN), &source(PROBLEM)).expect("correct");
+    let task = Arc::new(Task::new(problem));
+    let text = format!(
+        "format = \"elbowroom-world\"\nversion = 1
+         [[failure]]\naction = \"pick\"\nprobability = 1\n{undone}"
+    );
+    let model = WorldModel::read(text.as_str(), task.problem()).expect("a correct world");
+    let schema = task.problem().schema("pick").expect("an action");
+    let command = Command::Start {
+        ticket: Ticket(0),
+        action: Arc::new(task.instantiate(schema, &[]).expect("no arguments")),
+        duration: Some(Rational::from(2)),
+    };
+    let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
+    world.command(&Rational::ZERO, &command).expect("it is simulated");
+    let mut told = Vec::new();
+    for _ in 0..2 {
+        let passage = world.wait(&Rational::from(5)).expect("it is simulated");
+        for observation in passage.observations {
+            told.push(match observation.event {
+                Event::Ended { ending: Ending::Failed { .. }, .. } => "failed".to_owned(),
+                Event::Fact { fact, truth } => format!("{} {truth}", task.fact_name(fact)),
+                _ => continue,
+            });
+        }
+    }
+    let facts = world.truth().state().facts.into_iter();
+    (told, facts.map(|fact| task.fact_name(fact)).collect())
+}
+
+#[test]
+fn what_fails_leaves_things_as_its_start_left_them() {
+    let (told, facts) = after_a_failure("");
+    assert_eq!(told, ["failed"]);
+    assert_eq!(facts, ["(busy)"]);
+}
+
+#[test]
+fn what_is_undone_is_as_it_was_and_the_world_says_so() {
+    let (told, mut facts) = after_a_failure("undone = true");
+    assert_eq!(told, ["failed", "(lies) true", "(free) true", "(busy) false"]);
+    facts.sort();
+    assert_eq!(facts, ["(free)", "(lies)"]);
+}

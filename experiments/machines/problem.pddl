@@ -1,0 +1,6 @@
+(define (problem three-machines)
+  (:domain machines)
+  (:objects m1 m2 m3 - machine)
+  (:init (working m1) (working m2) (working m3))
+  (:goal (and (maintained m1) (maintained m2) (maintained m3)))
+  (:metric minimize (total-time)))
