@@ -34,13 +34,18 @@ fn after_a_failure(undone: &str) -> (Vec<String>, Vec<String>) {
         duration: Some(Rational::from(2)),
     };
     let mut world = SimWorld::new(Arc::clone(&task), &model, 1);
-    world.command(&Rational::ZERO, &command).expect("it is simulated");
+    world
+        .command(&Rational::ZERO, &command)
+        .expect("it is simulated");
     let mut told = Vec::new();
     for _ in 0..2 {
         let passage = world.wait(&Rational::from(5)).expect("it is simulated");
         for observation in passage.observations {
             told.push(match observation.event {
-                Event::Ended { ending: Ending::Failed { .. }, .. } => "failed".to_owned(),
+                Event::Ended {
+                    ending: Ending::Failed { .. },
+                    ..
+                } => "failed".to_owned(),
                 Event::Fact { fact, truth } => format!("{} {truth}", task.fact_name(fact)),
                 _ => continue,
             });
@@ -60,7 +65,10 @@ fn what_fails_leaves_things_as_its_start_left_them() {
 #[test]
 fn what_is_undone_is_as_it_was_and_the_world_says_so() {
     let (told, mut facts) = after_a_failure("undone = true");
-    assert_eq!(told, ["failed", "(lies) true", "(free) true", "(busy) false"]);
+    assert_eq!(
+        told,
+        ["failed", "(lies) true", "(free) true", "(busy) false"]
+    );
     facts.sort();
     assert_eq!(facts, ["(free)", "(lies)"]);
 }

@@ -187,7 +187,11 @@ impl Compiler<'_> {
     }
 
     /// `None` for what cannot matter, or never starts.
-    pub(super) fn act(&self, action: &Action, model: &WorldModel) -> Result<Option<Act>, NotTabulated> {
+    pub(super) fn act(
+        &self,
+        action: &Action,
+        model: &WorldModel,
+    ) -> Result<Option<Act>, NotTabulated> {
         let name = &action.name;
         let refuse = |what: &str| Err(NotTabulated::new(format!("{name} has {what}")));
         if model.delay_rule(name).is_some() {

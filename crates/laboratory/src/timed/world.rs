@@ -332,12 +332,9 @@ fn horizon(events: &[Event], model: &WorldModel, settings: &Settings) -> Result<
     let mut latest: f64 = 0.0;
     for event in events {
         let beyond = |time: f64| {
-            let share = event.time.share(
-                time,
-                Side::UpTo,
-                0.0,
-                model.resolution.to_f64(),
-            );
+            let share = event
+                .time
+                .share(time, Side::UpTo, 0.0, model.resolution.to_f64());
             share.map(|share| 1.0 - share)
         };
         let mut time: f64 = 1.0;
@@ -373,4 +370,3 @@ fn horizon(events: &[Event], model: &WorldModel, settings: &Settings) -> Result<
 pub(super) fn unknown_shape() -> NotTabulated {
     NotTabulated::new("there is a gamma distribution")
 }
-
