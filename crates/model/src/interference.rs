@@ -92,15 +92,20 @@ impl Footprint {
 
     /// Whether this writes what `other` reads, or writes the opposite of what `other` writes.
     fn disturbs(&self, other: &Self) -> bool {
-        let meet = |a: &BTreeSet<FactId>, b: &BTreeSet<FactId>| !a.is_disjoint(b);
-        let meet_fluents = |a: &BTreeSet<FluentId>, b: &BTreeSet<FluentId>| !a.is_disjoint(b);
-        meet(&self.adds, &other.reads)
-            || meet(&self.deletes, &other.reads)
-            || meet(&self.adds, &other.deletes)
-            || meet_fluents(&self.shifts, &other.reads_fluents)
-            || meet_fluents(&self.assigns, &other.reads_fluents)
-            || meet_fluents(&self.assigns, &other.assigns)
-            || meet_fluents(&self.assigns, &other.shifts)
+        self.writes_what_is_read_by(other) || self.contradicts(other)
+    }
+
+    /// Whether the two write the opposite of each other, or what does not commute, whatever they
+    /// read.
+    pub fn overwrites(&self, other: &Self) -> bool {
+        self.contradicts(other) || other.contradicts(self)
+    }
+
+    /// Whether this writes the opposite of what `other` writes.
+    fn contradicts(&self, other: &Self) -> bool {
+        !self.adds.is_disjoint(&other.deletes)
+            || !self.assigns.is_disjoint(&other.assigns)
+            || !self.assigns.is_disjoint(&other.shifts)
     }
 
     /// Whether this writes anything that `other` reads.

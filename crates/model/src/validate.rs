@@ -13,7 +13,7 @@
 //! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
 //!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
 //! - The goal holds after the last happening of the plan's actions. Timed initials after that do
-//!   not count.
+//!   not count, unless [`Settings::counts_later_timed`] says so.
 //!
 //! A part of a condition that says nothing (it reads a fluent without a value, divides by zero)
 //! is a violation, unless the other parts decide whatever it would say.
@@ -64,6 +64,10 @@ use crate::task::Task;
 
 /// Settings of the validator.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a rule of its own, and any two go together"
+)]
 pub struct Settings {
     /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
     /// fall into one group, which is what VAL asks for.
@@ -75,6 +79,13 @@ pub struct Settings {
     /// By how much comparisons of numbers may fail, strict ones by less. VAL allows a
     /// ten-thousandth, whatever its `-t`.
     pub slack: Rational,
+    /// Whether timed initials after the last happening of the plan's actions count, so that the
+    /// goal holds after all of them: what VAL, unified-planning and Tamer ask for.
+    pub counts_later_timed: bool,
+    /// Whether happenings of one time interfere only if they write the same. Their conditions read
+    /// the state before in any case; with this, another happening of that time may change what they
+    /// read, as unified-planning has it for problems without an ε.
+    pub allows_simultaneous_reads: bool,
 }
 
 impl Default for Settings {
@@ -84,6 +95,8 @@ impl Default for Settings {
             needs_separation: true,
             tolerance: Rational::ZERO,
             slack: Rational::ZERO,
+            counts_later_timed: false,
+            allows_simultaneous_reads: false,
         }
     }
 }
@@ -95,6 +108,18 @@ impl Settings {
             needs_separation: false,
             tolerance,
             slack: Rational::new(1, 10_000),
+            ..Self::default()
+        }
+    }
+
+    /// What unified-planning does with a problem without an ε: what happens at one time reads the
+    /// state before, nothing needs to be apart, and the goal holds after all timed effects.
+    pub fn like_unified_planning() -> Self {
+        Self {
+            needs_separation: false,
+            counts_later_timed: true,
+            allows_simultaneous_reads: true,
+            ..Self::default()
         }
     }
 

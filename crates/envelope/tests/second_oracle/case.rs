@@ -136,12 +136,7 @@ impl Case {
         let plan = TimeTriggeredPlan {
             steps: steps.collect(),
         };
-        let settings = Settings {
-            needs_separation: true,
-            tolerance: Rational::ZERO,
-            slack: Rational::ZERO,
-        };
-        validate(&task, &plan, &settings)
+        validate(&task, &plan, &Settings::default())
     }
 
     /// Takes away the domain's duration constraints of an action whose duration is a parameter.

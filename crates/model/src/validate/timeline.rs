@@ -50,8 +50,8 @@ pub(super) struct Group<'a> {
 
 /// All happenings by time; those that the tolerance does not tell apart form one group.
 ///
-/// Timed initials after the last happening of the plan are left out, and so is all that has
-/// happened when the plan begins in mid-execution.
+/// Timed initials after the last happening of the plan are left out unless they count, and so is
+/// all that has happened when the plan begins in mid-execution.
 pub(super) fn timeline<'a>(
     task: &'a Task,
     situation: Option<&Situation>,
@@ -115,6 +115,8 @@ pub(super) fn timeline<'a>(
             }),
         }
     }
-    groups.retain(|group| last.as_ref().is_some_and(|last| group.time <= *last));
+    if !settings.counts_later_timed {
+        groups.retain(|group| last.as_ref().is_some_and(|last| group.time <= *last));
+    }
     groups
 }

@@ -92,6 +92,57 @@ fn without_epsilon_interfering_happenings_only_must_not_coincide() {
     );
 }
 
+/// The delivery counts only if the shop has not thrown it out in the end.
+fn thrown_out() -> World {
+    World::new("")
+        .instant("deliver", "", "(p)")
+        .timed("9", "(not (p))")
+        .goal("(p)")
+}
+
+#[test]
+fn a_timed_initial_after_the_plan_counts_only_if_the_settings_say_so() {
+    assert_eq!(thrown_out().judge("1: deliver"), "valid");
+    let world = || {
+        thrown_out().settings(Settings {
+            counts_later_timed: true,
+            ..Settings::default()
+        })
+    };
+    assert_eq!(
+        world().judge("1: deliver"),
+        "at 9.000: the goal (p) does not hold: (p) is false since a timed initial at 9.000"
+    );
+    assert_eq!(world().judge("10: deliver"), "valid");
+    assert_eq!(world().timed("11", "(p)").judge("1: deliver"), "valid");
+    // Without any action, too.
+    let settings = world().settings;
+    let given = World::new("").timed("5", "(q)").goal("(q)").settings(settings);
+    assert_eq!(given.judge(""), "valid");
+}
+
+#[test]
+fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so() {
+    let world = |settings| {
+        World::new("(p)")
+            .instant("use", "(p)", "(q)")
+            .instant("spoil", "", "(not (p))")
+            .instant("restore", "", "(p)")
+            .goal("(q)")
+            .settings(settings)
+    };
+    let judge = |plan| world(Settings::like_unified_planning()).judge(plan);
+    assert_eq!(judge("1: use\n1: spoil"), "valid");
+    assert_ne!(world(Settings::default()).judge("1: use\n1: spoil"), "valid");
+    // What contradicts itself is refused under any rule, and nothing sees what comes with it.
+    assert!(judge("1: use\n2: spoil\n2: restore").starts_with("at 2.000: (restore) interferes"));
+    let handover = handover().settings(Settings::like_unified_planning());
+    assert_eq!(
+        handover.judge("1: give\n1: take"),
+        "at 1.000: (take) needs (p): (p) is false"
+    );
+}
+
 #[test]
 fn the_tolerance_merges_what_is_within_a_tenth_of_it_after_the_first() {
     let world = handover().settings(Settings::like_val(number("0.01")));
