@@ -62,7 +62,7 @@ pub use command::{Command, CommandError};
 pub use judge::Repair;
 pub use outcome::{Event, Found, Outcome, Report, Statistics};
 pub use registry::{Habits, Kind, Planner, PlannerError, REGISTRY, Registered};
-pub use request::Request;
+pub use request::{Question, Request};
 pub use run::plan;
 pub use settings::Settings;
 pub use supervise::Ending;

@@ -22,7 +22,7 @@ const DIGITS: u32 = 9;
 
 /// The problem as the planner gets it.
 #[derive(Debug)]
-pub(super) struct Question {
+pub struct Question {
     /// The text of the problem file.
     pub(super) text: String,
     /// The task that the planner sees: time 0 is now.
@@ -36,7 +36,7 @@ impl Question {
     ///
     /// # Errors
     /// When what is running cannot be told in a problem file.
-    pub(super) fn of(request: &Request<'_>) -> Result<Self, String> {
+    pub fn of(request: &Request<'_>) -> Result<Self, String> {
         if *request.situation == Situation::initial(request.task) {
             return Ok(Self {
                 text: request.problem.text().to_owned(),
@@ -63,13 +63,23 @@ impl Question {
         })
     }
 
+    /// The text of the problem file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The task that the planner sees: time 0 is now.
+    pub fn task(&self) -> &Task {
+        &self.task
+    }
+
     /// A plan for the planner's task, as one for ours: times on our clock, and what is running
     /// goes on to its assumed end.
     ///
     /// # Errors
     /// When an action cannot be instantiated, which the two tasks having the same objects rules
     /// out.
-    pub(super) fn translate(
+    pub fn translate(
         &self,
         plan: &TimeTriggeredPlan,
         request: &mut Request<'_>,
