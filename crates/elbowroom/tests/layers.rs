@@ -68,6 +68,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("cli", &["elbowroom", "laboratory"]),
+    ("python", &["elbowroom", "laboratory"]),
 ];
 
 #[test]

@@ -1,0 +1,134 @@
+"""Elbowroom: how far a temporal plan may deviate, and what to do when it does.
+
+    >>> import elbowroom
+    >>> problem = elbowroom.read(DOMAIN, PROBLEM)
+    >>> envelope = problem.envelope(PLAN)
+    >>> envelope.answer
+    'envelope'
+
+Times and amounts are exact: :class:`fractions.Fraction`, and ``math.inf`` where there is no limit.
+In a notebook, answers show themselves as tables; ``.to_pandas()`` and ``.to_polars()`` make data
+frames of them, ``.plot()`` draws them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from . import _native
+from ._answers import (
+    Constraint,
+    Envelope,
+    Execution,
+    Margin,
+    NoPlan,
+    Plan,
+    Room,
+    Run,
+    Step,
+    Stn,
+    Verdict,
+    Violation,
+)
+from ._errors import (
+    BugError,
+    CampaignError,
+    Diagnostic,
+    ElbowroomError,
+    InterruptedWarning,
+    PlannerError,
+    ReadError,
+    RequestError,
+    UndecidedError,
+    UnsupportedError,
+    WorldError,
+)
+from ._execution import Cancel, Look, Over, Start, Stepped, Wait
+from ._problem import Problem, read
+from ._tables import Progress
+from ._world import Action, AsyncWorld, Observation, World, ended, fact, started, value
+from .campaign import Comparison, Experiment, compare
+
+__version__ = _native.__version__
+
+
+class ExecutorInfo(NamedTuple):
+    """An executor, before there is one."""
+
+    name: str
+    argument: str | None
+    """What the number after its name and a colon means, if it takes one."""
+    summary: str
+    source: str
+
+
+def executors() -> list[ExecutorInfo]:
+    """Every executor that :meth:`Problem.run` knows.
+
+    >>> import elbowroom
+    >>> "guarded" in [executor.name for executor in elbowroom.executors()]
+    True
+    """
+    return [ExecutorInfo(*it) for it in _native.executors()]
+
+
+def envelope(problem: Any, plan: Any, **options: Any) -> Envelope:
+    """The envelope of a plan; also of unified-planning's problems and plans.
+
+    Options and errors are those of :meth:`Problem.envelope`.
+    """
+    if isinstance(problem, Problem):
+        return problem.envelope(plan, **options)
+    from . import up
+
+    return up.envelope(problem, plan, **options)
+
+
+__all__ = [
+    "Action",
+    "AsyncWorld",
+    "BugError",
+    "CampaignError",
+    "Cancel",
+    "Comparison",
+    "Constraint",
+    "Diagnostic",
+    "ElbowroomError",
+    "Envelope",
+    "Execution",
+    "ExecutorInfo",
+    "Experiment",
+    "InterruptedWarning",
+    "Look",
+    "Margin",
+    "NoPlan",
+    "Observation",
+    "Over",
+    "Plan",
+    "PlannerError",
+    "Problem",
+    "Progress",
+    "ReadError",
+    "RequestError",
+    "Room",
+    "Run",
+    "Start",
+    "Step",
+    "Stepped",
+    "Stn",
+    "UndecidedError",
+    "UnsupportedError",
+    "Verdict",
+    "Violation",
+    "Wait",
+    "World",
+    "WorldError",
+    "compare",
+    "ended",
+    "envelope",
+    "executors",
+    "fact",
+    "read",
+    "started",
+    "value",
+]

@@ -1,0 +1,485 @@
+"""Answers: what the questions of a :class:`~elbowroom.Problem` give back.
+
+Each holds the document that the command prints with ``--json`` (``.document``, described in
+``docs/formats``), with its exact numbers as fractions, and offers what people ask of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from . import _plots
+from ._numbers import Exact, exact, shown, shown_inwards
+from ._tables import Table, html_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Step(NamedTuple):
+    """An action of a plan."""
+
+    start: Fraction
+    """When it starts."""
+    action: str
+    """Its name: ``(drive rover depot shelf)``."""
+    duration: Fraction | None
+    """How long it takes; ``None`` for an instantaneous action."""
+
+
+class Plan(Table):
+    """A plan with fixed times.
+
+    Its text (``str(plan)``) is what planners print and validators read.
+    """
+
+    def __init__(self, text: str, steps: Sequence[Step], document: dict[str, Any]) -> None:
+        self._text = text
+        self.steps: list[Step] = list(steps)
+        """The actions, by start time."""
+        self.document: dict[str, Any] = document
+        """The answer of the planner; empty for a plan from elsewhere."""
+
+    @property
+    def makespan(self) -> Fraction:
+        """When the last action ends."""
+        return max((s.start + (s.duration or 0) for s in self.steps), default=Fraction(0))
+
+    @property
+    def metric(self) -> Fraction | None:
+        """The value of the problem's metric, if it has one and a planner made the plan."""
+        metric: Fraction | None = self.document.get("metric")
+        return metric
+
+    @property
+    def stop(self) -> str | None:
+        """Why the search ended: ``"first plan"``, ``"time limit"``, ``"cancelled"``, …"""
+        stop: str | None = self.document.get("stop")
+        return stop
+
+    def rows(self) -> list[Step]:
+        """The actions, by start time."""
+        return self.steps
+
+    def _fields(self) -> Sequence[str]:
+        return Step._fields
+
+    def __iter__(self) -> Iterator[Step]:
+        return iter(self.steps)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"<Plan: {len(self.steps)} steps, makespan {shown(self.makespan)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(shown(s.start), s.action, shown(s.duration)) for s in self.steps]
+        caption = f"plan, makespan {shown(self.makespan)}"
+        return html_table(("start", "action", "duration"), rows, caption)
+
+    def plot(self, envelope: Envelope | None = None, ax: Axes | None = None) -> Axes:
+        """A Gantt chart; with an envelope, each bar has the band in which its end may lie.
+
+        Raises:
+            ImportError: if matplotlib is not installed.
+        """
+        return _plots.gantt(self, envelope, ax)
+
+
+class NoPlan:
+    """There is no plan, or none was found; it is false in conditions."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self.document: dict[str, Any] = document
+        """The answer of the planner."""
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether there is none. Otherwise nothing is known."""
+        return bool(self.document["answer"] == "no plan")
+
+    @property
+    def reason(self) -> str:
+        """Why there is none, or why none was found."""
+        return str(self.document["reason"])
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __repr__(self) -> str:
+        return f"<NoPlan: {self.reason}>"
+
+
+class Violation(NamedTuple):
+    """What is wrong with a plan: the first thing that goes wrong."""
+
+    time: Fraction
+    """When."""
+    action: str | None
+    """In which action; ``None`` if it is the goal that does not hold."""
+    step: int | None
+    """The position of that action in the plan, from 0."""
+    message: str
+    """All of it, in words."""
+
+
+class Margin(NamedTuple):
+    """How close a comparison of numbers came to failing."""
+
+    condition: str
+    when: str
+    action: str | None
+    margin: Fraction
+    time: Fraction
+    strict: bool
+
+
+class Verdict(Table):
+    """Whether a plan is valid; true in conditions if it is."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self.document: dict[str, Any] = document
+        """The answer as the command has it."""
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the plan works."""
+        return bool(self.document["answer"] == "valid")
+
+    @property
+    def makespan(self) -> Fraction | None:
+        """When the last action ends, if the plan works."""
+        makespan: Fraction | None = self.document.get("makespan")
+        return makespan
+
+    @property
+    def metric(self) -> Fraction | None:
+        """The value of the problem's metric, if it has one that can be evaluated."""
+        metric: Fraction | None = self.document.get("metric")
+        return metric
+
+    @property
+    def violation(self) -> Violation | None:
+        """What is wrong, if something is."""
+        found = self.document.get("violation")
+        return Violation(**found) if found else None
+
+    @property
+    def values(self) -> dict[str, Fraction]:
+        """The value of each numeric fluent at the end, if the plan works."""
+        return {it["fluent"]: it["value"] for it in self.document.get("values", [])}
+
+    def rows(self) -> list[Margin]:
+        """How close each comparison came to failing."""
+        return [Margin(**it) for it in self.document.get("margins", [])]
+
+    def _fields(self) -> Sequence[str]:
+        return Margin._fields
+
+    def __bool__(self) -> bool:
+        return self.is_valid
+
+    def __repr__(self) -> str:
+        if self.violation is None:
+            return f"<Verdict: valid, makespan {shown(self.makespan)}>"
+        return f"<Verdict: invalid: {self.violation.message}>"
+
+    def _repr_html_(self) -> str:
+        if self.violation is not None:
+            row = (shown(self.violation.time), self.violation.action or "", self.violation.message)
+            return html_table(("time", "action", "what is wrong"), [row], "the plan does not work")
+        rows = [
+            (shown(m.margin), m.condition, m.when, m.action or "", shown(m.time))
+            for m in sorted(self.rows(), key=lambda m: m.margin)
+        ]
+        caption = f"the plan works, makespan {shown(self.makespan)}"
+        return html_table(("margin", "condition", "when", "action", "time"), rows, caption)
+
+
+class Constraint(NamedTuple):
+    """``lower <= to - from_ <= upper``."""
+
+    from_: str
+    to: str
+    lower: Exact | str
+    """A fraction, ``-math.inf``, or the name of a parameter."""
+    upper: Exact | str
+    """A fraction, ``math.inf``, or the name of a parameter."""
+    reason: str
+
+
+class Stn(Table):
+    """A plan as a simple temporal network: only the orders and bounds that it needs."""
+
+    def __init__(self, document: dict[str, Any], text: str, dot: str) -> None:
+        self.document: dict[str, Any] = document
+        """The answer as the command has it."""
+        self.text: str = text
+        """As an STN plan file."""
+        self.dot: str = dot
+        """As a drawing for Graphviz."""
+
+    @property
+    def nodes(self) -> dict[str, str]:
+        """The time points: name, and what happens there in words."""
+        return {node["name"]: node["what"] for node in self.document["nodes"]}
+
+    @property
+    def constraints(self) -> list[Constraint]:
+        """Bounds on the differences of time points."""
+
+        def bound(value: Any) -> Exact | str:
+            if isinstance(value, dict):
+                return str(value["parameter"])
+            return exact(value)
+
+        return [
+            Constraint(c["from"], c["to"], bound(c["lower"]), bound(c["upper"]), c["reason"])
+            for c in self.document["constraints"]
+        ]
+
+    def rows(self) -> list[Constraint]:
+        """The constraints."""
+        return self.constraints
+
+    def _fields(self) -> Sequence[str]:
+        return Constraint._fields
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.nodes)} time points, {len(self.constraints)} constraints"
+        return f"<Stn: {counts}>"
+
+    def _repr_html_(self) -> str:
+        def text(bound: Exact | str) -> str:
+            return bound if isinstance(bound, str) else shown(bound)
+
+        rows = [(text(c.lower), c.to, c.from_, text(c.upper), c.reason) for c in self.constraints]
+        return html_table(("at least", "to", "from", "at most", "reason"), rows, "network")
+
+
+class Room(NamedTuple):
+    """How far a quantity may deviate."""
+
+    name: str
+    """As in STN plan files."""
+    quantity: str
+    """In plain words: ``duration of (drive rover depot shelf)``."""
+    kind: str
+    """``"duration"``, ``"constant"``, ``"domain"``, ``"initial"``, ``"timed"`` or ``"bound"``."""
+    nominal: Fraction
+    """The value in the plan."""
+    lower: Exact
+    """The lower end; exact."""
+    upper: Exact
+    """The upper end; ``math.inf`` if there is no limit."""
+    lower_limit: str | None
+    """What keeps the lower end from moving further, in words."""
+    upper_limit: str | None
+    """What keeps the upper end."""
+
+
+class Envelope(Table):
+    """How far each quantity of a plan may deviate while the plan still works.
+
+    True in conditions if there is an envelope, or if the box asked about lies inside it.
+    """
+
+    def __init__(self, document: dict[str, Any], makespans: dict[str, Any] | None) -> None:
+        self.document: dict[str, Any] = document
+        """The answer as the command has it."""
+        self.makespans: dict[str, Exact | None] | None = makespans
+        """When the plan is done: with all quantities ``nominal``, ``at_lower``, ``at_upper``."""
+
+    @property
+    def answer(self) -> str:
+        """``"envelope"``, ``"fails"``, ``"inside"``, ``"outside"`` or ``"none"``."""
+        return str(self.document["answer"])
+
+    @property
+    def stop(self) -> str | None:
+        """Why the search ended: ``"converged"``, ``"time limit"``, ``"cancelled"``, …"""
+        stop: str | None = self.document.get("stop")
+        return stop
+
+    @property
+    def guarantee(self) -> str:
+        """What is promised inside it: ``"weak"``, ``"dynamic"`` or ``"strong"``."""
+        return str(self.document["settings"]["guarantee"])
+
+    @property
+    def why_not(self) -> str | None:
+        """Why the plan fails as planned, or in the box asked about."""
+        if "violation" in self.document:
+            return str(self.document["violation"]["message"])
+        if "counterexample" in self.document:
+            return str(self.document["counterexample"]["message"])
+        return None
+
+    @property
+    def counterexample(self) -> dict[str, Any] | None:
+        """What can go wrong, with values and a schedule; ``docs/formats/envelope-json.md``."""
+        found: dict[str, Any] | None = self.document.get("counterexample")
+        return found
+
+    def rows(self) -> list[Room]:
+        """Each quantity and its interval."""
+        if self.answer not in ("envelope", "inside", "outside"):
+            return []
+        fields = Room._fields
+        return [
+            Room(*(it.get(field) for field in fields)) for it in self.document["parameters"]
+        ]
+
+    def _fields(self) -> Sequence[str]:
+        return Room._fields
+
+    def __getitem__(self, name: str) -> Room:
+        for room in self.rows():
+            if room.name == name or room.quantity == name:
+                return room
+        known = ", ".join(room.name for room in self.rows())
+        raise KeyError(f"no quantity is called {name!r}; there are: {known}")
+
+    def __contains__(self, values: object) -> bool:
+        """Whether values, by name, all lie in their intervals."""
+        if not isinstance(values, dict):
+            return False
+        return all(self[name].lower <= value <= self[name].upper for name, value in values.items())
+
+    def __bool__(self) -> bool:
+        return self.answer in ("envelope", "inside")
+
+    def __repr__(self) -> str:
+        rooms = ", ".join(
+            f"{r.name} in [{shown_inwards(r.lower, True)}, {shown_inwards(r.upper, False)}]"
+            for r in self.rows()
+        )
+        why = f": {self.why_not}" if self.why_not else ""
+        return f"<Envelope: {self.answer}{why}{': ' + rooms if rooms else ''}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (
+                room.name,
+                room.quantity,
+                shown(room.nominal),
+                shown_inwards(room.lower, True),
+                shown_inwards(room.upper, False),
+                room.lower_limit or "",
+                room.upper_limit or ("nothing" if room.upper == math.inf else ""),
+            )
+            for room in self.rows()
+        ]
+        heads = ("name", "quantity", "planned", "from", "to", "lower limit", "upper limit")
+        why = f": {self.why_not}" if self.why_not else ""
+        return html_table(heads, rows, f"{self.answer}, guarantee {self.guarantee}{why}")
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Each interval as a bar, with the planned value marked.
+
+        Raises:
+            ImportError: if matplotlib is not installed.
+        """
+        return _plots.intervals(self, ax)
+
+
+class Execution(NamedTuple):
+    """An action that was started in a run."""
+
+    start: Fraction
+    action: str
+    duration: Fraction | None
+    """``None`` for an instantaneous action, or one that had not ended."""
+    ticket: int
+    """The number of the start."""
+    outcome: str | None
+    """``"succeeded"``, ``"failed"``, ``"cancelled"``, or ``None`` if it had not ended."""
+
+
+class Run(Table):
+    """What came of executing a plan; true in conditions if the goal was reached."""
+
+    def __init__(self, document: dict[str, Any], trace: str | None) -> None:
+        self.document: dict[str, Any] = document
+        """The answer as the command has it."""
+        self.trace_text: str | None = trace
+        """The trace as JSON Lines, which ``elbowroom run --replay`` plays back."""
+
+    @property
+    def verdict(self) -> str:
+        """``"goal-reached"``, ``"no-plan"``, ``"unsolvable-from-here"``, ``"time-limit"``, …"""
+        return str(self.document["verdict"])
+
+    @property
+    def why(self) -> str | None:
+        """What there is to add to the verdict."""
+        why: str | None = self.document["why"]
+        return why
+
+    @property
+    def time(self) -> Fraction:
+        """When the run ended, by the world's clock."""
+        time: Fraction = self.document["time"]
+        return time
+
+    @property
+    def replans(self) -> int:
+        """How many new plans were made, or asked for."""
+        return int(self.document["replans"])
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why, in words, one for each."""
+        return [str(reason["words"]) for reason in self.document["reasons"]]
+
+    def trace(self) -> list[dict[str, Any]]:
+        """The record of the run, entry by entry (``docs/formats/trace.md``).
+
+        Raises:
+            ValueError: if none was kept (``trace=False``).
+        """
+        from ._numbers import document
+
+        if self.trace_text is None:
+            raise ValueError("no trace was kept; run with trace=True")
+        return [document(line) for line in self.trace_text.splitlines()]
+
+    def rows(self) -> list[Execution]:
+        """What was done."""
+        return [
+            Execution(*(it.get(field) for field in Execution._fields))
+            for it in self.document["executed"]
+        ]
+
+    def _fields(self) -> Sequence[str]:
+        return Execution._fields
+
+    def __bool__(self) -> bool:
+        return self.verdict == "goal-reached"
+
+    def __repr__(self) -> str:
+        return f"<Run: {self.verdict} at {shown(self.time)}, {self.replans} new plans>"
+
+    def _repr_html_(self) -> str:
+        rows = [(shown(e.start), e.action, shown(e.duration), e.outcome or "") for e in self.rows()]
+        why = f" ({self.why})" if self.why else ""
+        caption = f"{self.verdict}{why} at {shown(self.time)}, {self.replans} new plans"
+        return html_table(("start", "action", "took", "outcome"), rows, caption)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """A Gantt chart of what was done.
+
+        Raises:
+            ImportError: if matplotlib is not installed.
+        """
+        return _plots.executed(self, ax)

@@ -1,0 +1,107 @@
+"""What can go wrong. Every exception says what to do."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+
+class Diagnostic(NamedTuple):
+    """One finding about a text: a domain, a problem, a plan, a world file."""
+
+    severity: str
+    """``"error"``, or ``"warning"`` where the text is used all the same."""
+    message: str
+    """What is wrong, in lower case."""
+    advice: str | None
+    """What was expected, or what to do."""
+    file: str
+    """The name of the text: its path, or what it is."""
+    line: int
+    """The line, from 1."""
+    column: int
+    """The column, from 1, in characters."""
+    length: int
+    """How many characters the place spans on its line; 0 where something is missing."""
+
+    def __str__(self) -> str:
+        advice = f"; {self.advice}" if self.advice else ""
+        place = f"{self.file}:{self.line}:{self.column}"
+        return f"{place}: {self.severity}: {self.message}{advice}"
+
+
+def diagnostics(records: str) -> list[Diagnostic]:
+    """Reads what the native module says about a text."""
+    read: list[dict[str, Any]] = json.loads(records)
+    fields = Diagnostic._fields
+    return [Diagnostic(*(record[field] for field in fields)) for record in read]
+
+
+class ElbowroomError(Exception):
+    """The base of all exceptions of this package."""
+
+
+class ReadError(ElbowroomError, ValueError):
+    """A text cannot be read: a domain, a problem, a plan, a world, an experiment.
+
+    >>> import elbowroom
+    >>> try:
+    ...     elbowroom.read("(define (domain d) (:predicats (p)))", "(define (problem q))")
+    ... except elbowroom.ReadError as error:
+    ...     print(error.diagnostics[0].line, error.diagnostics[0].advice)
+    1 did you mean `:predicates`?
+    """
+
+    diagnostics: list[Diagnostic]
+    """All that was found, errors and warnings, in the order of the text."""
+
+    def __init__(self, message: str, records: str = "[]") -> None:
+        super().__init__(message)
+        self.diagnostics = diagnostics(records)
+
+
+class RequestError(ElbowroomError, ValueError):
+    """The request cannot be understood, or its answer is beyond exact analysis; it says why."""
+
+
+class UnsupportedError(ElbowroomError):
+    """The problem needs something that the planner, or the translation, does not support."""
+
+
+class UndecidedError(ElbowroomError):
+    """The judge cannot tell whether the plan is valid."""
+
+
+class PlannerError(ElbowroomError):
+    """A planner is not known, could not be started, or has failed."""
+
+
+class WorldError(ElbowroomError):
+    """A world in Python has raised an exception, which is the ``__cause__``, or broke its contract.
+
+    ``run`` is what came of the run until then.
+    """
+
+    run: Any
+
+    def __init__(self, message: str, run: Any = None) -> None:
+        super().__init__(message)
+        self.run = run
+
+
+class CampaignError(ElbowroomError):
+    """Parts of a campaign are missing, or could not be made; it says which."""
+
+
+class BugError(ElbowroomError, RuntimeError):
+    """A bug in Elbowroom itself."""
+
+    def __init__(self, said: str) -> None:
+        super().__init__(
+            f"this is a bug in Elbowroom: {said}. Please report it, with the domain, the problem "
+            "and the call that led here; nothing that you gave should end like this"
+        )
+
+
+class InterruptedWarning(UserWarning):
+    """Ctrl-C has ended a search or a run early; what was found until then is the answer."""

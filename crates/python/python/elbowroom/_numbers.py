@@ -1,0 +1,90 @@
+"""Exact numbers: fractions, and infinity for what has no limit."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+Number: TypeAlias = int | float | str | Fraction | Decimal
+"""What is taken as a number: a float means the decimal that it is written as, 0.1 one tenth."""
+
+Exact: TypeAlias = Fraction | float
+"""A fraction, or ``math.inf`` or ``-math.inf``. A float is never anything else."""
+
+
+def exact(number: Number) -> Exact:
+    """A number, exactly.
+
+    >>> exact(0.1), exact("1/3"), exact(2), exact(float("inf"))
+    (Fraction(1, 10), Fraction(1, 3), Fraction(2, 1), inf)
+    """
+    if isinstance(number, bool):
+        raise TypeError(f"{number} is no number; give an int, a Fraction, a str or a float")
+    if isinstance(number, float):
+        if math.isnan(number):
+            raise ValueError("nan is no number")
+        return number if math.isinf(number) else Fraction(repr(number))
+    if isinstance(number, str):
+        text = number.strip().lower()
+        if text in ("inf", "+inf", "-inf"):
+            return float(text)
+        return Fraction(text)
+    if isinstance(number, (int, Fraction, Decimal)):
+        return Fraction(number)
+    # unified-planning, numpy and others have numbers of their own.
+    return Fraction(str(number))
+
+
+def text(number: Number) -> str:
+    """A number as Elbowroom reads it.
+
+    >>> text(0.1), text(5), text(float("-inf"))
+    ('1/10', '5', '-inf')
+    """
+    return str(exact(number))
+
+
+def _pair(fields: dict[str, Any]) -> Any:
+    if "exact" in fields and len(fields) == 2 and "decimal" in fields:
+        return exact(fields["exact"])
+    return fields
+
+
+def document(text: str) -> Any:
+    """Reads an answer; its exact numbers become fractions."""
+    import json
+
+    return json.loads(text, object_hook=_pair)
+
+
+def shown(number: Exact | None, digits: int = 3) -> str:
+    """A number for people: rounded to ``digits`` decimals.
+
+    >>> from fractions import Fraction
+    >>> shown(Fraction(1, 3)), shown(Fraction(5, 2)), shown(float("inf"))
+    ('0.333', '2.5', 'inf')
+    """
+    if number is None:
+        return ""
+    if isinstance(number, float):
+        return str(number)
+    if number.denominator == 1:
+        return str(number.numerator)
+    return f"{float(number):.{digits}f}".rstrip("0").rstrip(".")
+
+
+def shown_inwards(number: Exact, is_lower: bool, digits: int = 3) -> str:
+    """An end of an interval, rounded into the interval: what is printed is promised.
+
+    >>> from fractions import Fraction
+    >>> shown_inwards(Fraction(2, 3), True), shown_inwards(Fraction(2, 3), False)
+    ('0.667', '0.666')
+    """
+    if isinstance(number, float) or number.denominator == 1:
+        return shown(number)
+    scale = 10**digits
+    scaled = number * scale
+    whole = math.ceil(scaled) if is_lower else math.floor(scaled)
+    return shown(Fraction(whole, scale), digits)

@@ -1,0 +1,449 @@
+"""Problems, and what can be asked about them."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+from . import _native
+from ._answers import Envelope, NoPlan, Plan, Run, Step, Stn, Verdict
+from ._errors import Diagnostic, InterruptedWarning, RequestError, WorldError, diagnostics
+from ._execution import Stepped, drive, run_options
+from ._numbers import Number, document, text
+from ._tables import ProgressCallback, listener
+from ._world import Adapter, AsyncWorld, World
+
+Text: TypeAlias = "str | os.PathLike[str]"
+"""A path, or a text: a str with a parenthesis or a line feed in it is a text."""
+
+AnyPlan: TypeAlias = "Plan | Stn | Text | Iterable[tuple[Any, ...]]"
+"""A plan: what :meth:`Problem.plan` or :meth:`Problem.stn` gave, a path, a text, or steps
+(start, action, duration)."""
+
+PlannerCallable: TypeAlias = Callable[[str, str], "str | Plan | None"]
+"""A planner in Python: gets the texts of a domain and a problem, returns a plan, or ``None``."""
+
+_LARGEST_FILE = 256 << 20
+
+
+def named_text(given: Text, what: str) -> tuple[str, str]:
+    """A text and its name for messages."""
+    if isinstance(given, str) and ("\n" in given or "(" in given or not given.strip()):
+        return what, given
+    if not isinstance(given, (str, os.PathLike)):
+        raise TypeError(f"the {what} must be a path or a text, not {type(given).__name__}")
+    path = os.fspath(given)
+    if os.path.getsize(path) > _LARGEST_FILE:
+        raise RequestError(f"the {what} {path} has more than 256 MB; give a text file")
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
+        return path, file.read()
+
+
+def read(domain: Text, problem: Text, *, epsilon: Number = "0.001") -> Problem:
+    """Reads a domain and a problem, in PDDL: paths, or the texts themselves.
+
+    Args:
+        domain: the domain.
+        problem: the problem.
+        epsilon: the least separation of interfering happenings, in the problem's unit of time.
+
+    Raises:
+        ReadError: if they cannot be read; it has all mistakes, with line, column and advice.
+        OSError: if there is no such file.
+
+    >>> import elbowroom
+    >>> problem = elbowroom.read(DOMAIN, PROBLEM)
+    >>> problem.name
+    'one-parcel'
+    """
+    native, found = _native.read(
+        named_text(domain, "domain"), named_text(problem, "problem"), text(epsilon)
+    )
+    return Problem(native, diagnostics(found), text(epsilon))
+
+
+class Problem:
+    """A planning problem: what :func:`read` returns. It does not change."""
+
+    def __init__(
+        self, native: _native.Task, found: Sequence[Diagnostic] = (), epsilon: str = "1/1000"
+    ) -> None:
+        self._native = native
+        self._epsilon = epsilon
+        self.warnings: list[Diagnostic] = list(found)
+        """What was noticed while reading, though it could be read."""
+
+    @property
+    def domain_name(self) -> str:
+        """The name of the domain."""
+        return self._native.names()[0]
+
+    @property
+    def name(self) -> str:
+        """The name of the problem."""
+        return self._native.names()[1]
+
+    @property
+    def domain_text(self) -> str:
+        """The domain, in PDDL."""
+        return self._native.texts()[0][1]
+
+    @property
+    def problem_text(self) -> str:
+        """The problem, in PDDL."""
+        return self._native.texts()[1][1]
+
+    def __repr__(self) -> str:
+        return f"<Problem {self.name} of domain {self.domain_name}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Problems travel to other processes as their texts.
+        domain, problem = self._native.texts()
+        return _read_again, (domain, problem, self._epsilon)
+
+    def _plan_text(self, plan: AnyPlan) -> tuple[str, str]:
+        if isinstance(plan, Plan):
+            return "plan", str(plan)
+        if isinstance(plan, Stn):
+            return "plan.stn", plan.text
+        if isinstance(plan, (str, os.PathLike)):
+            return named_text(plan, "plan")
+        return "plan", "".join(_line(step) for step in plan)
+
+    def read_plan(self, plan: AnyPlan) -> Plan:
+        """Reads a plan with fixed times, as planners print it.
+
+        Raises:
+            ReadError: if it cannot be read, or names what the problem does not have.
+            RequestError: if it is an STN plan.
+
+        >>> problem.read_plan("0: (unlock office) [6]").steps
+        [Step(start=Fraction(0, 1), action='(unlock office)', duration=Fraction(6, 1))]
+        """
+        name, given = self._plan_text(plan)
+        steps = self._native.steps((name, given))
+        if steps is None:
+            raise RequestError(f"{name} is an STN plan, which has no fixed times")
+        made = [Step(Fraction(s), a, None if d is None else Fraction(d)) for s, a, d in steps]
+        return Plan(given, sorted(made, key=lambda step: step.start), {})
+
+    def check(
+        self, plan: AnyPlan, *, tolerance: Number | None = None, rules: str = "pddl"
+    ) -> Verdict:
+        """Judges a plan by the semantics of PDDL 2.1, exactly.
+
+        Args:
+            plan: a plan with fixed times.
+            tolerance: judges as VAL does with this ``-t``; without it, exactly.
+            rules: without a tolerance: ``"pddl"``; ``"pddl-later-timed"``, where the goal must hold
+                after all timed initials; or ``"unified-planning"``, where in addition nothing needs
+                to be apart, and what happens at one time reads the state before.
+
+        Raises:
+            ReadError: if the plan cannot be read.
+            UndecidedError: if it cannot be told whether the plan works.
+
+        >>> bool(problem.check(PLAN))
+        True
+        >>> problem.check("0: (drop rover parcel office) [3]").violation.action
+        '(drop rover parcel office)'
+        """
+        options = {"rules": rules}
+        if tolerance is not None:
+            options["tolerance"] = text(tolerance)
+        answer = self._native.check(self._plan_text(plan), json.dumps(options))
+        return Verdict(document(answer))
+
+    def plan(
+        self,
+        *,
+        planner: str = "embedded",
+        time_limit: float | None = None,
+        first: bool | None = None,
+        memory: int | None = None,
+        progress: ProgressCallback | bool | None = None,
+    ) -> Plan | NoPlan:
+        """Looks for a plan.
+
+        Args:
+            planner: ``"embedded"``, the name of another planner, or a command line.
+            time_limit: in seconds; better plans are looked for until then.
+            first: whether the first plan is enough; by default, without a time limit.
+            memory: about how many bytes the search may use.
+            progress: is told how far it has come; ``True`` shows a bar.
+
+        Returns:
+            A plan, or a :class:`NoPlan`, which is false and says why. At Ctrl-C, the best so far.
+
+        Raises:
+            UnsupportedError: if the problem needs what the embedded planner does not support.
+            PlannerError: if another planner is not known, or fails.
+
+        >>> plan = problem.plan()
+        >>> plan.makespan
+        Fraction(30003, 1000)
+        """
+        if first is None:
+            first = time_limit is None
+        limit = _seconds(time_limit)
+        answer, is_interrupted = self._native.plan(
+            planner, limit, first, memory, listener(progress)
+        )
+        found = document(answer)
+        _warn(is_interrupted, found["answer"] == "plan")
+        if found["answer"] != "plan":
+            return NoPlan(found)
+        steps = [Step(it["start"], it["action"], it["duration"]) for it in found["steps"]]
+        return Plan(found["plan"], steps, found)
+
+    def stn(self, plan: AnyPlan) -> Stn:
+        """A plan with only the orders and bounds that it needs, as a simple temporal network.
+
+        Raises:
+            RequestError: if the plan does not work.
+
+        >>> len(problem.stn(PLAN).nodes)
+        12
+        """
+        answer, written, dot = self._native.stn(self._plan_text(plan))
+        found = document(answer)
+        if written is None or dot is None:
+            raise RequestError(
+                f"the plan does not work, so it has no room: {found['violation']['message']}"
+            )
+        return Stn(found, written, dot)
+
+    def envelope(
+        self,
+        plan: AnyPlan,
+        *,
+        vary: str | Sequence[str] = (),
+        controllable: str | Sequence[str] = (),
+        guarantee: str = "dynamic",
+        method: str = "irr",
+        precision: Number = 1,
+        growth: str = "doubling",
+        sharpen: bool = False,
+        enforce: bool = False,
+        contains: str | dict[str, tuple[Number, Number]] | None = None,
+        most_checks: int | None = None,
+        time_limit: float | None = None,
+        progress: ProgressCallback | bool | None = None,
+    ) -> Envelope:
+        """How far each quantity of a plan may deviate while the plan still works.
+
+        Args:
+            plan: a plan with fixed times, or an STN plan.
+            vary: what to leave open, as ``elbowroom envelope --vary`` reads it; all durations by
+                default.
+            controllable: actions whose durations the executor chooses.
+            guarantee: ``"weak"``, ``"dynamic"`` or ``"strong"``.
+            method: ``"irr"``.
+            precision: how close each end comes to its limit, in the quantity's own unit.
+            growth: ``"doubling"`` or ``"constant"`` steps.
+            sharpen: whether each end is moved onto its limit when the search has ended.
+            enforce: whether the dispatcher keeps to obligations that are bounds on differences.
+            contains: asks instead whether this box lies inside: ``{"dur_0": (8, 12)}``.
+            most_checks: the search ends after that many box checks.
+            time_limit: in seconds; what was found until then is sound.
+            progress: is told how far it has come; ``True`` shows a bar.
+
+        Returns:
+            An :class:`Envelope`; also if the plan fails, which it says and explains. At Ctrl-C,
+            the box so far, in all of which the plan works.
+
+        Raises:
+            ReadError: if the plan cannot be read.
+            RequestError: if a specification names what the plan does not have, or the plan is
+                beyond exact analysis.
+
+        >>> envelope = problem.envelope(PLAN, sharpen=True)
+        >>> [str(room.upper) for room in envelope.rows()][:2]
+        ['17499/1000', '56519/1000']
+        >>> bool(problem.envelope(PLAN, contains={"dur_0": (10, 12)}))
+        True
+        """
+        wanted = [vary] if isinstance(vary, str) else list(vary)
+        chosen = [controllable] if isinstance(controllable, str) else list(controllable)
+        wanted += [f"controllable {action}" for action in chosen]
+        options: dict[str, Any] = {
+            "vary": wanted,
+            "guarantee": guarantee,
+            "method": method,
+            "precision": text(precision),
+            "growth": growth,
+            "sharpen": sharpen,
+            "enforce": enforce,
+            "contains": _box(contains),
+        }
+        if most_checks is not None:
+            options["most_checks"] = most_checks
+        answer, makespans, is_interrupted = self._native.envelope(
+            self._plan_text(plan), json.dumps(options), _seconds(time_limit), listener(progress)
+        )
+        found = document(answer)
+        _warn(is_interrupted, found["answer"] != "none")
+        return Envelope(found, None if makespans is None else document(makespans))
+
+    def run(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        world: World | Text | None = None,
+        executor: str = "guarded",
+        planner: str | PlannerCallable = "embedded",
+        seed: int = 0,
+        trace: bool = True,
+        wall_time_limit: float | None = None,
+        progress: ProgressCallback | bool | None = None,
+        **options: Any,
+    ) -> Run:
+        """Executes a plan in a world: dispatches, watches, and replans.
+
+        Args:
+            plan: the plan to begin with; without one, one is made.
+            world: a :class:`World` in Python, or a world file (``docs/formats/world.md``); without
+                one, everything goes as planned.
+            executor: who decides; :func:`elbowroom.executors` lists them.
+            planner: who makes new plans: ``"embedded"``, ``"none"``, another planner's name or
+                command line, or a function of the texts of domain and problem.
+            seed: which trajectory of a simulated world.
+            trace: whether to keep the record of the run.
+            wall_time_limit: in seconds on the wall clock; then the run ends in order.
+            progress: is told of what happens; ``True`` shows a bar.
+            options: further members of a run's specification, as the header of a trace has them
+                (``docs/formats/trace.md``): ``time_limit`` and ``planning_time`` in the world's
+                seconds, ``max_replans``, ``vary``, ``guarantee``, ``precision``, ``running``,
+                ``likelihoods``, …
+
+        Returns:
+            What came of it; also when the goal was not reached. Ctrl-C ends the run in order.
+
+        Raises:
+            RequestError: if the options contradict each other.
+            WorldError: if the world raises something, which is then its cause.
+
+        >>> run = problem.run(PLAN)
+        >>> run.verdict, run.time
+        ('goal-reached', Fraction(30003, 1000))
+        """
+        chosen = run_options(executor, planner, seed, options)
+        adapter: Adapter | None = None
+        if isinstance(world, (str, os.PathLike)):
+            chosen["world"] = named_text(world, "world")[1]
+        elif isinstance(world, AsyncWorld):
+            raise TypeError("this world has coroutines; `await problem.run_async(…)`")
+        elif world is not None:
+            adapter = Adapter(world)
+            # What the world does is its own; nothing is known of it.
+            chosen["world_process"] = f"python {type(world).__qualname__}"
+        answer, record, is_interrupted, raised = _native.run(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            json.dumps(chosen),
+            adapter,
+            asked(planner),
+            trace,
+            _seconds(wall_time_limit),
+            listener(progress),
+        )
+        result = Run(document(answer), record)
+        if raised is not None:
+            raise WorldError(f"{type(raised).__name__}: {raised}", result) from raised
+        if result.verdict == "world-failed":
+            raise WorldError(f"the world broke its contract: {result.why}", result)
+        _warn(is_interrupted, True)
+        return result
+
+    def execution(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        executor: str = "guarded",
+        planner: str | PlannerCallable = "embedded",
+        trace: bool = True,
+        **options: Any,
+    ) -> Stepped:
+        """A run that an event loop of your own drives, step by step.
+
+        Arguments and errors are those of :meth:`run`.
+
+        >>> execution = problem.execution(PLAN)
+        >>> execution.next_command().action.name
+        '(drive rover depot shelf)'
+        """
+        chosen = run_options(executor, planner, 0, options)
+        chosen.setdefault("world_process", "python")
+        native = _native.Stepper(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            json.dumps(chosen),
+            asked(planner),
+            trace,
+        )
+        return Stepped(native)
+
+    async def run_async(
+        self, plan: AnyPlan | None = None, *, world: AsyncWorld | World, **options: Any
+    ) -> Run:
+        """Executes a plan in a world whose methods are coroutines.
+
+        Arguments and errors are those of :meth:`run`; plans are made in a thread, so that the event
+        loop goes on meanwhile.
+        """
+        return await drive(self.execution(plan, **options), world)
+
+
+def _read_again(domain: tuple[str, str], problem: tuple[str, str], epsilon: str) -> Problem:
+    native, found = _native.read(domain, problem, epsilon)
+    return Problem(native, diagnostics(found), epsilon)
+
+
+def asked(planner: str | PlannerCallable) -> Callable[[str, str], str | None] | None:
+    """What the native module asks for plans, if that is in Python."""
+    if isinstance(planner, str):
+        return None
+    callable_ = planner
+
+    def ask(domain: str, problem: str) -> str | None:
+        found = callable_(domain, problem)
+        if found is None or isinstance(found, NoPlan):
+            return None
+        return str(found)
+
+    return ask
+
+
+def _line(step: tuple[Any, ...]) -> str:
+    start, action, *rest = step
+    duration = rest[0] if rest else None
+    lasts = "" if duration is None else f" [{text(duration)}]"
+    return f"{text(start)}: {action}{lasts}\n"
+
+
+def _box(contains: str | dict[str, tuple[Number, Number]] | None) -> str | None:
+    if contains is None or isinstance(contains, str):
+        return contains
+    ends = {name: (text(lower), text(upper)) for name, (lower, upper) in contains.items()}
+    return " ".join(f"{name}=[{lower},{upper}]" for name, (lower, upper) in ends.items())
+
+
+def _seconds(limit: float | None) -> float | None:
+    if limit is None:
+        return None
+    seconds = float(limit)
+    if not seconds >= 0:
+        raise ValueError(f"a time limit of {limit} seconds; give a number from 0 on")
+    return seconds
+
+
+def _warn(is_interrupted: bool, has_result: bool) -> None:
+    if not is_interrupted:
+        return
+    if not has_result:
+        raise KeyboardInterrupt
+    warnings.warn("ended by Ctrl-C; this is what was found until then", InterruptedWarning, 3)

@@ -1,0 +1,185 @@
+"""Worlds in Python: what is told to do things, and reports what happens."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from ._numbers import Number, exact, text
+
+
+class Action(NamedTuple):
+    """An action that a world is told to start."""
+
+    ticket: int
+    """The number of the start; reports refer to it."""
+    name: str
+    """``(drive rover depot shelf)``."""
+    duration: Fraction | None
+    """How long the plan has it take; ``None`` for an instantaneous action."""
+    now: Fraction
+    """When it is to start, by the world's clock."""
+
+    @property
+    def words(self) -> list[str]:
+        """The action and its arguments: ``["drive", "rover", "depot", "shelf"]``."""
+        return self.name.strip("()").split()
+
+
+class Observation(NamedTuple):
+    """What a world reports. Made by :func:`started`, :func:`ended`, :func:`fact`, :func:`value`."""
+
+    time: Number
+    fields: Mapping[str, Any]
+
+
+def _ticket(action: Action | int) -> int:
+    return action.ticket if isinstance(action, Action) else action
+
+
+def _measured(amounts: Mapping[str, Number] | None) -> dict[str, Any]:
+    if not amounts:
+        return {}
+    return {"measured": {fluent: text(amount) for fluent, amount in amounts.items()}}
+
+
+def started(
+    action: Action | int, time: Number, measured: Mapping[str, Number] | None = None
+) -> Observation:
+    """An action has started. ``measured`` has the amounts by which its start changed fluents."""
+    fields = {"type": "started", "ticket": _ticket(action), **_measured(measured)}
+    return Observation(time, fields)
+
+
+def ended(
+    action: Action | int,
+    time: Number,
+    outcome: str = "succeeded",
+    why: str = "",
+    measured: Mapping[str, Number] | None = None,
+) -> Observation:
+    """An action has ended: ``"succeeded"``, ``"failed"`` (say why) or ``"cancelled"``."""
+    fields = {"type": "ended", "ticket": _ticket(action), "outcome": outcome, "why": why}
+    return Observation(time, {**fields, **_measured(measured)})
+
+
+def fact(name: str, becomes: bool, time: Number) -> Observation:
+    """A fact is seen to be true or false: ``fact("(at rover depot)", True, now)``."""
+    return Observation(time, {"type": "fact", "fact": name, "becomes": becomes})
+
+
+def value(fluent: str, amount: Number, time: Number) -> Observation:
+    """A fluent is seen to have a value: ``value("(battery rover)", 80, now)``."""
+    return Observation(time, {"type": "value", "fluent": fluent, "value": text(amount)})
+
+
+def wire(observations: Iterable[Observation]) -> list[dict[str, Any]]:
+    """Observations as the native module reads them."""
+    return [{**fields, "time": text(time)} for time, fields in observations]
+
+
+class World:
+    """A world in which actions are started and things are observed; derive from it.
+
+    Each start is answered by :func:`started` and, if the action takes time, later by one
+    :func:`ended`. Each cancel of a running action is answered by an :func:`ended`. Time never goes
+    back. ``docs/formats/world-protocol.md`` has the whole contract; what happens when a world breaks
+    it is defined, and nothing hangs.
+
+    >>> import elbowroom
+    >>> class AsPlanned(elbowroom.World):
+    ...     def __init__(self):
+    ...         self.coming = []
+    ...     def start(self, action):
+    ...         self.coming.append(elbowroom.started(action, action.now))
+    ...         if action.duration is not None:
+    ...             self.coming.append(elbowroom.ended(action, action.now + action.duration))
+    ...     def cancel(self, action):
+    ...         pass
+    ...     def wait(self, until):
+    ...         now = min([until, *(it.time for it in self.coming)])
+    ...         due = [it for it in self.coming if it.time <= now]
+    ...         self.coming = [it for it in self.coming if it.time > now]
+    ...         return now, due
+    """
+
+    def start(self, action: Action) -> None:
+        """Starts an action. Returns at once; what comes of it is reported by :meth:`wait`."""
+        raise NotImplementedError("a world needs a method start(action)")
+
+    def cancel(self, action: Action) -> None:
+        """Stops an action that is running; its end is to be reported, as cancelled."""
+        raise NotImplementedError("a world needs a method cancel(action)")
+
+    def wait(self, until: Fraction) -> tuple[Number, Sequence[Observation]]:
+        """Lets time pass until something is observed, but not beyond ``until``.
+
+        Returns what time it is then, and what has been observed.
+        """
+        raise NotImplementedError("a world needs a method wait(until)")
+
+    def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
+        """What is true of these now; nothing, if the world cannot look."""
+        return ()
+
+
+class AsyncWorld:
+    """A world whose methods are coroutines, for :meth:`elbowroom.Problem.run_async`."""
+
+    async def start(self, action: Action) -> None:
+        """As :meth:`World.start`."""
+        raise NotImplementedError("a world needs a coroutine start(action)")
+
+    async def cancel(self, action: Action) -> None:
+        """As :meth:`World.cancel`."""
+        raise NotImplementedError("a world needs a coroutine cancel(action)")
+
+    async def wait(self, until: Fraction) -> tuple[Number, Sequence[Observation]]:
+        """As :meth:`World.wait`."""
+        raise NotImplementedError("a world needs a coroutine wait(until)")
+
+    async def look(self, facts: Sequence[str], fluents: Sequence[str]) -> Sequence[Observation]:
+        """As :meth:`World.look`."""
+        return ()
+
+
+def passage(answer: tuple[Number, Sequence[Observation]]) -> str:
+    """The answer to a wait, as the native module reads it."""
+    try:
+        now, observations = answer
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"wait() must return what time it is and a list of observations, not {answer!r}"
+        ) from None
+    return json.dumps({"now": text(now), "observations": wire(observations)})
+
+
+class Adapter:
+    """Between the native module, which gives and takes texts, and a world."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._actions: dict[int, Action] = {}
+
+    def start(self, now: str, ticket: int, name: str, duration: str | None) -> None:
+        lasts = None if duration is None else Fraction(duration)
+        action = Action(ticket, name, lasts, Fraction(now))
+        self._actions[ticket] = action
+        self._world.start(action)
+
+    def cancel(self, _now: str, ticket: int) -> None:
+        self._world.cancel(self._actions[ticket])
+
+    def wait(self, until: str) -> str:
+        return passage(self._world.wait(Fraction(until)))
+
+    def look(self, facts: list[str], fluents: list[str]) -> str:
+        look = getattr(self._world, "look", None)
+        return json.dumps(wire(look(facts, fluents)) if look is not None else [])
+
+
+__all__ = [
+    "Action", "AsyncWorld", "Observation", "World", "ended", "exact", "fact", "started", "value",
+]  # fmt: skip

@@ -1,0 +1,205 @@
+//! Experiments, whole or in parts.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+use std::{fs, thread};
+use std::ops::ControlFlow;
+
+use elbowroom::answers::{Event, Halt, Watcher};
+use elbowroom::text::Source;
+use elbowroom_laboratory::answer::{AnyExperiment, CompareAnswer, CompareRequest, compare};
+use elbowroom_laboratory::compare::Part;
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+
+use crate::trouble::{Trouble, guarded};
+
+/// How often the interpreter is asked for signals, and progress is told.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// An experiment that has been read.
+#[pyclass(frozen, module = "elbowroom._native")]
+pub(crate) struct Experiment {
+    experiment: AnyExperiment,
+}
+
+/// The files that an experiment names, by these names; they are looked for in a folder.
+#[pyfunction]
+pub(crate) fn experiment_files(
+    py: Python<'_>,
+    name: String,
+    text: String,
+    folder: String,
+) -> PyResult<BTreeMap<String, String>> {
+    guarded(py, || {
+        let found = Mutex::new(BTreeMap::new());
+        let file = |name: &str| {
+            let path = Path::new(&folder).join(name);
+            let text = fs::read_to_string(&path)
+                .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+            let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+            found.insert(name.to_owned(), text.clone());
+            Ok(text)
+        };
+        AnyExperiment::read(&Source::new(name, text), &file)?;
+        Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
+    })
+}
+
+#[pymethods]
+impl Experiment {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        name: String,
+        text: String,
+        files: BTreeMap<String, String>,
+    ) -> PyResult<Self> {
+        guarded(py, || {
+            let file = |name: &str| {
+                let text = files.get(name).cloned();
+                text.ok_or_else(|| format!("the file {name} was not given with the experiment"))
+            };
+            let experiment = AnyExperiment::read(&Source::new(name, text), &file)?;
+            Ok(Self { experiment })
+        })
+    }
+
+    /// How many trials it asks for.
+    fn trials(&self) -> u64 {
+        self.experiment.trials()
+    }
+
+    /// Makes a part of the trials: the document as the command writes it, and whether it was ended
+    /// by Ctrl-C.
+    fn make(
+        &self,
+        py: Python<'_>,
+        trials: u64,
+        part: (u64, u64),
+        jobs: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, bool)> {
+        guarded(py, || {
+            let (shard, shards) = part;
+            if shard >= shards {
+                return Err(Trouble::Request(format!(
+                    "there is no part {shard} of {shards}; the parts are 0 to {}",
+                    shards.saturating_sub(1)
+                )));
+            }
+            let part = Part {
+                trials,
+                shard,
+                shards,
+                jobs,
+            };
+            let state = State::default();
+            let request = CompareRequest {
+                experiment: &self.experiment,
+                part,
+            };
+            // Signals are seen by the thread that Python started this in; the trials go on in
+            // others.
+            let (answer, raised) = thread::scope(|scope| {
+                let trials = scope.spawn(|| compare(request, &mut Shared(&state)));
+                let raised = state.heed(progress.as_ref(), || trials.is_finished());
+                let answer = trials.join();
+                (answer, raised)
+            });
+            let answer = answer.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+            match raised {
+                Some(error) => Err(error.into()),
+                None => Ok((document(&answer), answer.is_interrupted())),
+            }
+        })
+    }
+
+    /// Puts parts together.
+    fn merge(&self, py: Python<'_>, parts: Vec<String>) -> PyResult<String> {
+        guarded(py, || {
+            let parts = parts
+                .iter()
+                .map(|part| CompareAnswer::read(part, &self.experiment));
+            let parts: Vec<_> = parts.collect::<Result<_, _>>()?;
+            Ok(document(&CompareAnswer::merged(&parts)?))
+        })
+    }
+
+    /// The table of results: as CSV, as Markdown, and as text for people.
+    fn tables(&self, py: Python<'_>, results: &str) -> PyResult<(String, String, String)> {
+        guarded(py, || {
+            let answer = CompareAnswer::read(results, &self.experiment)?;
+            let table = answer.table(&self.experiment)?;
+            Ok((table.csv(), table.markdown(), table.within(100)))
+        })
+    }
+}
+
+/// As the command writes `results.json`.
+fn document(answer: &CompareAnswer) -> String {
+    format!("{:#}\n", answer.json())
+}
+
+/// How far the trials have come, and whether they are to end.
+#[derive(Default)]
+struct State {
+    done: AtomicU64,
+    of: AtomicU64,
+    is_to_end: AtomicBool,
+}
+
+impl State {
+    /// Until the trials are over, looks for signals and tells of progress.
+    fn heed(&self, progress: Option<&Py<PyAny>>, is_over: impl Fn() -> bool) -> Option<PyErr> {
+        let mut told = 0;
+        loop {
+            let over = is_over();
+            let done = self.done.load(Ordering::Relaxed);
+            let of = self.of.load(Ordering::Relaxed);
+            let heard = Python::attach(|py| {
+                py.check_signals()?;
+                match progress {
+                    Some(callback) if done > told => {
+                        told = done;
+                        callback.call1(py, ("trials", done, Some(of), "")).map(|_| ())
+                    }
+                    _ => Ok(()),
+                }
+            });
+            if let Err(error) = heard {
+                self.is_to_end.store(true, Ordering::Relaxed);
+                let is_interrupt =
+                    Python::attach(|py| error.is_instance_of::<PyKeyboardInterrupt>(py));
+                return if is_interrupt { None } else { Some(error) };
+            }
+            if over {
+                return None;
+            }
+            thread::park_timeout(GLANCE);
+        }
+    }
+}
+
+/// The watcher of the trials.
+struct Shared<'a>(&'a State);
+
+impl Watcher for Shared<'_> {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.0.is_to_end.load(Ordering::Relaxed) {
+            ControlFlow::Break(Halt::Cancelled)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        if let Event::Trials(progress) = event {
+            self.0.of.store(progress.of, Ordering::Relaxed);
+            self.0.done.store(progress.done, Ordering::Relaxed);
+        }
+    }
+}

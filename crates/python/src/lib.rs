@@ -1,0 +1,46 @@
+//! The native module of the Python package `elbowroom`.
+//!
+//! What goes in and comes out are texts: PDDL, plans, options as JSON, and the answers of
+//! [`elbowroom::answers`] as the JSON documents that `docs/formats` describes. The Python side
+//! (`crates/python/python/elbowroom`) makes objects of them, with exact fractions; it computes
+//! nothing that stands in an answer. So a question asked in Python has, byte for byte, the answer
+//! that the command gives.
+//!
+//! Whatever can take long releases the interpreter's lock, is heard of by a progress callback, and
+//! ends at Ctrl-C with what was found until then (`watch`). A panic in here becomes the exception
+//! `elbowroom.BugError` (`trouble`).
+
+mod campaign;
+mod planner;
+mod recorder;
+mod run;
+mod stepper;
+mod task;
+mod trouble;
+mod watch;
+mod world;
+
+use pyo3::prelude::*;
+
+/// The native module.
+#[pymodule(name = "_native")]
+mod native {
+    #[pymodule_export]
+    use crate::campaign::{Experiment, experiment_files};
+    #[pymodule_export]
+    use crate::run::{executors, run};
+    #[pymodule_export]
+    use crate::stepper::Stepper;
+    #[pymodule_export]
+    use crate::task::{Task, read};
+    #[pymodule_export]
+    use crate::trouble::panic_for_test;
+
+    use pyo3::prelude::*;
+
+    /// The version of the package.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,48 @@
+//! Keeps the trace of a run.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use elbowroom::execute::RunSpec;
+use elbowroom::execution::{Entry, Recorder};
+use elbowroom::model::Task;
+use elbowroom::report::trace::TraceWriter;
+
+use crate::trouble::Trouble;
+
+/// A trace as text: `docs/formats/trace.md`.
+#[derive(Clone)]
+pub(crate) struct Tape {
+    task: Arc<Task>,
+    text: Arc<Mutex<String>>,
+}
+
+impl Tape {
+    /// A trace that begins with what is run.
+    pub(crate) fn of(task: &Arc<Task>, spec: &RunSpec) -> Result<Self, Trouble> {
+        let mut text = String::new();
+        let mut sink = |line: &str| text.push_str(line);
+        let mut writer = TraceWriter::new(Arc::clone(task), &mut sink);
+        writer.header(spec).map_err(Trouble::request)?;
+        Ok(Self {
+            task: Arc::clone(task),
+            text: Arc::new(Mutex::new(text)),
+        })
+    }
+
+    /// What stands in it.
+    pub(crate) fn text(&self) -> String {
+        self.text
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+}
+
+impl Recorder for Tape {
+    fn record(&mut self, entry: &Entry<'_>) {
+        let mut locked = self.text.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = &mut *locked;
+        let mut sink = |line: &str| text.push_str(line);
+        TraceWriter::new(Arc::clone(&self.task), &mut sink).record(entry);
+    }
+}

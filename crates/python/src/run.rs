@@ -1,0 +1,151 @@
+//! Runs.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError};
+
+use elbowroom::answers::RunRequest;
+use elbowroom::answers::run::{RunOutcome, run as execute, simulate};
+use elbowroom::execute::{RunSpec, check_vary};
+use elbowroom::execution::NoRecord;
+use elbowroom::execution::executors::EXECUTORS;
+use elbowroom::model;
+use pyo3::prelude::*;
+use serde_json::{Map, Value};
+
+use crate::planner::{PyPlanner, Raised};
+use crate::recorder::Tape;
+use crate::task::{Task, read_options};
+use crate::trouble::{Trouble, guarded, json};
+use crate::watch::Watch;
+use crate::world::PyWorld;
+
+/// The executors: name, what the number after it means, summary, source.
+#[pyfunction]
+pub(crate) fn executors() -> Vec<(&'static str, Option<&'static str>, &'static str, &'static str)> {
+    let registered = EXECUTORS.iter();
+    registered
+        .map(|it| (it.name, it.argument, it.summary, it.paper))
+        .collect()
+}
+
+/// What came of a run: the document, the trace if one was kept, whether it was ended by Ctrl-C, and
+/// what the world or the planner has raised.
+type Outcome = (String, Option<String>, bool, Option<PyErr>);
+
+/// Executes a plan, in the world that the options describe or in one in Python.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a keyword argument in Python"
+)]
+pub(crate) fn run(
+    py: Python<'_>,
+    problem: &Task,
+    plan: Option<(String, String)>,
+    options: &str,
+    world: Option<Py<PyAny>>,
+    planner: Option<Py<PyAny>>,
+    has_trace: bool,
+    time_limit: Option<f64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(String, Option<String>, bool, Option<Py<PyAny>>)> {
+    let (answer, trace, is_interrupted, raised) = guarded(py, || {
+        let spec = problem.specification(options, plan.is_some())?;
+        let watch = Watch::start(time_limit, progress);
+        let raised = Raised::default();
+        let task = problem.with_epsilon_of(&spec);
+        let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
+        let mut request = RunRequest::new(&spec, &task).beginning_with(first);
+        if let Some(callable) = planner {
+            let planner = problem.asking(callable, watch.flag(), &raised);
+            request = request.planned_by(planner);
+        }
+        problem.executed(request, world, &raised, has_trace, watch)
+    })?;
+    let raised = raised.map(|error| error.into_value(py).into_any());
+    Ok((answer, trace, is_interrupted, raised))
+}
+
+impl Task {
+    /// A planner in Python.
+    pub(crate) fn asking(
+        &self,
+        callable: Py<PyAny>,
+        interrupted: Arc<AtomicBool>,
+        raised: &Raised,
+    ) -> PyPlanner {
+        PyPlanner {
+            callable,
+            domain: self.domain.clone(),
+            problem: self.problem.clone(),
+            interrupted,
+            raised: Arc::clone(raised),
+        }
+    }
+
+    fn executed(
+        &self,
+        request: RunRequest<'_>,
+        world: Option<Py<PyAny>>,
+        raised: &Raised,
+        has_trace: bool,
+        mut watch: Watch,
+    ) -> Result<Outcome, Trouble> {
+        let tape = if has_trace {
+            Some(Tape::of(request.task, request.spec)?)
+        } else {
+            None
+        };
+        let request = match tape.clone() {
+            Some(tape) => request.recorded_by(tape),
+            None => request.recorded_by(NoRecord),
+        };
+        let (outcome, by_world) = match world {
+            Some(adapter) => {
+                let mut world = PyWorld::new(adapter, &self.task, watch.flag());
+                let outcome = execute(request, &mut world, &mut watch)?;
+                (outcome, world.raised)
+            }
+            None => (simulate(request, &mut watch)?, None),
+        };
+        let RunOutcome { answer, .. } = outcome;
+        let by_planner = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let trace = tape.map(|tape| tape.text());
+        let is_interrupted = watch.ended()?;
+        Ok((
+            json(&answer),
+            trace,
+            is_interrupted,
+            by_world.or(by_planner),
+        ))
+    }
+
+    /// The run of this problem that differs from the usual one in what the options say.
+    pub(crate) fn specification(&self, options: &str, has_plan: bool) -> Result<RunSpec, Trouble> {
+        let usual = RunSpec {
+            has_plan,
+            epsilon: self.task.epsilon().clone(),
+            ..RunSpec::new((&self.domain).into(), (&self.problem).into())
+        };
+        let options: Map<String, Value> = read_options(options)?;
+        let Value::Object(mut members) =
+            serde_json::to_value(&usual).map_err(Trouble::request)?
+        else {
+            return Ok(usual);
+        };
+        members.extend(options);
+        let spec: RunSpec = serde_json::from_value(members.into()).map_err(Trouble::request)?;
+        check_vary(&self.task, &spec.vary).map_err(Trouble::request)?;
+        spec.check_planner()?;
+        Ok(spec)
+    }
+
+    /// The problem with the ε of the run.
+    pub(crate) fn with_epsilon_of(&self, spec: &RunSpec) -> Arc<model::Task> {
+        if *self.task.epsilon() == spec.epsilon {
+            return Arc::clone(&self.task);
+        }
+        let task = (*self.task).clone();
+        Arc::new(task.with_epsilon(spec.epsilon.clone()))
+    }
+}

@@ -1,0 +1,161 @@
+//! Runs that an event loop drives.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom::answers::RunAnswer;
+use elbowroom::execution::run::{Next, Run};
+use elbowroom::execution::{Command, WorldError};
+use elbowroom::model;
+use elbowroom::num::Rational;
+use pyo3::prelude::*;
+
+use crate::planner::Raised;
+use crate::recorder::Tape;
+use crate::task::Task;
+use crate::trouble::{Trouble, guarded, json};
+use crate::world::{names, read_observations, read_passage};
+
+/// A run, asked what it needs next, and told.
+#[pyclass(frozen, module = "elbowroom._native")]
+pub(crate) struct Stepper {
+    run: Mutex<Run<'static>>,
+    task: Arc<model::Task>,
+    tape: Option<Tape>,
+    raised: Raised,
+}
+
+/// What a run needs next: a kind, and what it is about.
+#[derive(IntoPyObject)]
+pub(crate) enum Needed {
+    Start(&'static str, String, u64, String, Option<String>),
+    Cancel(&'static str, String, u64),
+    Wait(&'static str, String),
+    Look(&'static str, Vec<String>, Vec<String>),
+    Over(&'static str, String, Option<String>),
+}
+
+/// Nobody looks at a clock: how long making a plan takes in the world is said in the options.
+const NO_CLOCK: &(dyn Fn() -> Rational + Sync) = &|| Rational::ZERO;
+/// An event loop that wants no more asks nothing more.
+const ALWAYS: &(dyn Fn() -> bool + Sync) = &|| true;
+
+#[pymethods]
+impl Stepper {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        problem: &Task,
+        plan: Option<(String, String)>,
+        options: &str,
+        planner: Option<Py<PyAny>>,
+        has_trace: bool,
+    ) -> PyResult<Self> {
+        guarded(py, || {
+            let spec = problem.specification(options, plan.is_some())?;
+            let task = problem.with_epsilon_of(&spec);
+            let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
+            let raised = Raised::default();
+            let mut execution = spec.execution(&task)?.beginning_with(first).explaining();
+            execution = match planner {
+                Some(callable) => {
+                    let flag = Arc::new(AtomicBool::new(false));
+                    execution.planned_by(problem.asking(callable, flag, &raised))
+                }
+                None => {
+                    let model = spec.model(task.problem());
+                    let model = model.map_err(elbowroom::execute::SpecError::World)?;
+                    execution.planned_by(spec.planner_for(model.as_ref(), NO_CLOCK, ALWAYS)?)
+                }
+            };
+            let tape = if has_trace {
+                Some(Tape::of(&task, &spec)?)
+            } else {
+                None
+            };
+            if let Some(tape) = &tape {
+                execution = execution.recorded_by(tape.clone());
+            }
+            Ok(Self {
+                run: Mutex::new(execution.run()),
+                task,
+                tape,
+                raised,
+            })
+        })
+    }
+
+    /// What the run needs next.
+    fn next(&self, py: Python<'_>) -> PyResult<Needed> {
+        guarded(py, || {
+            let mut run = self.run();
+            let next = run.next();
+            if let Some(error) = self
+                .raised
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .take()
+            {
+                return Err(Trouble::Python(error));
+            }
+            let now = run.now().to_string();
+            Ok(match next {
+                Next::Command(Command::Start {
+                    ticket,
+                    action,
+                    duration,
+                }) => {
+                    let duration = duration.as_ref().map(ToString::to_string);
+                    Needed::Start("start", now, ticket.0, action.name.clone(), duration)
+                }
+                Next::Command(Command::Cancel { ticket }) => {
+                    Needed::Cancel("cancel", now, ticket.0)
+                }
+                Next::Wait { until } => Needed::Wait("wait", until.to_string()),
+                Next::Look { facts, fluents } => {
+                    let (facts, fluents) = names(&self.task, &facts, &fluents);
+                    Needed::Look("look", facts, fluents)
+                }
+                Next::Over(report) => {
+                    let trace = self.tape.as_ref().map(Tape::text);
+                    Needed::Over("over", json(&RunAnswer::of(&report)), trace)
+                }
+            })
+        })
+    }
+
+    /// Time has passed, and this was observed.
+    fn observe(&self, py: Python<'_>, passage: &str) -> PyResult<()> {
+        guarded(py, || {
+            let passage = read_passage(passage, &self.task).map_err(Trouble::request)?;
+            self.run().observe(passage).map_err(Trouble::request)
+        })
+    }
+
+    /// This was seen.
+    fn see(&self, py: Python<'_>, observations: &str) -> PyResult<()> {
+        guarded(py, || {
+            let seen = read_observations(observations, &self.task).map_err(Trouble::request)?;
+            self.run().see(seen).map_err(Trouble::request)
+        })
+    }
+
+    /// The world has failed.
+    fn fail(&self, py: Python<'_>, why: &str) -> PyResult<()> {
+        guarded(py, || {
+            self.run().fail(WorldError::new(why));
+            Ok(())
+        })
+    }
+
+    /// What time it is, by the world's clock.
+    fn now(&self) -> String {
+        self.run().now().to_string()
+    }
+}
+
+impl Stepper {
+    fn run(&self) -> MutexGuard<'_, Run<'static>> {
+        self.run.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

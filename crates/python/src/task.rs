@@ -1,0 +1,321 @@
+//! Problems, and the questions about them that need no execution.
+
+use std::sync::Arc;
+
+use elbowroom::answers::check::CheckRequest;
+use elbowroom::answers::envelope::{EnvelopeRequest, Search};
+use elbowroom::answers::plan::{self, PlanRequest};
+use elbowroom::answers::stn::StnRequest;
+use elbowroom::answers::{self, Exact};
+use elbowroom::envelope::{Growth, Guarantee, Method};
+use elbowroom::external::Planner;
+use elbowroom::model::validate::Settings;
+use elbowroom::model::{self, TimeTriggeredPlan};
+use elbowroom::plan::format;
+use elbowroom::plan::parametrize::VarySpec;
+use elbowroom::text::Source;
+use elbowroom::{AnyPlan, PlanKind, graph, pddl};
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::trouble::{Trouble, guarded, json, number, positive};
+use crate::watch::Watch;
+
+/// A problem, and the texts that it was read from.
+#[pyclass(frozen, module = "elbowroom._native")]
+pub(crate) struct Task {
+    pub(crate) task: Arc<model::Task>,
+    pub(crate) domain: Source,
+    pub(crate) problem: Source,
+}
+
+/// Reads a domain and a problem, each a name for messages and a text; also the warnings, as records.
+#[pyfunction]
+pub(crate) fn read(
+    py: Python<'_>,
+    domain: (String, String),
+    problem: (String, String),
+    epsilon: &str,
+) -> PyResult<(Task, String)> {
+    guarded(py, || {
+        let domain = Source::new(domain.0, domain.1);
+        let problem = Source::new(problem.0, problem.1);
+        let epsilon = positive(epsilon, "epsilon")?;
+        let (read, warnings) = pddl::read_problem(&domain, &problem)?;
+        let warnings: Vec<_> = warnings.iter().map(pddl::Diagnostic::record).collect();
+        let task = Arc::new(model::Task::new(read).with_epsilon(epsilon));
+        let task = Task {
+            task,
+            domain,
+            problem,
+        };
+        Ok((task, json(&warnings)))
+    })
+}
+
+/// What can be said about a check, as JSON.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct CheckOptions {
+    tolerance: Option<String>,
+    rules: Rules,
+}
+
+/// By whose reading of the semantics to judge.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Rules {
+    /// PDDL 2.1, with ε.
+    #[default]
+    Pddl,
+    /// PDDL 2.1 with ε, and the goal after all timed initials.
+    PddlLaterTimed,
+    /// What unified-planning does where a problem has no ε.
+    UnifiedPlanning,
+}
+
+/// What can be said about an envelope, as JSON.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct EnvelopeOptions {
+    vary: Vec<String>,
+    guarantee: Guarantee,
+    method: Method,
+    precision: Option<String>,
+    growth: Growth,
+    sharpen: bool,
+    enforce: bool,
+    contains: Option<String>,
+    most_checks: Option<usize>,
+}
+
+impl Default for EnvelopeOptions {
+    fn default() -> Self {
+        let search = Search::default();
+        Self {
+            vary: Vec::new(),
+            guarantee: Guarantee::default(),
+            method: search.method,
+            precision: None,
+            growth: search.growth,
+            sharpen: search.sharpen,
+            enforce: false,
+            contains: None,
+            most_checks: search.most_checks,
+        }
+    }
+}
+
+/// When a plan is done, which the document does not have.
+#[derive(Serialize)]
+struct Makespans {
+    nominal: Exact,
+    at_lower: Option<Exact>,
+    at_upper: Option<Exact>,
+}
+
+#[pymethods]
+impl Task {
+    /// The names of the domain and the problem.
+    fn names(&self) -> (String, String) {
+        let problem = self.task.problem();
+        (problem.domain.clone(), problem.name.clone())
+    }
+
+    /// The texts of the domain and the problem, each with its name.
+    fn texts(&self) -> [(String, String); 2] {
+        [&self.domain, &self.problem]
+            .map(|source| (source.name().to_owned(), source.text().to_owned()))
+    }
+
+    /// Whether a plan is valid: a document.
+    fn check(&self, py: Python<'_>, plan: (String, String), options: &str) -> PyResult<String> {
+        guarded(py, || {
+            let options: CheckOptions = read_options(options)?;
+            let settings = match (&options.tolerance, options.rules) {
+                (Some(tolerance), _) => Settings::like_val(number(tolerance, "tolerance")?),
+                (None, Rules::Pddl) => Settings::default(),
+                (None, Rules::PddlLaterTimed) => Settings {
+                    counts_later_timed: true,
+                    ..Settings::default()
+                },
+                (None, Rules::UnifiedPlanning) => Settings::like_unified_planning(),
+            };
+            let name = plan.0.clone();
+            let plan = self.time_triggered(plan)?;
+            let request = CheckRequest {
+                task: &self.task,
+                plan: Some(&plan),
+                name,
+                settings,
+            };
+            Ok(json(&answers::check::check(&request)?))
+        })
+    }
+
+    /// A plan's steps, and whether it is a plan with fixed times: (start, action, duration).
+    fn steps(
+        &self,
+        py: Python<'_>,
+        plan: (String, String),
+    ) -> PyResult<Option<Vec<(String, String, Option<String>)>>> {
+        guarded(py, || {
+            let AnyPlan::TimeTriggered(plan) = self.any_plan(plan)? else {
+                return Ok(None);
+            };
+            let steps = plan.steps.iter().map(|step| {
+                let duration = step.duration.as_ref().map(ToString::to_string);
+                (step.start.to_string(), step.action.name.clone(), duration)
+            });
+            Ok(Some(steps.collect()))
+        })
+    }
+
+    /// A plan: a document, and whether the search was ended by Ctrl-C.
+    #[pyo3(signature = (planner, time_limit, first, memory, progress))]
+    fn plan(
+        &self,
+        py: Python<'_>,
+        planner: &str,
+        time_limit: Option<f64>,
+        first: bool,
+        memory: Option<u64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, bool)> {
+        guarded(py, || {
+            let mut watch = Watch::start(time_limit, progress);
+            let limit = time_limit.map(std::time::Duration::try_from_secs_f64);
+            let limit = limit.transpose().map_err(Trouble::request)?;
+            let mut request = PlanRequest {
+                task: &self.task,
+                first_plan_only: first,
+                most_memory: memory,
+            };
+            let outcome = if planner.eq_ignore_ascii_case(plan::EMBEDDED) {
+                plan::plan(&mut request, &mut watch)?
+            } else {
+                let planner = Planner::named(planner)
+                    .map_err(|error| Trouble::Planner(error.to_string()))?;
+                let sources = [&self.domain, &self.problem];
+                plan::plan_with(&planner, &mut request, sources, limit, &mut watch)?
+            };
+            Ok((json(&outcome.answer), watch.ended()?))
+        })
+    }
+
+    /// A plan as a network: a document, its STN plan file, and its drawing for Graphviz.
+    fn stn(
+        &self,
+        py: Python<'_>,
+        plan: (String, String),
+    ) -> PyResult<(String, Option<String>, Option<String>)> {
+        guarded(py, || {
+            let request = StnRequest {
+                task: &self.task,
+                plan: self.any_plan(plan)?,
+            };
+            let outcome = answers::stn::stn(&request)?;
+            let text = match &outcome.plan {
+                Some(plan) => Some(format::write(&self.task, plan).map_err(Trouble::request)?),
+                None => None,
+            };
+            let plan = outcome.plan.as_ref();
+            let dot = plan.map(|plan| graph::to_dot(&self.task, plan));
+            Ok((json(&outcome.answer), text, dot))
+        })
+    }
+
+    /// An envelope: a document, when the plan is done in it, and whether the search was ended by
+    /// Ctrl-C.
+    fn envelope(
+        &self,
+        py: Python<'_>,
+        plan: (String, String),
+        options: &str,
+        time_limit: Option<f64>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(String, Option<String>, bool)> {
+        guarded(py, || {
+            let options: EnvelopeOptions = read_options(options)?;
+            let mut watch = Watch::start(time_limit, progress);
+            let name = plan.0.clone();
+            let search = Search::default();
+            let request = EnvelopeRequest {
+                name,
+                vary: specifications(&options.vary)?,
+                guarantee: options.guarantee,
+                enforce: options.enforce,
+                contains: options.contains,
+                search: Search {
+                    method: options.method,
+                    precision: match &options.precision {
+                        Some(precision) => positive(precision, "precision")?,
+                        None => search.precision.clone(),
+                    },
+                    growth: options.growth,
+                    sharpen: options.sharpen,
+                    most_checks: options.most_checks,
+                },
+                ..EnvelopeRequest::new(&self.task, self.any_plan(plan)?)
+            };
+            let outcome = answers::envelope::envelope(&request, &mut watch)?;
+            let makespans = match &outcome.answer.finding {
+                answers::envelope::EnvelopeFinding::Envelope { makespans, .. } => {
+                    makespans.as_ref().map(|makespans| {
+                        json(&Makespans {
+                            nominal: Exact(makespans.nominal.clone()),
+                            at_lower: makespans.at_lower.clone().map(Exact),
+                            at_upper: makespans.at_upper.clone().map(Exact),
+                        })
+                    })
+                }
+                _ => None,
+            };
+            Ok((json(&outcome.answer), makespans, watch.ended()?))
+        })
+    }
+}
+
+impl Task {
+    /// A plan of either kind, told by its content or a name that ends in `.stn`.
+    fn any_plan(&self, (name, text): (String, String)) -> Result<AnyPlan, Trouble> {
+        let is_stn_name = name.to_ascii_lowercase().ends_with(".stn");
+        let source = Source::new(name, text);
+        if is_stn_name || PlanKind::of_text(source.text()) == PlanKind::Stn {
+            return Ok(format::read(&source, &self.task)?.into());
+        }
+        let (plan, _warnings) = pddl::read_plan(&source, &self.task)?;
+        Ok(plan.into())
+    }
+
+    /// A plan with fixed times.
+    pub(crate) fn time_triggered(
+        &self,
+        plan: (String, String),
+    ) -> Result<TimeTriggeredPlan, Trouble> {
+        let name = plan.0.clone();
+        match self.any_plan(plan)? {
+            AnyPlan::TimeTriggered(plan) => Ok(plan),
+            AnyPlan::Stn(_) => Err(Trouble::Request(format!(
+                "{name} is an STN plan, which stands for many plans; give a plan with fixed times, \
+                 or ask for the envelope of this one"
+            ))),
+        }
+    }
+}
+
+/// What to leave open.
+fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
+    let specs = texts.iter().map(|text| text.parse::<VarySpec>());
+    specs.collect::<Result<_, _>>().map_err(Trouble::request)
+}
+
+/// Options, as JSON.
+pub(crate) fn read_options<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, Trouble> {
+    serde_json::from_str(text).map_err(|error| {
+        // Where it stands in a text that the user never wrote is of no use.
+        let message = error.to_string();
+        let end = message.rfind(" at line ").unwrap_or(message.len());
+        Trouble::Request(message[..end].to_owned())
+    })
+}

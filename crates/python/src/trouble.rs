@@ -1,0 +1,161 @@
+//! What goes wrong, as exceptions of the Python package.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use elbowroom::answers::RequestError;
+use elbowroom::answers::plan::PlannerFailure;
+use elbowroom::execute::SpecError;
+use elbowroom::num::Rational;
+use elbowroom::text::Diagnostics;
+use elbowroom_laboratory::answer::CompareError;
+use pyo3::prelude::*;
+
+/// Why there is no answer.
+pub(crate) enum Trouble {
+    /// A text cannot be read.
+    Read(Diagnostics),
+    /// The request cannot be understood, or the answer is beyond what can be analysed.
+    Request(String),
+    /// The problem needs what the planner does not support.
+    Unsupported(String),
+    /// The judge cannot tell.
+    Undecided(String),
+    /// A planner could not be run.
+    Planner(String),
+    /// Something in Python has failed, which says so itself.
+    Python(PyErr),
+}
+
+impl Trouble {
+    pub(crate) fn request(message: impl ToString) -> Self {
+        Self::Request(message.to_string())
+    }
+
+    /// As an exception of the module `elbowroom._errors`.
+    pub(crate) fn raised(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Read(diagnostics) => {
+                let records = json(&diagnostics.records());
+                exception(py, "ReadError", (diagnostics.to_string(), records))
+            }
+            Self::Request(message) => exception(py, "RequestError", (message,)),
+            Self::Unsupported(message) => exception(py, "UnsupportedError", (message,)),
+            Self::Undecided(message) => exception(py, "UndecidedError", (message,)),
+            Self::Planner(message) => exception(py, "PlannerError", (message,)),
+            Self::Python(error) => error,
+        }
+    }
+}
+
+impl From<Diagnostics> for Trouble {
+    fn from(diagnostics: Diagnostics) -> Self {
+        Self::Read(diagnostics)
+    }
+}
+
+impl From<RequestError> for Trouble {
+    fn from(error: RequestError) -> Self {
+        match error {
+            RequestError::Undecided(why) => Self::Undecided(why),
+            RequestError::Unsupported(what) => Self::Unsupported(what),
+            other => Self::request(other),
+        }
+    }
+}
+
+impl From<PlannerFailure> for Trouble {
+    fn from(failure: PlannerFailure) -> Self {
+        Self::Planner(failure.to_string())
+    }
+}
+
+impl From<SpecError> for Trouble {
+    fn from(error: SpecError) -> Self {
+        match error {
+            SpecError::World(wrong) | SpecError::Likelihoods(wrong) => Self::Read(wrong),
+            SpecError::Planner(wrong) => Self::Planner(wrong.to_string()),
+            other => Self::request(other),
+        }
+    }
+}
+
+impl From<CompareError> for Trouble {
+    fn from(error: CompareError) -> Self {
+        match error {
+            CompareError::Text(diagnostics) => Self::Read(diagnostics),
+            other => Self::request(other),
+        }
+    }
+}
+
+impl From<PyErr> for Trouble {
+    fn from(error: PyErr) -> Self {
+        Self::Python(error)
+    }
+}
+
+/// Does something without the interpreter's lock. What goes wrong is raised; a panic is a bug, and
+/// says so.
+pub(crate) fn guarded<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, Trouble> + Send,
+) -> PyResult<T> {
+    match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(trouble)) => Err(trouble.raised(py)),
+        Err(panic) => Err(bug(py, panic.as_ref())),
+    }
+}
+
+/// The exception about a panic.
+fn bug(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+    let said = panic
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or_else(|| panic.downcast_ref::<&str>().copied());
+    exception(
+        py,
+        "BugError",
+        (said.unwrap_or("it says nothing").to_owned(),),
+    )
+}
+
+fn exception<'py, A>(py: Python<'py>, name: &str, arguments: A) -> PyErr
+where
+    A: pyo3::call::PyCallArgs<'py>,
+{
+    let made = py
+        .import("elbowroom._errors")
+        .and_then(|module| module.getattr(name))
+        .and_then(|class| class.call1(arguments));
+    made.map_or_else(|error| error, PyErr::from_value)
+}
+
+/// A document.
+pub(crate) fn json(document: &impl serde::Serialize) -> String {
+    serde_json::to_string(document).expect("documents have texts as keys")
+}
+
+/// A number, in any form that Python code writes it in.
+pub(crate) fn number(text: &str, what: &str) -> Result<Rational, Trouble> {
+    text.parse()
+        .map_err(|error| Trouble::Request(format!("`{what}`: {error}")))
+}
+
+/// A positive number.
+pub(crate) fn positive(text: &str, what: &str) -> Result<Rational, Trouble> {
+    let number = number(text, what)?;
+    if number.is_positive() {
+        Ok(number)
+    } else {
+        let message = format!("`{what}` is {number}; it must be greater than 0");
+        Err(Trouble::Request(message))
+    }
+}
+
+/// Panics, so that the tests can see what becomes of that.
+#[pyfunction(name = "_panic_for_test")]
+pub(crate) fn panic_for_test(py: Python<'_>) -> PyResult<()> {
+    guarded(py, || panic!("a test wants to see a panic"))
+}

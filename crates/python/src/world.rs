@@ -1,0 +1,157 @@
+//! Worlds in Python behind the port of [`elbowroom::execution`].
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use elbowroom::execution::{Command, Observation, Passage, World, WorldError};
+use elbowroom::model::Task;
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::num::Rational;
+use elbowroom::report::wire;
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use serde_json::Value;
+
+/// A world whose Python side (`elbowroom._world`) gets and gives the messages of
+/// `docs/formats/world-protocol.md`.
+pub(crate) struct PyWorld {
+    adapter: Py<PyAny>,
+    task: Arc<Task>,
+    now: Rational,
+    interrupted: Arc<AtomicBool>,
+    /// What the world has raised.
+    pub(crate) raised: Option<PyErr>,
+}
+
+impl PyWorld {
+    /// A world that tells by `interrupted` of Ctrl-C.
+    pub(crate) fn new(
+        adapter: Py<PyAny>,
+        task: &Arc<Task>,
+        interrupted: Arc<AtomicBool>,
+    ) -> Self {
+        Self {
+            adapter,
+            task: Arc::clone(task),
+            now: Rational::ZERO,
+            interrupted,
+            raised: None,
+        }
+    }
+
+    /// Calls the Python side; `None` at Ctrl-C.
+    fn call<'py, A, T>(
+        &mut self,
+        py: Python<'py>,
+        method: &str,
+        arguments: A,
+        take: impl FnOnce(Bound<'py, PyAny>) -> PyResult<T>,
+    ) -> Result<Option<T>, WorldError>
+    where
+        A: pyo3::call::PyCallArgs<'py>,
+    {
+        let answered = self
+            .adapter
+            .bind(py)
+            .call_method1(method, arguments)
+            .and_then(take);
+        match answered {
+            Ok(value) => Ok(Some(value)),
+            Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
+                self.interrupted.store(true, Ordering::Relaxed);
+                Ok(None)
+            }
+            Err(error) => {
+                let message = error.to_string();
+                self.raised = Some(error);
+                Err(WorldError::new(message))
+            }
+        }
+    }
+}
+
+impl World for PyWorld {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        Python::attach(|py| {
+            let now = now.to_string();
+            let done = match command {
+                Command::Start {
+                    ticket,
+                    action,
+                    duration,
+                } => {
+                    let duration = duration.as_ref().map(ToString::to_string);
+                    let told = (now, ticket.0, action.name.as_str(), duration);
+                    self.call(py, "start", told, |_| Ok(()))
+                }
+                Command::Cancel { ticket } => self.call(py, "cancel", (now, ticket.0), |_| Ok(())),
+            };
+            done.map(|_| ())
+        })
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let answered = Python::attach(|py| {
+            self.call(py, "wait", (until.to_string(),), |it| it.extract::<String>())
+        })?;
+        let Some(text) = answered else {
+            let now = self.now.clone();
+            let observations = Vec::new();
+            return Ok(Passage { now, observations });
+        };
+        let passage = read_passage(&text, &self.task)?;
+        self.now = passage.now.clone();
+        Ok(passage)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        let (facts, fluents) = names(&self.task, facts, fluents);
+        let answered = Python::attach(|py| {
+            self.call(py, "look", (facts, fluents), |it| it.extract::<String>())
+        })?;
+        match answered {
+            Some(text) => read_observations(&text, &self.task),
+            None => Ok(Vec::new()),
+        }
+    }
+}
+
+/// What a look is at, in words.
+pub(crate) fn names(
+    task: &Task,
+    facts: &[FactId],
+    fluents: &[FluentId],
+) -> (Vec<String>, Vec<String>) {
+    let facts = facts.iter().map(|&fact| task.fact_name(fact));
+    let fluents = fluents.iter().map(|&fluent| task.fluent_name(fluent));
+    (facts.collect(), fluents.collect())
+}
+
+/// The answer to a wait: `{"now": …, "observations": […]}`.
+pub(crate) fn read_passage(text: &str, task: &Task) -> Result<Passage, WorldError> {
+    let message = read(text)?;
+    let now = wire::field_number(&message, "now").map_err(|error| WorldError::new(error.message))?;
+    let observations = listed(message.get("observations"), task)?;
+    Ok(Passage { now, observations })
+}
+
+/// The answer to a look: a list of observations.
+pub(crate) fn read_observations(text: &str, task: &Task) -> Result<Vec<Observation>, WorldError> {
+    listed(Some(&read(text)?), task)
+}
+
+fn read(text: &str) -> Result<Value, WorldError> {
+    serde_json::from_str(text).map_err(|error| WorldError::new(error.to_string()))
+}
+
+fn listed(list: Option<&Value>, task: &Task) -> Result<Vec<Observation>, WorldError> {
+    let list = list.and_then(Value::as_array);
+    let list = list.ok_or_else(|| WorldError::new("the observations must be a list"))?;
+    let read = |it| wire::read_observation(it, task);
+    let read: Result<Vec<_>, _> = list.iter().map(read).collect();
+    read.map_err(|error| WorldError::new(error.message))
+}

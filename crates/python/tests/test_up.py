@@ -1,0 +1,150 @@
+"""unified-planning: its own test cases as a conformance suite."""
+
+from __future__ import annotations
+
+import warnings
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+up = pytest.importorskip("unified_planning")
+warnings.filterwarnings("ignore")
+
+import elbowroom  # noqa: E402
+import elbowroom.up  # noqa: E402
+from unified_planning.engines import PlanGenerationResultStatus as Status  # noqa: E402
+from unified_planning.engines import ValidationResultStatus  # noqa: E402
+from unified_planning.model import Problem  # noqa: E402
+from unified_planning.plans import PlanKind  # noqa: E402
+from unified_planning.shortcuts import OneshotPlanner, PlanValidator  # noqa: E402
+from unified_planning.test.examples import get_example_problems  # noqa: E402
+
+up.shortcuts.get_environment().credits_stream = None
+CASES: dict[str, Any] = get_example_problems()
+
+
+def supported(engine: Any, case: Any) -> bool:
+    return isinstance(case.problem, Problem) and engine.supports(case.problem.kind)
+
+
+JUDGED = [
+    (name, case, plan, expected)
+    for name, case in CASES.items()
+    if supported(elbowroom.up.ElbowroomValidator, case)
+    for expected, plans in ((True, case.valid_plans), (False, case.invalid_plans))
+    for plan in plans
+    if elbowroom.up.ElbowroomValidator.supports_plan(plan.kind)
+]
+SOLVED = [name for name, case in CASES.items() if supported(elbowroom.up.ElbowroomPlanner, case)]
+
+
+def test_there_are_cases() -> None:
+    assert len(JUDGED) >= 60 and len(SOLVED) >= 40
+
+
+@pytest.mark.parametrize(
+    ("name", "case", "plan", "expected"), JUDGED, ids=[f"{it[0]}-{i}" for i, it in enumerate(JUDGED)]
+)
+def test_plans_are_judged_as_the_case_says(name: str, case: Any, plan: Any, expected: bool) -> None:
+    with PlanValidator(name="elbowroom-val") as validator:
+        result = validator.validate(case.problem, plan)
+    found = result.status == ValidationResultStatus.VALID
+    assert found == expected, result.log_messages
+
+
+@pytest.mark.parametrize("name", SOLVED)
+def test_a_case_is_solved_and_the_plan_is_valid(name: str) -> None:
+    case = CASES[name]
+    with OneshotPlanner(name="elbowroom") as planner:
+        result = planner.solve(case.problem, timeout=20)
+    if not case.solvable:
+        assert result.status in (Status.UNSOLVABLE_PROVEN, Status.UNSOLVABLE_INCOMPLETELY)
+        return
+    assert result.status == Status.SOLVED_SATISFICING, result.log_messages
+    with PlanValidator(name="elbowroom-val") as validator:
+        assert validator.validate(case.problem, result.plan)
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - set(SOLVED)))
+def test_what_is_not_supported_is_refused_by_name(name: str) -> None:
+    problem = CASES[name].problem
+    with pytest.raises(elbowroom.UnsupportedError, match="support"):
+        elbowroom.up.Translation(problem)
+
+
+def test_the_engines_are_there() -> None:
+    engines = up.shortcuts.get_environment().factory.engines
+    assert {"elbowroom", "elbowroom-val", "replanner[elbowroom]"} <= set(engines) | {
+        f"replanner[{name}]" for name in engines
+    }
+
+
+def temporal() -> Any:
+    return CASES["matchcellar"]
+
+
+def test_an_envelope_of_a_problem_and_a_plan() -> None:
+    case = temporal()
+    envelope = elbowroom.envelope(case.problem, case.valid_plans[0])
+    assert envelope.answer == "envelope" and envelope.rows()
+
+
+def test_a_network_has_the_plan_among_its_schedules() -> None:
+    case = temporal()
+    stn = elbowroom.up.to_stn(case.problem, case.valid_plans[0])
+    assert stn.kind == PlanKind.STN_PLAN and stn.is_consistent
+    again = stn.convert_to(PlanKind.TIME_TRIGGERED_PLAN, case.problem)
+    with PlanValidator(name="elbowroom-val") as validator:
+        assert validator.validate(case.problem, again)
+
+
+def test_a_plan_is_executed() -> None:
+    case = temporal()
+    assert elbowroom.up.execute(case.problem, case.valid_plans[0]).verdict == "goal-reached"
+
+
+def test_a_third_is_a_third() -> None:
+    problem = up.shortcuts.Problem("thirds")
+    done = problem.add_fluent("done", default_initial_value=False)
+    wait = up.shortcuts.DurativeAction("wait")
+    wait.set_fixed_duration(Fraction(1, 3))
+    wait.add_effect(up.shortcuts.EndTiming(), done, True)
+    problem.add_action(wait)
+    problem.add_goal(done)
+    with OneshotPlanner(name="elbowroom") as planner:
+        result = planner.solve(problem)
+    assert result.plan.timed_actions[0][2] == Fraction(1, 3)
+
+
+def test_names_that_pddl_does_not_know_come_back() -> None:
+    problem = up.shortcuts.Problem("names")
+    of = up.shortcuts.UserType("object")
+    problem.add_object("Täg 1", of)
+    problem.add_object("täg 1", of)
+    and_ = problem.add_fluent("and", default_initial_value=False, x=of)
+    action = up.shortcuts.InstantaneousAction("at", when=of)
+    action.add_effect(and_(action.when), True)
+    problem.add_action(action)
+    problem.add_goal(and_(problem.object("täg 1")))
+    with OneshotPlanner(name="elbowroom") as planner:
+        plan = planner.solve(problem).plan
+    assert str(plan.actions[0]) == "at(täg 1)"
+
+
+def test_the_goal_is_protected_until_after_all_timed_effects() -> None:
+    case = CASES["basic_tils"] if "basic_tils" in CASES else None
+    problem = up.shortcuts.Problem("thrown_out")
+    kept = problem.add_fluent("kept", default_initial_value=False)
+    put = up.shortcuts.DurativeAction("put")
+    put.set_closed_duration_interval(1, 20)
+    put.add_effect(up.shortcuts.EndTiming(), kept, True)
+    problem.add_action(put)
+    problem.add_timed_effect(up.shortcuts.GlobalStartTiming(10), kept, False)
+    problem.add_goal(kept)
+    with OneshotPlanner(name="elbowroom") as planner, PlanValidator(name="elbowroom-val") as judge:
+        plan = planner.solve(problem).plan
+        assert judge.validate(problem, plan)
+        start, _, duration = plan.timed_actions[0]
+        assert start + duration > 10
+    assert case is None or case.problem.timed_effects
