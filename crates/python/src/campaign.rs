@@ -1,12 +1,12 @@
 //! Experiments, whole or in parts.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use std::{fs, thread};
-use std::ops::ControlFlow;
 
 use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::text::Source;
@@ -165,7 +165,9 @@ impl State {
                 match progress {
                     Some(callback) if done > told => {
                         told = done;
-                        callback.call1(py, ("trials", done, Some(of), "")).map(|_| ())
+                        callback
+                            .call1(py, ("trials", done, Some(of), ""))
+                            .map(|_| ())
                     }
                     _ => Ok(()),
                 }

@@ -46,8 +46,7 @@ impl PyPlanner {
                     if error.is_instance_of::<PyKeyboardInterrupt>(py) {
                         self.interrupted.store(true, Ordering::Relaxed);
                     } else {
-                        let mut raised =
-                            self.raised.lock().unwrap_or_else(PoisonError::into_inner);
+                        let mut raised = self.raised.lock().unwrap_or_else(PoisonError::into_inner);
                         raised.get_or_insert(error);
                     }
                     Err(why)
@@ -65,9 +64,9 @@ impl PyPlanner {
         match validate::validate_from(task, situation, &plan, &Settings::default()) {
             Verdict::Valid(_) => Ok(PlanAnswer::Plan(plan)),
             Verdict::Invalid(wrong) => Err(format!("the planner's plan does not work: {wrong}")),
-            Verdict::Undecided(why) => {
-                Err(format!("cannot tell whether the planner's plan works: {why}"))
-            }
+            Verdict::Undecided(why) => Err(format!(
+                "cannot tell whether the planner's plan works: {why}"
+            )),
         }
     }
 }

@@ -21,7 +21,12 @@ use crate::world::PyWorld;
 
 /// The executors: name, what the number after it means, summary, source.
 #[pyfunction]
-pub(crate) fn executors() -> Vec<(&'static str, Option<&'static str>, &'static str, &'static str)> {
+pub(crate) fn executors() -> Vec<(
+    &'static str,
+    Option<&'static str>,
+    &'static str,
+    &'static str,
+)> {
     let registered = EXECUTORS.iter();
     registered
         .map(|it| (it.name, it.argument, it.summary, it.paper))
@@ -128,8 +133,7 @@ impl Task {
             ..RunSpec::new((&self.domain).into(), (&self.problem).into())
         };
         let options: Map<String, Value> = read_options(options)?;
-        let Value::Object(mut members) =
-            serde_json::to_value(&usual).map_err(Trouble::request)?
+        let Value::Object(mut members) = serde_json::to_value(&usual).map_err(Trouble::request)?
         else {
             return Ok(usual);
         };

@@ -194,8 +194,8 @@ impl Task {
             let outcome = if planner.eq_ignore_ascii_case(plan::EMBEDDED) {
                 plan::plan(&mut request, &mut watch)?
             } else {
-                let planner = Planner::named(planner)
-                    .map_err(|error| Trouble::Planner(error.to_string()))?;
+                let planner =
+                    Planner::named(planner).map_err(|error| Trouble::Planner(error.to_string()))?;
                 let sources = [&self.domain, &self.problem];
                 plan::plan_with(&planner, &mut request, sources, limit, &mut watch)?
             };

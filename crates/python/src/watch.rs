@@ -109,7 +109,8 @@ impl Watcher for Watch {
                 });
             }
         }
-        self.halt.map_or(ControlFlow::Continue(()), ControlFlow::Break)
+        self.halt
+            .map_or(ControlFlow::Continue(()), ControlFlow::Break)
     }
 
     fn notice(&mut self, event: &Event<'_>) {

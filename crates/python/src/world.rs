@@ -25,11 +25,7 @@ pub(crate) struct PyWorld {
 
 impl PyWorld {
     /// A world that tells by `interrupted` of Ctrl-C.
-    pub(crate) fn new(
-        adapter: Py<PyAny>,
-        task: &Arc<Task>,
-        interrupted: Arc<AtomicBool>,
-    ) -> Self {
+    pub(crate) fn new(adapter: Py<PyAny>, task: &Arc<Task>, interrupted: Arc<AtomicBool>) -> Self {
         Self {
             adapter,
             task: Arc::clone(task),
@@ -92,7 +88,9 @@ impl World for PyWorld {
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
         let answered = Python::attach(|py| {
-            self.call(py, "wait", (until.to_string(),), |it| it.extract::<String>())
+            self.call(py, "wait", (until.to_string(),), |it| {
+                it.extract::<String>()
+            })
         })?;
         let Some(text) = answered else {
             let now = self.now.clone();
@@ -134,7 +132,8 @@ pub(crate) fn names(
 /// The answer to a wait: `{"now": …, "observations": […]}`.
 pub(crate) fn read_passage(text: &str, task: &Task) -> Result<Passage, WorldError> {
     let message = read(text)?;
-    let now = wire::field_number(&message, "now").map_err(|error| WorldError::new(error.message))?;
+    let now =
+        wire::field_number(&message, "now").map_err(|error| WorldError::new(error.message))?;
     let observations = listed(message.get("observations"), task)?;
     Ok(Passage { now, observations })
 }

@@ -117,7 +117,10 @@ fn a_timed_initial_after_the_plan_counts_only_if_the_settings_say_so() {
     assert_eq!(world().timed("11", "(p)").judge("1: deliver"), "valid");
     // Without any action, too.
     let settings = world().settings;
-    let given = World::new("").timed("5", "(q)").goal("(q)").settings(settings);
+    let given = World::new("")
+        .timed("5", "(q)")
+        .goal("(q)")
+        .settings(settings);
     assert_eq!(given.judge(""), "valid");
 }
 
@@ -133,7 +136,10 @@ fn what_is_read_and_written_at_one_time_is_allowed_only_if_the_settings_say_so()
     };
     let judge = |plan| world(Settings::like_unified_planning()).judge(plan);
     assert_eq!(judge("1: use\n1: spoil"), "valid");
-    assert_ne!(world(Settings::default()).judge("1: use\n1: spoil"), "valid");
+    assert_ne!(
+        world(Settings::default()).judge("1: use\n1: spoil"),
+        "valid"
+    );
     // What contradicts itself is refused under any rule, and nothing sees what comes with it.
     assert!(judge("1: use\n2: spoil\n2: restore").starts_with("at 2.000: (restore) interferes"));
     let handover = handover().settings(Settings::like_unified_planning());
