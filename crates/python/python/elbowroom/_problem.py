@@ -263,7 +263,7 @@ class Problem:
 
         >>> envelope = problem.envelope(PLAN, sharpen=True)
         >>> [str(room.upper) for room in envelope.rows()][:2]
-        ['17499/1000', '56519/1000']
+        ['2562/125', '27749/500']
         >>> bool(problem.envelope(PLAN, contains={"dur_0": (10, 12)}))
         True
         """

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any
 
+from unified_planning.engines import CompilationKind
+from unified_planning.engines.compilers.bounded_types_remover import BoundedTypesRemover
 from unified_planning.model import (
     DurativeAction,
     FNode,
@@ -56,6 +58,9 @@ class Translation:
                 f"a {type(problem).__name__} is no action-based problem; only these are supported"
             )
         self.original = problem
+        if problem.kind.has_bounded_types():
+            problem = _without_bounds(problem)
+        self.source = problem
         self.has_finish = until_all_timed and bool(problem.timed_effects)
         self._names: dict[tuple[str, Any], str] = {}
         self._used = {ALL_OVER, FINISH, FINISHED, COST, *_TAKEN}
@@ -64,7 +69,7 @@ class Translation:
         self.domain_text = "\n".join(self._domain())
         self.problem_text = "\n".join(self._problem())
         self.actions: dict[str, Any] = {
-            self.name("action", action): action for action in problem.actions
+            self.name("action", action): action for action in self.original.actions
         }
         self.objects: dict[str, Any] = {
             self.name("object", it): it for it in problem.all_objects
@@ -99,11 +104,13 @@ class Translation:
     # Refusals.
 
     def _refuse_what_has_no_counterpart(self) -> None:
-        problem = self.original
+        problem = self.source
         if problem.timed_goals:
             raise UnsupportedError("timed goals are not supported")
-        if problem.trajectory_constraints:
+        if problem.trajectory_constraints or getattr(problem, "state_invariants", None):
             raise UnsupportedError("trajectory constraints are not supported")
+        if problem.kind.has_undefined_initial_symbolic():
+            raise UnsupportedError("facts whose initial truth is not defined are not supported")
         for what in ("processes", "events"):
             if getattr(problem, what, None):
                 raise UnsupportedError(f"{what} are not supported")
@@ -112,10 +119,7 @@ class Translation:
             if of.is_user_type():
                 raise UnsupportedError(f"the object fluent {fluent.name} is not supported")
             if not of.is_bool_type() and (of.lower_bound, of.upper_bound) != (None, None):
-                raise UnsupportedError(
-                    f"the bounded type of {fluent.name} is not supported; the compiler "
-                    "up_bounded_types_remover takes bounds away"
-                )
+                raise UnsupportedError(f"the bounds of {fluent.name} are not supported")
 
     # Expressions.
 
@@ -184,7 +188,7 @@ class Translation:
     # The domain.
 
     def _domain(self) -> Iterator[str]:
-        problem = self.original
+        problem = self.source
         yield "(define (domain d)"
         yield (
             "  (:requirements :typing :adl :negative-preconditions :fluents :durative-actions "
@@ -268,15 +272,15 @@ class Translation:
 
     def _costs(self) -> dict[Any, FNode] | None:
         """What each action costs, if that is the metric."""
-        metrics = self.original.quality_metrics
+        metrics = self.source.quality_metrics
         if len(metrics) != 1:
             return None
         metric = metrics[0]
         if metric.is_minimize_action_costs():
-            return {action: metric.get_action_cost(action) for action in self.original.actions}
+            return {action: metric.get_action_cost(action) for action in self.source.actions}
         if metric.is_minimize_sequential_plan_length():
-            one = self.original.environment.expression_manager.Int(1)
-            return dict.fromkeys(self.original.actions, one)
+            one = self.source.environment.expression_manager.Int(1)
+            return dict.fromkeys(self.source.actions, one)
         return None
 
     def _cost(self, action: Any) -> list[str]:
@@ -288,7 +292,7 @@ class Translation:
     # The problem.
 
     def _problem(self) -> Iterator[str]:
-        problem = self.original
+        problem = self.source
         yield "(define (problem p) (:domain d)"
         yield "  (:init"
         for fluent, value in problem.initial_values.items():
@@ -333,7 +337,7 @@ class Translation:
         return f"(at {time} {target if value.is_true() else f'(not {target})'})"
 
     def _metric(self) -> str | None:
-        metrics = self.original.quality_metrics
+        metrics = self.source.quality_metrics
         if len(metrics) != 1:
             return None
         metric = metrics[0]
@@ -435,6 +439,17 @@ def _split(text: str) -> Iterator[str]:
     while text:
         first, text = _first(text)
         yield first
+
+
+def _without_bounds(problem: UPProblem) -> UPProblem:
+    """The problem with conditions instead of bounds of its numbers."""
+    kind = CompilationKind.BOUNDED_TYPES_REMOVING
+    try:
+        return BoundedTypesRemover().compile(problem, kind).problem
+    except Exception as error:
+        raise UnsupportedError(
+            f"bounds of numbers are not supported where unified-planning cannot take them away: {error}"
+        ) from error
 
 
 _OPERATORS = {

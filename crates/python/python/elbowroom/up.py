@@ -81,6 +81,7 @@ def _common_kind() -> ProblemKind:
         kind.set_typing(feature)
     for feature in ("INT_FLUENTS", "REAL_FLUENTS"):
         kind.set_fluents_type(feature)
+    kind.set_numbers("BOUNDED_TYPES")
     kind.set_initial_state("UNDEFINED_INITIAL_NUMERIC")
     for feature in ("ACTIONS_COST", "FINAL_VALUE", "MAKESPAN", "PLAN_LENGTH"):
         kind.set_quality_metrics(feature)
