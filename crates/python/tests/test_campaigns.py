@@ -9,7 +9,23 @@ from conftest import ROOT
 
 import elbowroom
 
-TABLE = ROOT / "experiments" / "table1.toml"
+TEXT = """
+format = "elbowroom-experiment"
+version = 1
+title = "Late drives"
+domain = "delivery/domain.pddl"
+problem = "delivery/problem.pddl"
+trials = 100
+seed = 1
+executors = ["guarded", "stn"]
+planner_states = 256
+improve_states = 1
+
+[[column]]
+name = "drives"
+world = "delivery/world.toml"
+"""
+TABLE = elbowroom.Experiment(TEXT, ROOT / "cases")
 
 
 @pytest.fixture(scope="module")
