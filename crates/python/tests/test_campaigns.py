@@ -116,4 +116,4 @@ def test_an_unknown_engine_is_named() -> None:
     with pytest.raises(ValueError, match="local, ray and slurm"):
         elbowroom.compare(TABLE, engine="cloud")
     with pytest.raises(elbowroom.RequestError, match="there is no part 3 of 3"):
-        elbowroom.Experiment(TABLE).make(2, (3, 3))
+        TABLE.make(2, (3, 3))
