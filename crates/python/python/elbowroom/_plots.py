@@ -88,7 +88,7 @@ def rates(comparison: Comparison, ax: Axes | None) -> Axes:
     rows = comparison.rows()
     names = list(dict.fromkeys(row.row for row in rows))
     columns = list(dict.fromkeys(row.column for row in rows))
-    ax = axes(ax, len(rows))
+    ax = axes(ax, len(names) + len(rows) // 4)
     height = 0.8 / max(len(columns), 1)
     for index, column in enumerate(columns):
         shares = {row.row: row.successes / max(row.runs, 1) for row in rows if row.column == column}
