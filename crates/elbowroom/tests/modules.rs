@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 const KNOWN: &[(&str, &[&str], &str)] = &[
     (
         "elbowroom",
-        &["answers", "flow"],
-        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps",
+        &["answers", "execute", "flow"],
+        "`flow::robust_plan` is a line over the answer, which is put together from the flow's steps, \
+         as what is executed is; a run is an answer too",
     ),
     (
         "execution",
