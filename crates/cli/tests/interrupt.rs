@@ -43,7 +43,7 @@ impl Long {
             file("problem.pddl"),
             file("rounds.plan"),
             "--precision".to_owned(),
-            "1e-400".to_owned(),
+            "1e-390".to_owned(),
         ]
     }
 }
@@ -53,6 +53,8 @@ fn wait_until_it_listens(child: &Child, signal: u32) {
     let status = format!("/proc/{}/status", child.id());
     loop {
         let text = std::fs::read_to_string(&status).expect("the process is alive");
+        let has_ended = text.lines().any(|line| line.starts_with("State:\tZ"));
+        assert!(!has_ended, "the process has ended before it was told to");
         let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
         let caught = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
         if caught.is_some_and(|mask| mask >> (signal - 1) & 1 == 1) {

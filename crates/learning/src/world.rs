@@ -67,9 +67,7 @@ fn durations(text: &mut String, learnt: &Learnt) {
 fn rests_on(group: &Group) -> String {
     match group.counts() {
         (observed, 0) => format!("from {observed} durations"),
-        (observed, censored) => {
-            format!("from {observed} durations and {censored} that were cut off")
-        }
+        (observed, censored) => format!("from {observed} durations and {censored} cut off"),
     }
 }
 

@@ -50,7 +50,7 @@ pub const EXECUTORS: &[Registered] = &[
         name: "adaptable",
         summary: "The paper's PGen and PExec. What is under way is ended before a plan is given \
                   up. In a dead end, where there is no other plan, it does what its plan has the \
-                  best chance with, counting on luck.",
+                  best chance with, relying on spontaneous changes.",
         paper: "Olisipo in Ribeiro et al. (2021), sections 2.2.1 and 2.2.2",
         make: |means| {
             let (task, likelihoods) = means.both();
@@ -74,8 +74,8 @@ pub const EXECUTORS: &[Registered] = &[
     },
     Registered {
         name: "lookahead",
-        summary: "What is best in the sound world (`docs/probability.md`), without regard to the \
-                  plan. It is exact where at most `most_running` actions are under way at once.",
+        summary: "The optimal policy in the sound world (`docs/probability.md`), without regard to \
+                  the plan. It is exact where at most `most_running` actions are under way at once.",
         paper: "goes beyond Ribeiro et al. (2021)",
         make: |means| Ok(Box::new((means.foresight)()?)),
     },
