@@ -2,6 +2,7 @@
 
 mod command;
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
@@ -230,13 +231,15 @@ fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     for (a, b) in (0..9).flat_map(|a| (0..9).map(move |b| (a, b))) {
         let distance = i32::abs(a / 3 - b / 3) + i32::abs(a % 3 - b % 3);
         if distance == 1 {
-            beside += &format!(" (beside c{a} c{b})");
+            let _ = write!(beside, " (beside c{a} c{b})");
         }
     }
     let on = |cells: [u8; 8]| {
         let on = cells.iter().enumerate();
-        on.map(|(tile, cell)| format!(" (on t{tile} c{cell})"))
-            .collect::<String>()
+        let words: Vec<String> = on
+            .map(|(tile, cell)| format!(" (on t{tile} c{cell})"))
+            .collect();
+        words.concat()
     };
     let problem = Temporary::new(
         "tiles-problem.pddl",

@@ -201,7 +201,7 @@ fn conformal_intervals_hold_the_next_run() {
             plan.steps
                 .iter()
                 .map(|step| {
-                    let planned = step.duration.as_ref().map(|d| d.to_f64());
+                    let planned = step.duration.as_ref().map(elbowroom::num::Rational::to_f64);
                     let duration = planned.unwrap_or(0.0) * shape.sample(rng);
                     Record {
                         action: step.action.name.clone(),

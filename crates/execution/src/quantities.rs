@@ -54,7 +54,7 @@ pub(crate) struct Place<'n> {
 }
 
 /// All amounts that were measured.
-pub(crate) fn places<'n>(news: &'n [News]) -> impl Iterator<Item = Place<'n>> {
+pub(crate) fn places(news: &[News]) -> impl Iterator<Item = Place<'_>> {
     let measured = news.iter().filter_map(|news| {
         let (step, is_end, measured) = match news {
             News::Started { step, measured, .. } => (step, false, measured),

@@ -201,11 +201,11 @@ fn grid(
     };
     let upper = match bound(Side::Above)? {
         Ok(value) => (value + SLACK).min(1.0),
-        Err(stop) => return Ok(Err(stop)),
+        Err(why) => return Ok(Err(why)),
     };
     let lower = match bound(Side::Below)? {
         Ok(value) => (value - SLACK).max(0.0),
-        Err(stop) => return Ok(Err(stop)),
+        Err(why) => return Ok(Err(why)),
     };
     Ok(Ok(Grid {
         step,

@@ -1,5 +1,7 @@
 //! What was learnt, as a world file (`docs/formats/world.md`).
 
+use std::fmt::Write as _;
+
 use elbowroom_sim::{Distribution, Failure};
 use toml::{Table, Value};
 
@@ -9,7 +11,7 @@ use crate::learn::{Durations, Group, Learnt, constant};
 /// The world file, with a comment on each section that says on what it rests.
 pub fn write(learnt: &[Learnt], resolution: f64) -> String {
     let mut text = String::from("format = \"elbowroom-world\"\nversion = 1\n");
-    text.push_str(&format!("resolution = {}\n", Value::Float(resolution)));
+    let _ = writeln!(text, "resolution = {}", Value::Float(resolution));
     for action in learnt {
         durations(&mut text, action);
         if let Some(fit) = &action.delay {
@@ -85,9 +87,10 @@ fn failures(text: &mut String, learnt: &Learnt) {
         Failure::AtEnd => "end",
     };
     let (failed, of) = (learnt.failures.successes, learnt.failures.count);
-    text.push_str(&format!(
+    let _ = write!(
+        text,
         "\n# {failed} of {of}; 95 % interval {lower:.3} to {upper:.3}\n[[failure]]\n"
-    ));
+    );
     push(text, "action", Value::String(learnt.name.clone()));
     push(text, "probability", Value::Float(share));
     push(text, "when", Value::String(when.to_owned()));
@@ -101,11 +104,11 @@ fn section(
     is_relative: bool,
     remark: &str,
 ) {
-    text.push_str(&format!("\n# {remark}"));
+    let _ = write!(text, "\n# {remark}");
     if let Some(error) = fit.standard_error {
-        text.push_str(&format!("; standard error of the mean {error:.3}"));
+        let _ = write!(text, "; standard error of the mean {error:.3}");
     }
-    text.push_str(&format!("\n[[{kind}]]\n"));
+    let _ = writeln!(text, "\n[[{kind}]]");
     push(text, "action", Value::String(action.to_owned()));
     let table = |pairs: &[(&str, f64)]| {
         let pairs = pairs
@@ -148,6 +151,7 @@ fn section(
     }
 }
 
-fn push(text: &mut String, key: &str, value: Value) {
-    text.push_str(&format!("{key} = {value}\n"));
+fn push(text: &mut String, key: &str, value: impl Into<Value>) {
+    let value: Value = value.into();
+    let _ = writeln!(text, "{key} = {value}");
 }

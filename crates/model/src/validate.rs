@@ -64,10 +64,6 @@ use crate::task::Task;
 
 /// Settings of the validator.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "each is a rule of its own, and any two go together"
-)]
 pub struct Settings {
     /// Whether interfering happenings must be [`Task::epsilon`] apart. If not, they only must not
     /// fall into one group, which is what VAL asks for.

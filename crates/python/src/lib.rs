@@ -9,6 +9,19 @@
 //! Whatever can take long releases the interpreter's lock, is heard of by a progress callback, and
 //! ends at Ctrl-C with what was found until then (`watch`). A panic in here becomes the exception
 //! `elbowroom.BugError` (`trouble`).
+#![allow(
+    clippy::needless_pass_by_value,
+    clippy::type_complexity,
+    reason = "what Python passes and gets is owned, and tuples are what it is given"
+)]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a front door looks at the clock, as the command does"
+)]
+#![allow(
+    clippy::struct_field_names,
+    reason = "a Python class has the name of what it wraps"
+)]
 
 mod campaign;
 mod planner;

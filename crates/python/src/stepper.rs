@@ -57,16 +57,13 @@ impl Stepper {
             let first = plan.map(|plan| problem.time_triggered(plan)).transpose()?;
             let raised = Raised::default();
             let mut execution = spec.execution(&task)?.beginning_with(first).explaining();
-            execution = match planner {
-                Some(callable) => {
-                    let flag = Arc::new(AtomicBool::new(false));
-                    execution.planned_by(problem.asking(callable, flag, &raised))
-                }
-                None => {
-                    let model = spec.model(task.problem());
-                    let model = model.map_err(elbowroom::execute::SpecError::World)?;
-                    execution.planned_by(spec.planner_for(model.as_ref(), NO_CLOCK, ALWAYS)?)
-                }
+            execution = if let Some(callable) = planner {
+                let flag = Arc::new(AtomicBool::new(false));
+                execution.planned_by(problem.asking(callable, flag, &raised))
+            } else {
+                let model = spec.model(task.problem());
+                let model = model.map_err(elbowroom::execute::SpecError::World)?;
+                execution.planned_by(spec.planner_for(model.as_ref(), NO_CLOCK, ALWAYS)?)
             };
             let tape = if has_trace {
                 Some(Tape::of(&task, &spec)?)

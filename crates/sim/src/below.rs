@@ -28,7 +28,6 @@ impl Distribution {
             Self::Normal { mean, deviation } if *deviation > 0.0 => {
                 standard_normal_below((value - mean) / deviation)
             }
-            Self::Normal { mean, .. } => step(*mean),
             Self::LogNormal { mean, deviation } if *deviation > 0.0 => {
                 if value <= 0.0 {
                     return Some(0.0);
@@ -37,11 +36,10 @@ impl Distribution {
                 let location = mean.ln() - variance / 2.0;
                 standard_normal_below((value.ln() - location) / variance.sqrt())
             }
-            Self::LogNormal { mean, .. } => step(*mean),
+            Self::Normal { mean, .. } | Self::LogNormal { mean, .. } => step(*mean),
             Self::Uniform { from, to } if from < to => {
                 ((value - from) / (to - from)).clamp(0.0, 1.0)
             }
-            Self::Uniform { from, .. } => step(*from),
             Self::Triangular { from, mode, to } if from < to => {
                 let value = value.clamp(*from, *to);
                 if value <= *mode && from < mode {
@@ -52,11 +50,12 @@ impl Distribution {
                     1.0
                 }
             }
-            Self::Triangular { from, .. } => step(*from),
             Self::Exponential { from, mean } if *mean > 0.0 => {
                 -(-(value - from).max(0.0) / mean).exp_m1()
             }
-            Self::Exponential { from, .. } => step(*from),
+            Self::Uniform { from, .. }
+            | Self::Triangular { from, .. }
+            | Self::Exponential { from, .. } => step(*from),
             Self::Gamma { .. } => return None,
             Self::Empirical(values) => {
                 #[allow(

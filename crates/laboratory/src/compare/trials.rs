@@ -88,7 +88,7 @@ impl Setting<'_> {
         goes_on: &'a (dyn Fn() -> bool + Sync),
     ) -> Result<Common<'a>, ExperimentError> {
         let (domain, problem) = self.texts()?;
-        let task = self.task(&domain, &problem)?;
+        let task = Self::task(&domain, &problem)?;
         let situation = Situation::initial(&task);
         let mut planner = self.planner(domain, problem, goes_on)?;
         let first = match planner.plan(&task, &situation).answer {
@@ -250,7 +250,7 @@ impl Setting<'_> {
         flow
     }
 
-    fn task(&self, domain: &Source, problem: &Source) -> Result<Task, ExperimentError> {
+    fn task(domain: &Source, problem: &Source) -> Result<Task, ExperimentError> {
         let read = elbowroom_pddl::read_problem(domain, problem);
         let (problem, _) = read.map_err(ExperimentError::Text)?;
         Ok(Task::new(problem))
@@ -259,7 +259,7 @@ impl Setting<'_> {
     /// The problem, and the world of a column for it.
     pub(super) fn scene(&self, column: &Column) -> Result<(Task, WorldModel), ExperimentError> {
         let (domain, problem) = self.texts()?;
-        let task = self.task(&domain, &problem)?;
+        let task = Self::task(&domain, &problem)?;
         let world = world(column, &task)?;
         Ok((task, world))
     }

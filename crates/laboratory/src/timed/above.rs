@@ -17,7 +17,8 @@ type Moment = (State, u32);
 /// What is being put together of one cell.
 struct Cell<'c> {
     bound: &'c Above<'c>,
-    cell: usize,
+    /// Its number.
+    number: usize,
     /// After the nodes of the cell's beginning.
     moments: IndexSet<Moment>,
     first: usize,
@@ -109,7 +110,7 @@ impl Expansion for Above<'_> {
     ) -> Nodes {
         let mut here = Cell {
             bound: self,
-            cell,
+            number: cell,
             moments: IndexSet::new(),
             first: states.len(),
             next,
@@ -214,7 +215,7 @@ impl Cell<'_> {
         ];
         let mut choice = Choice::new();
         for (p, phase) in ways.into_iter().filter(|(p, _)| *p > 0.0) {
-            let after = state.started(world, act, self.cell, phase);
+            let after = state.started(world, act, self.number, phase);
             choice.push((p, vec![self.target((after, pending))]));
         }
         choice

@@ -27,7 +27,8 @@ enum Happening {
 /// What is being put together of one cell.
 struct Cell<'c> {
     bound: &'c Below<'c>,
-    cell: usize,
+    /// Its number.
+    number: usize,
     /// The states in which the agent decides, those at the boundary first.
     moments: IndexSet<State>,
     next: &'c mut IndexSet<State>,
@@ -167,7 +168,7 @@ impl Expansion for Below<'_> {
     ) -> Nodes {
         let mut here = Cell {
             bound: self,
-            cell,
+            number: cell,
             moments: states.clone(),
             next,
             hopes,
@@ -206,7 +207,7 @@ impl Cell<'_> {
         }
         let startable = state.startable(world);
         if state.must_start(world, &startable) {
-            let after = state.started(world, startable[0], self.cell, Phase::Goes);
+            let after = state.started(world, startable[0], self.number, Phase::Goes);
             return vec![vec![(1.0, vec![self.target(after)])]];
         }
         let mut choices = Vec::new();
@@ -218,11 +219,11 @@ impl Cell<'_> {
             }
         }
         for act in startable {
-            let after = state.started(world, act, self.cell, Phase::Goes);
+            let after = state.started(world, act, self.number, Phase::Goes);
             choices.push(vec![(1.0, vec![self.target(after)])]);
         }
         let mut choice = Choice::new();
-        for (p, happenings) in self.bound.happenings(self.cell, state) {
+        for (p, happenings) in self.bound.happenings(self.number, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
             let targets = outcomes.into_iter().map(|outcome| {
                 if world.goal.hold(outcome.facts) {

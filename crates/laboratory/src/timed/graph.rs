@@ -1,8 +1,6 @@
 //! What both bounds have in common: states, cell by cell, and their values backwards.
 
-use std::collections::HashMap;
-
-use indexmap::IndexSet;
+use indexmap::{IndexMap, IndexSet};
 
 use super::Stop;
 use super::world::{Facts, TimedWorld};
@@ -80,7 +78,7 @@ pub(super) trait Expansion {
 }
 
 /// Where there is hope, as far as that has been looked at.
-pub(super) type Hopes = HashMap<(Facts, u64, u32), bool>;
+pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
 
 impl State {
     pub(super) fn under_way(&self) -> u64 {

@@ -4,7 +4,7 @@
 //!
 //! It knows neither cells nor bounds, and reads neither PDDL nor world files.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use rand::Rng;
@@ -114,8 +114,12 @@ impl SmallWorld {
 
     pub(crate) fn problem(&self) -> String {
         let facts = (0..FACTS).filter(|fact| self.initial & (1 << fact) != 0);
-        let initial: String = facts.map(|fact| format!("(f{fact}) ")).collect();
-        let goal: String = self.goal.iter().map(|fact| format!("(f{fact}) ")).collect();
+        let listed = |facts: &mut dyn Iterator<Item = usize>| {
+            let words: Vec<String> = facts.map(|fact| format!("(f{fact})")).collect();
+            words.join(" ")
+        };
+        let initial = listed(&mut facts.clone());
+        let goal = listed(&mut self.goal.iter().copied());
         format!(
             "(define (problem p) (:domain small)
                (:init {initial} (open) (at {CLOSES} (not (open)))) (:goal (and (open) {goal})))"
@@ -156,14 +160,14 @@ impl SmallWorld {
             happened: 0,
             begun: 0,
         };
-        self.value(&start, &mut HashMap::new())
+        self.value(&start, &mut BTreeMap::new())
     }
 
     fn is_won(&self, now: &Now) -> bool {
         self.goal.iter().all(|fact| now.facts & (1 << fact) != 0)
     }
 
-    fn value(&self, now: &Now, known: &mut HashMap<Now, f64>) -> f64 {
+    fn value(&self, now: &Now, known: &mut BTreeMap<Now, f64>) -> f64 {
         if self.is_won(now) {
             return 1.0;
         }
@@ -198,7 +202,7 @@ impl SmallWorld {
     }
 
     /// A second passes.
-    fn wait(&self, now: &Now, known: &mut HashMap<Now, f64>) -> f64 {
+    fn wait(&self, now: &Now, known: &mut BTreeMap<Now, f64>) -> f64 {
         let time = now.time + 1;
         let mut all = vec![(
             1.0,
@@ -278,7 +282,7 @@ impl SmallWorld {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Now {
     time: u32,
     facts: u32,

@@ -125,7 +125,7 @@ pub(super) fn answer(
         let is_too_few = duration.calibration.len() < needed;
         let interval = interval(
             &parameter.nominal,
-            room.intervals()[duration.index].clone(),
+            &room.intervals()[duration.index],
             stretching,
         );
         if is_too_few {
@@ -211,7 +211,7 @@ fn durations<'a>(
 }
 
 /// The envelope's interval, stretched around the nominal value, rounded outwards to exact numbers.
-fn interval(nominal: &Rational, room: Interval, stretching: f64) -> Interval {
+fn interval(nominal: &Rational, room: &Interval, stretching: f64) -> Interval {
     if stretching <= 0.0 {
         return Interval::point(nominal.clone());
     }
