@@ -322,6 +322,7 @@ def _ray(
 ) -> Comparison:
     try:
         import ray
+        import ray.exceptions
     except ImportError as error:
         raise ImportError('engine="ray" needs Ray: `pip install ray`') from error
     if not ray.is_initialized():
