@@ -15,12 +15,12 @@
 //!
 //! **Bounds.** The best value is bounded from both sides on a grid of time: cells of one length.
 //!
-//! - *Above*, [`Side::Above`]: the agent is told at the beginning of a cell what will end or happen
+//! - *Above*, `Side::Above`: the agent is told at the beginning of a cell what will end or happen
 //!   in it, and chooses the order within the cell. What began in cell c and takes n whole cells and
 //!   something ends in cell c + n or in the next one; the agent chooses that, too. An agent in the real
 //!   world that knows less can be imitated step by step, with the remainders drawn at random, so
 //!   this is at least as good as the best.
-//! - *Below*, [`Side::Below`]: the agent decides only at the boundaries of cells, and what happens
+//! - *Below*, `Side::Below`: the agent decides only at the boundaries of cells, and what happens
 //!   between them happens in the order that is worst for it. That is a way to act in the real
 //!   world, so the best is at least as good.
 //!
