@@ -81,8 +81,15 @@ pub fn of_trace(trace: &Stored) -> Vec<Record> {
             Line::Passed(line) => last = last.max(float(&line.now.0)),
             Line::Observed(line) if line.remark.is_none() => match &line.observation {
                 ObservationLine::Started { ticket, time, .. } => {
-                    if let Some(open) = open.get_mut(ticket) {
-                        open.start = Some(float(&time.0));
+                    let time = float(&time.0);
+                    // What takes no time is done when it has started; no end is reported.
+                    let is_instantaneous =
+                        open.get(ticket).is_some_and(|open| open.planned.is_none());
+                    if let Some(started) = open.get_mut(ticket) {
+                        started.start = Some(time);
+                    }
+                    if is_instantaneous && let Some(done) = open.remove(ticket) {
+                        records.push((*ticket, closed(done, time, Outcome::Succeeded)));
                     }
                 }
                 ObservationLine::Ended {

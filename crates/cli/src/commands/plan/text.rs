@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use elbowroom::answers::plan::{PlanAnswer, PlanFinding, PlanStop, PlannerFailure};
 use elbowroom::external::Outcome;
 
+use crate::args::EMBEDDED;
 use crate::exit::Failure;
 use crate::look::{FAINT, HINT, styled};
 use crate::number;
@@ -44,6 +45,8 @@ pub(super) fn summary(answer: &PlanAnswer) -> Option<String> {
     let plans = counted(answer.plans, "plan");
     let better = match answer.stop {
         PlanStop::Exhausted => "the search found no better one",
+        // Another planner may have been about to end by itself, which is a matter of chance.
+        PlanStop::FirstPlan if answer.planner != EMBEDDED => "not proved optimal",
         PlanStop::FirstPlan => "not proved optimal; --time-limit looks for better ones",
         _ => "not proved optimal",
     };
