@@ -10,6 +10,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use toml::{Table, Value};
 
@@ -131,6 +132,33 @@ fn only_the_laboratory_makes_threads() {
         let has_threads = dependencies.is_some_and(|table| table.contains_key("rayon"));
         assert_eq!(has_threads, *name == "laboratory", "`{name}`");
     }
+}
+
+/// Cargo itself says what is built for who asks for the library alone.
+#[test]
+fn the_library_builds_neither_plots_nor_threads() {
+    let tree = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "--offline", "--locked", "--package", "elbowroom"])
+            .args(["--edges", "normal", "--prefix", "none", "--format", "{p}"])
+            .args(arguments)
+            .current_dir(workspace())
+            .output()
+            .expect("cargo starts");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{errors}");
+        String::from_utf8(output.stdout).expect("UTF-8")
+    };
+    let has = |tree: &str, package: &str| {
+        let mut names = tree.lines().filter_map(|line| line.split(' ').next());
+        names.any(|name| name == package)
+    };
+    let plain = tree(&[]);
+    assert!(has(&plain, "elbowroom-execution"), "{plain}");
+    for unwanted in ["plotters", "rayon", "clap"] {
+        assert!(!has(&plain, unwanted), "{unwanted} is in\n{plain}");
+    }
+    assert!(has(&tree(&["--features", "plots"]), "plotters"));
 }
 
 /// The crates that a crate imports, and those that they import, by the table.

@@ -86,11 +86,6 @@ impl LayerDispatch {
         &self.search
     }
 
-    /// Forgets the order, but not what searches have found.
-    pub fn reset(&mut self) {
-        self.order = None;
-    }
-
     /// What to do next. `watch` can cut a search short, as in [`OrderSearch::best_order`].
     ///
     /// # Errors

@@ -7,7 +7,7 @@
 //! - [`exact`]: exact numbers in JSON.
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
-//! - [`plot`]: plots as SVG.
+//! - `plot`: plots as SVG, with the feature `plots`.
 //!
 //! ```
 //! use elbowroom_report::table::Table;
@@ -24,6 +24,7 @@
 
 pub mod exact;
 pub mod line;
+#[cfg(feature = "plots")]
 pub mod plot;
 pub mod statistics;
 pub mod table;
