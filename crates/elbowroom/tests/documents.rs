@@ -7,9 +7,11 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// All Markdown files at the root and under `docs`.
+/// All Markdown files at the root and under `docs`, and the chapters of the tutorial, which stand in
+/// the packages that compile them.
 fn documents() -> Vec<PathBuf> {
-    let mut folders = vec![root().join("docs")];
+    let folders = ["docs", "crates/elbowroom/docs", "crates/laboratory/docs"];
+    let mut folders: Vec<PathBuf> = folders.map(|folder| root().join(folder)).into();
     let mut files: Vec<PathBuf> = markdown_in(&root());
     while let Some(folder) = folders.pop() {
         files.extend(markdown_in(&folder));
@@ -70,4 +72,36 @@ fn links_and_paths_in_documents_lead_somewhere() {
         }
     }
     assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+/// What a package carries has to be in its folder. Links to files elsewhere do not survive every
+/// way in which a repository is copied, so these are files of their own, the same everywhere.
+#[test]
+fn every_package_carries_the_licences_word_for_word() {
+    let crates = fs::read_dir(root().join("crates")).expect("the folder of crates");
+    for entry in crates {
+        let folder = entry.expect("an entry").path();
+        for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            let text = fs::read_to_string(root().join(name)).expect("a licence");
+            let carried = fs::read_to_string(folder.join(name));
+            let carried = carried.unwrap_or_else(|_| panic!("{} has no {name}", folder.display()));
+            assert_eq!(carried, text, "{} has another {name}", folder.display());
+        }
+    }
+}
+
+#[test]
+fn every_chapter_of_the_tutorial_is_a_text() {
+    let chapters = documents();
+    let chapters = chapters.iter().filter(|path| {
+        let folder = path.parent().and_then(Path::file_name);
+        folder.is_some_and(|folder| folder == "tutorial")
+    });
+    let chapters: Vec<String> = chapters
+        .map(|path| fs::read_to_string(path).expect("a chapter"))
+        .collect();
+    assert_eq!(chapters.len(), 5);
+    for chapter in chapters {
+        assert!(chapter.starts_with("# "), "{chapter}");
+    }
 }
