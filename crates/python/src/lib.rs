@@ -9,6 +9,13 @@
 //! Whatever can take long releases the interpreter's lock, is heard of by a progress callback, and
 //! ends at Ctrl-C with what was found until then (`watch`). A panic in here becomes the exception
 //! `elbowroom.BugError` (`trouble`).
+//!
+//! ```python
+//! import elbowroom
+//!
+//! problem = elbowroom.read("domain.pddl", "problem.pddl")
+//! print(problem.envelope("plan.plan"))
+//! ```
 #![allow(
     clippy::needless_pass_by_value,
     clippy::type_complexity,
