@@ -8,7 +8,8 @@ mod number;
 mod plan;
 mod run;
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -72,6 +73,16 @@ impl From<Colour> for anstream::ColorChoice {
     }
 }
 
+/// The command line; a program that is called as VAL is takes VAL's.
+pub(crate) fn spoken() -> Vec<OsString> {
+    let mut line: Vec<OsString> = std::env::args_os().collect();
+    let program = line.first().map(Path::new).and_then(Path::file_stem);
+    if program.is_some_and(|name| name.eq_ignore_ascii_case("validate")) {
+        line.insert(1, "val".into());
+    }
+    line
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Validate a plan, and say what is wrong with it
@@ -90,6 +101,10 @@ pub(crate) enum Command {
     Learn(LearnArgs),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
+    /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
+    Val(ValArgs),
+    /// Write an answer, a run or an experiment as a page to look at in a browser
+    Report(ReportArgs),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionsArgs),
     /// Print the manual page, or write one for each command
@@ -108,9 +123,46 @@ impl Command {
             Self::Compare(arguments) => arguments.json,
             Self::Learn(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
-            Self::Completions(_) | Self::Man(_) => false,
+            Self::Val(_) | Self::Report(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The same happens when the program is called `Validate` or `validate`, such as by a link of that name.")]
+pub(crate) struct ValArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plans
+    #[arg(value_name = "PLAN", required = true)]
+    pub(crate) plans: Vec<PathBuf>,
+    /// Also print the plan and the times at which something happens
+    #[arg(short, long)]
+    pub(crate) verbose: bool,
+    /// Times closer than this count as equal; VAL's own default is 0.01
+    #[arg(short, long, value_name = "T", default_value = "0.01", value_parser = positive_or_zero, allow_negative_numbers = true)]
+    pub(crate) tolerance: Rational,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The page is one HTML file that needs no network. It shows the plan with its envelope, the run beside its \
+plan, or the rates of the experiment; docs/pages.md says what is on it.")]
+pub(crate) struct ReportArgs {
+    /// The trace of a run (`run --trace`), an answer (`envelope --json`, `plan --json`, `run --json`), the
+    /// results of an experiment (`results.json`), or the folder that has them (`compare -o DIR`)
+    #[arg(value_name = "FILE")]
+    pub(crate) input: PathBuf,
+    /// Write the page there instead of to standard output
+    #[arg(short, long, value_name = "FILE.html")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the run in the format of Perfetto (https://ui.perfetto.dev) there; without `--output`, no page
+    #[arg(long, value_name = "FILE.pftrace")]
+    pub(crate) perfetto: Option<PathBuf>,
+    /// Write the run as an MCAP file, for Foxglove and others, there; without `--output`, no page
+    #[arg(long, value_name = "FILE.mcap")]
+    pub(crate) mcap: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -157,6 +209,20 @@ pub(crate) struct CheckArgs {
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
+    /// How to print what is wrong in a text: `text`, with an excerpt, or also `lines` on standard output,
+    /// one `FILE: line: N: Error: message` for each mistake
+    #[arg(long, value_name = "FORM", value_enum, default_value_t = DiagnosticsForm::Text)]
+    #[arg(hide_possible_values = true, conflicts_with = "json")]
+    pub(crate) diagnostics: DiagnosticsForm,
+}
+
+/// How mistakes in a text are printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DiagnosticsForm {
+    /// With an excerpt, on standard error
+    Text,
+    /// Also one line for each mistake, on standard output
+    Lines,
 }
 
 #[derive(Args, Debug)]

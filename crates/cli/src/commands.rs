@@ -6,6 +6,8 @@ pub(crate) mod envelope;
 pub(crate) mod learn;
 pub(crate) mod network;
 pub(crate) mod plan;
+pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod shell;
 pub(crate) mod stn;
+pub(crate) mod val;

@@ -75,6 +75,11 @@ impl Failure {
         }
     }
 
+    /// Where texts are wrong.
+    pub(crate) fn diagnostics(&self) -> &[Record] {
+        &self.diagnostics
+    }
+
     /// The same with advice, if it has none of its own.
     pub(crate) fn advised(mut self, advice: &str) -> Self {
         if self.advice.is_none() {

@@ -31,7 +31,7 @@ use output::Output;
 
 fn main() -> ExitCode {
     bug::install_hook();
-    let CommandLine { color, command } = CommandLine::parse();
+    let CommandLine { color, command } = CommandLine::parse_from(args::spoken());
     anstream::ColorChoice::from(color).write_global();
     let as_json = command.is_json();
     let mut output = Output::default();
@@ -43,6 +43,8 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => commands::compare::run(&arguments, &mut output),
         Command::Learn(arguments) => commands::learn::run(&arguments, &mut output),
         Command::Network(arguments) => commands::network::run(&arguments, &mut output),
+        Command::Val(arguments) => commands::val::run(&arguments, &mut output),
+        Command::Report(arguments) => commands::report::run(&arguments),
         Command::Completions(arguments) => commands::shell::completions(&arguments),
         Command::Man(arguments) => commands::shell::man(&arguments),
         Command::Run(arguments) => commands::run::run(&arguments, &mut output),

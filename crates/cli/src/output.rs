@@ -67,6 +67,11 @@ impl Output {
         }
     }
 
+    /// The warnings that were printed and are in no document yet.
+    pub(crate) fn warnings(&self) -> &[Record] {
+        &self.warnings
+    }
+
     /// Writes a warning about a text to standard error.
     pub(crate) fn warn_about(&mut self, warning: &Diagnostic) {
         tell(&format!("{}\n", warning.render(true)));
@@ -91,7 +96,17 @@ pub(crate) fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     if path.as_os_str() == "-" {
         return print(text);
     }
-    std::fs::write(path, text).map_err(|error| {
+    write_bytes(path, text.as_bytes())
+}
+
+/// Writes a file that is no text; `-` is standard output.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    if path.as_os_str() == "-" {
+        let mut stdout = io::stdout().lock();
+        let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
+        return survive(written, "standard output");
+    }
+    std::fs::write(path, bytes).map_err(|error| {
         Failure::new(
             format!("cannot write {}: {}", path.display(), plain(&error)),
             "choose a file in a folder that exists and that you may write to",

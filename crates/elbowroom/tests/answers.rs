@@ -11,13 +11,16 @@ use elbowroom::answers::envelope::{EnvelopeFinding, Failing, Stop, envelope};
 use elbowroom::answers::plan as planning;
 use elbowroom::answers::plan::{PlanFinding, PlanOutcome, PlanRequest, PlanStop};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
-use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
+use elbowroom::answers::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest, Exact};
 use elbowroom::answers::{Event, Halt, Unwatched, Watcher};
 use elbowroom::execute::Analyst;
 use elbowroom::execution::{Need, Preparer};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{self, Source};
+use elbowroom::plan::{Node, Valuation};
+use elbowroom::stn::{ConsistentNetwork, NodeId};
 use elbowroom::{AnyPlan, flow, plan};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -314,4 +317,51 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
     };
     assert_eq!(outcome.answer.finding, expected);
     assert_stored(&outcome.answer);
+}
+
+/// The windows of a timeline are compared with those of the network at every corner of the box, which is
+/// where the extremes of a plan with this one deadline lie.
+#[test]
+fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
+    let (task, plan) = read("delivery");
+    let outcome = asked(&EnvelopeRequest::new(&task, plan));
+    let EnvelopeFinding::Envelope { timeline, .. } = &outcome.answer.finding else {
+        panic!("an envelope");
+    };
+    let timeline = timeline.as_ref().expect("a timeline");
+    let (plan, envelope) = (outcome.plan.expect("a plan"), outcome.envelope.expect("a box"));
+    let ends = |interval: &Interval| {
+        [&interval.lower, &interval.upper].map(|end| end.value().cloned().expect("a number"))
+    };
+    let ends: Vec<_> = envelope.intervals().iter().map(ends).collect();
+    let mut widest = vec![None::<(Rational, Rational)>; plan.plan.nodes.len()];
+    for corner in 0..1_usize << ends.len() {
+        let values = ends.iter().enumerate();
+        let values: Valuation =
+            values.map(|(index, ends)| ends[corner >> index & 1].clone()).collect();
+        let network = ConsistentNetwork::try_from(plan.plan.network(&values));
+        let windows = network.expect("a schedule").windows(NodeId(0));
+        for ((_, window), widest) in windows.iter().zip(&mut widest) {
+            let earliest = window.earliest.clone().expect("after 0");
+            let latest = window.latest.clone().expect("before the deadline");
+            *widest = Some(match widest.take() {
+                Some((low, high)) => (low.min(earliest), high.max(latest)),
+                None => (earliest, latest),
+            });
+        }
+    }
+    for (node, what) in plan.plan.nodes() {
+        let (action, window) = match what {
+            Node::Start(id) => (id, &timeline.actions[id.index()].start_window),
+            Node::End(id) => {
+                let window = timeline.actions[id.index()].end_window.as_ref();
+                (id, window.expect("it has an end"))
+            }
+            _ => continue,
+        };
+        let said = (&window.earliest, &window.latest);
+        let (earliest, latest) = widest[node.index()].clone().expect("a window");
+        let known = (Some(Exact(earliest)), Some(Exact(latest)));
+        assert_eq!(said, (&known.0, &known.1), "{action:?}");
+    }
 }

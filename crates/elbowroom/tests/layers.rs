@@ -68,7 +68,8 @@ const LAYERS: &[(&str, &[&str])] = &[
             "elbowroom",
         ],
     ),
-    ("cli", &["elbowroom", "laboratory"]),
+    ("page", &["elbowroom", "laboratory"]),
+    ("cli", &["elbowroom", "laboratory", "page"]),
     ("python", &["elbowroom", "laboratory"]),
 ];
 

@@ -8,6 +8,7 @@
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
 //! - `plot`: plots as SVG, with the feature `plots`.
+//! - [`short`]: exact numbers as short decimals.
 //!
 //! ```
 //! use elbowroom_report::table::Table;
@@ -26,6 +27,7 @@ pub mod exact;
 pub mod line;
 #[cfg(feature = "plots")]
 pub mod plot;
+pub mod short;
 pub mod statistics;
 pub mod table;
 pub mod trace;

@@ -78,6 +78,20 @@ impl Mean {
     }
 }
 
+/// The two-sided p-value of McNemar's exact test: how likely trials that were each decided for one
+/// of two sides divide at least as unevenly if both sides are equally likely. 1 if there are none.
+pub fn mcnemar(first: u64, second: u64) -> f64 {
+    let count = first + second;
+    // ln C(n, k) - n ln 2, from k = 0 on, so that no term is too large or too small on the way.
+    let mut logarithm = -float(count) * std::f64::consts::LN_2;
+    let mut tail = 0.0;
+    for k in 0..=first.min(second) {
+        tail += logarithm.exp();
+        logarithm += float(count - k).ln() - float(k + 1).ln();
+    }
+    (2.0 * tail).min(1.0)
+}
+
 #[allow(
     clippy::cast_precision_loss,
     reason = "counts of runs are far below 2^52"
@@ -88,7 +102,28 @@ fn float(count: u64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::Proportion;
+    use super::{Proportion, mcnemar};
+
+    /// The sum of the definition, in whole numbers.
+    fn mcnemar_by_counting(first: u64, second: u64) -> f64 {
+        let (count, most) = (first + second, first.min(second));
+        let few = (0_u32..1 << count).filter(|bits| u64::from(bits.count_ones()) <= most);
+        let all = f64::from(1_u32 << count);
+        (2.0 * f64::from(u32::try_from(few.count()).unwrap()) / all).min(1.0)
+    }
+
+    #[test]
+    fn mcnemars_test_counts_the_ways_to_divide_so_unevenly() {
+        for first in 0..8 {
+            for second in 0..8 {
+                let counted = mcnemar_by_counting(first, second);
+                let computed = mcnemar(first, second);
+                assert!((computed - counted).abs() < 1e-12, "{first} {second}: {computed} {counted}");
+            }
+        }
+        let many = mcnemar(49_000, 51_000);
+        assert!(many > 0.0 && many < 1e-9, "{many}");
+    }
 
     #[test]
     fn wilsons_interval_is_that_of_the_books() {

@@ -11,8 +11,9 @@ use elbowroom::answers::check::{
 };
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::text::{Record, Severity};
 
-use crate::args::CheckArgs;
+use crate::args::{CheckArgs, DiagnosticsForm};
 use crate::exit::{Answer, Exit, Failure};
 use crate::limits::push_wrapped;
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
@@ -25,6 +26,30 @@ const MARGINS_SHOWN: usize = 8;
 
 /// Checks a problem, or a plan for it.
 pub(crate) fn run(arguments: &CheckArgs, output: &mut Output) -> Answer {
+    let answer = judge(arguments, output);
+    if arguments.diagnostics == DiagnosticsForm::Lines {
+        let failed = answer.as_ref().err().map(Failure::diagnostics);
+        let findings = output.warnings().iter().chain(failed.unwrap_or_default());
+        output::print(&findings.map(line).collect::<String>())?;
+    }
+    answer
+}
+
+/// A finding on one line, in the form that VAL's parser made usual.
+fn line(finding: &Record) -> String {
+    let severity = match finding.severity {
+        Severity::Error => "Error",
+        Severity::Warning => "Warning",
+    };
+    let mut line = format!("{}: line: {}: {severity}: {}", finding.file, finding.line, finding.message);
+    if let Some(advice) = &finding.advice {
+        let _ = write!(line, " ({advice})");
+    }
+    // Names in a message may have line feeds.
+    line.replace(['\n', '\r'], " ") + "\n"
+}
+
+fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let plan = match &arguments.plan {
         Some(path) => Some(plan(&task, path, output)?),

@@ -5,6 +5,7 @@ mod conditions;
 mod foresight;
 mod limits;
 mod search;
+pub mod timeline;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -26,6 +27,7 @@ pub use answer::{
 };
 pub use conditions::Conditions;
 pub use foresight::Foresight;
+pub use timeline::Timeline;
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.
 #[derive(Clone, Debug)]

@@ -97,6 +97,7 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     let EnvelopeFinding::Envelope {
         parameters,
         makespans,
+        timeline: _,
         stop,
         checks,
         widenings,

@@ -9,7 +9,7 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Conditions, EnvelopeRequest, Foresight, Subject};
+use super::{Conditions, EnvelopeRequest, Foresight, Subject, Timeline};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -84,6 +84,9 @@ pub enum EnvelopeFinding {
         /// What it would be worth to know values in advance, if anything.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
+        /// When each action happens, as planned and anywhere in the envelope.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        timeline: Option<Timeline>,
         /// The makespan of the plan. Not in the document.
         #[serde(skip)]
         makespans: Option<Makespans>,

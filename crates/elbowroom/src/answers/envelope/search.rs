@@ -10,6 +10,7 @@ use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
 use super::conditions::Conditions;
 use super::foresight::foresight;
 use super::limits::what_limits;
+use super::timeline::Timeline;
 use super::{EnvelopeOutcome, Subject};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
 use crate::flow::FlowError;
@@ -80,6 +81,7 @@ pub(super) fn search(
         widenings,
         conditions,
         foresight,
+        timeline: Timeline::of(&subject.request.task, subject.plan, &envelope),
         makespans: Makespans::of(subject.plan, &envelope),
     });
     outcome.envelope = Some(envelope);

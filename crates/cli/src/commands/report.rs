@@ -1,0 +1,53 @@
+//! `elbowroom report`: a page to look at, and a run for another viewer.
+
+use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
+
+use crate::args::ReportArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::{input, output};
+
+/// What `compare -o DIR` leaves in a folder.
+const RESULTS: &str = "results.json";
+
+/// Writes what is asked for.
+pub(crate) fn run(arguments: &ReportArgs) -> Answer {
+    let path = if arguments.input.is_dir() {
+        arguments.input.join(RESULTS)
+    } else {
+        arguments.input.clone()
+    };
+    let is_for_others = arguments.perfetto.is_some() || arguments.mcap.is_some();
+    let target = match (&arguments.output, is_for_others) {
+        (Some(target), _) => Some(target.clone()),
+        (None, true) => None,
+        (None, false) if io::stdout().is_terminal() => {
+            return Err(Failure::new(
+                "a page is not for a terminal",
+                format!("write it to a file: -o {}", suggested(&path).display()),
+            ));
+        }
+        (None, false) => Some(PathBuf::from("-")),
+    };
+    let source = input::source(&path, "trace or answer")?;
+    let failure = |error| Failure::new(error, "");
+    if let Some(target) = &arguments.perfetto {
+        let trace = elbowroom_page::perfetto(source.name(), source.text()).map_err(failure)?;
+        output::write_bytes(target, &trace)?;
+    }
+    if let Some(target) = &arguments.mcap {
+        let file = elbowroom_page::mcap(source.name(), source.text()).map_err(failure)?;
+        output::write_bytes(target, &file)?;
+    }
+    if let Some(target) = target {
+        let page = elbowroom_page::page(source.name(), source.text()).map_err(failure)?;
+        output::write_file(&target, &page)?;
+    }
+    Ok(Exit::Yes)
+}
+
+/// The input's name with another ending.
+fn suggested(input: &Path) -> PathBuf {
+    let stem = input.file_stem().filter(|stem| *stem != "-");
+    Path::new(stem.unwrap_or_else(|| "report".as_ref())).with_extension("html")
+}

@@ -1,0 +1,183 @@
+//! `elbowroom val`: the verdicts of `check` in VAL's words, for programs that know those.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use elbowroom::AnyPlan;
+use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
+use elbowroom::model::validate::Settings;
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+
+use crate::args::ValArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::output::Output;
+use crate::{input, output};
+
+/// Digits after the point; times with so many are told apart by whoever reads them.
+const DIGITS: u32 = 6;
+
+/// Judges all plans, as VAL's `Validate` does.
+pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
+    let task = match input::task(&arguments.problem, &Task::default_epsilon(), output) {
+        Ok(task) => task,
+        Err(failure) => {
+            output::print("Problem in domain or problem description!\n")?;
+            return Err(failure);
+        }
+    };
+    let mut tally = Tally::default();
+    for path in &arguments.plans {
+        let plan = match read(&task, path, output) {
+            Ok(plan) => plan,
+            Err(failure) => {
+                output::print("Bad plan description!\n")?;
+                output.fail(&failure, false);
+                tally.bad.push(path.display().to_string());
+                continue;
+            }
+        };
+        let name = path.display().to_string();
+        let request = CheckRequest {
+            task: &task,
+            plan: Some(&plan),
+            name: name.clone(),
+            settings: Settings::like_val(arguments.tolerance.clone()),
+        };
+        let answer = check(&request).map_err(|error| Failure::new(error, ""))?;
+        let CheckAnswer::Plan(checked) = answer else {
+            continue;
+        };
+        let mut text = String::new();
+        if arguments.verbose {
+            push_plan(&mut text, &name, &plan);
+        }
+        tally.add(&mut text, arguments.verbose, &task, &plan, checked);
+        output::print(&text)?;
+    }
+    output::print(&tally.text())?;
+    Ok(match (tally.bad.is_empty(), tally.failed.is_empty()) {
+        (false, _) => Exit::BadInput,
+        (true, false) => Exit::No,
+        (true, true) => Exit::Yes,
+    })
+}
+
+fn read(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPlan, Failure> {
+    match input::any_plan(task, path, output)? {
+        AnyPlan::TimeTriggered(plan) => Ok(plan),
+        AnyPlan::Stn(_) => Err(Failure::new(
+            format!("{} is an STN plan file, which stands for many plans", path.display()),
+            "`elbowroom envelope` says whether all of them work",
+        )),
+    }
+}
+
+/// What came of the plans so far.
+#[derive(Default)]
+struct Tally {
+    /// Value and name.
+    valid: Vec<(String, String)>,
+    failed: Vec<String>,
+    /// Those that cannot be read.
+    bad: Vec<String>,
+}
+
+impl Tally {
+    fn add(
+        &mut self,
+        text: &mut String,
+        is_verbose: bool,
+        task: &Task,
+        plan: &TimeTriggeredPlan,
+        checked: PlanChecked,
+    ) {
+        let name = checked.plan;
+        match checked.finding {
+            CheckFinding::Valid {
+                makespan, metric, ..
+            } => {
+                if is_verbose {
+                    push_happenings(text, task, plan, None);
+                }
+                let value = metric.unwrap_or(makespan).to_decimal(DIGITS);
+                let _ = write!(
+                    text,
+                    "Plan executed successfully - checking goal\nPlan valid\nFinal value: {value} \n"
+                );
+                self.valid.push((value, name));
+            }
+            CheckFinding::Invalid { violation } => {
+                // The action to blame is found by its start.
+                let step = violation.step.and_then(|step| plan.steps.get(step));
+                let time = step.map_or(&violation.time, |step| &step.start);
+                if is_verbose {
+                    push_happenings(text, task, plan, Some(time));
+                }
+                text.push_str(match violation.action {
+                    Some(_) => "Plan failed to execute\n",
+                    None => {
+                        "Plan executed successfully - checking goal\nGoal not satisfied\nPlan invalid\n"
+                    }
+                });
+                let _ = write!(text, "\nPlan Repair Advice:\n\n{}\n\n", violation.message);
+                // What follows the advice ends with these words; the list is complete at the end.
+                let _ = writeln!(text, "Failed plans:\n {name} ");
+                self.failed.push(name);
+            }
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        if !self.valid.is_empty() {
+            text.push_str("\nSuccessful plans:");
+            for (value, name) in &self.valid {
+                let _ = write!(text, "\nValue: {value}\n {name} {value} ");
+            }
+            text.push('\n');
+        }
+        if self.failed.len() > 1 {
+            let _ = writeln!(text, "\nFailed plans:\n {} ", self.failed.join(" "));
+        }
+        if !self.bad.is_empty() {
+            let _ = writeln!(text, "\nBad plans:\n {} ", self.bad.join(" "));
+        }
+        text
+    }
+}
+
+fn push_plan(text: &mut String, name: &str, plan: &TimeTriggeredPlan) {
+    let _ = writeln!(text, "Checking plan: {name}\nPlan to validate:\n\nPlan size: {}", plan.steps.len());
+    for step in &plan.steps {
+        let _ = write!(text, "{}:\n{}", step.start.to_decimal(DIGITS), step.action.name);
+        if let Some(duration) = &step.duration {
+            let _ = write!(text, " [{}]", duration.to_decimal(DIGITS));
+        }
+        text.push('\n');
+    }
+    text.push_str("\nPlan Validation details\n-----------------------\n\n");
+}
+
+/// The times at which something happens, up to that one.
+fn push_happenings(
+    text: &mut String,
+    task: &Task,
+    plan: &TimeTriggeredPlan,
+    until: Option<&Rational>,
+) {
+    let mut times: BTreeSet<Rational> = task.timed().iter().map(|it| it.time.clone()).collect();
+    for step in &plan.steps {
+        times.insert(step.start.clone());
+        times.insert(step.end());
+    }
+    for time in times.iter().filter(|time| until.is_none_or(|until| *time <= until)) {
+        let mut time = time.to_decimal(DIGITS);
+        // A point is looked for.
+        if !time.contains('.') {
+            time.push_str(".0");
+        }
+        let _ = writeln!(text, "Checking next happening (time {time})");
+    }
+}

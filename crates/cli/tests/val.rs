@@ -1,0 +1,80 @@
+//! `elbowroom val` against the recorded verdicts of VAL, and under VAL's name.
+
+mod command;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use command::elbowroom;
+use skipped::skipped;
+
+/// Plans whose domains have processes or events, which we do not read.
+const NOT_READ: [&str; 3] = ["coffee", "sleeping-beauty", "vendingmachine"];
+
+/// The benchmark set; `None` where it is not installed.
+fn benchmarks() -> Option<PathBuf> {
+    let shared = std::env::var_os("ELBOWROOM_SHARED")
+        .map_or_else(|| command::root().join("../shared"), PathBuf::from);
+    let root = shared.join("data/pddl");
+    root.join("plans.csv").is_file().then_some(root)
+}
+
+/// The tolerance at which the judge and VAL agree on all plans (`docs/val-agreement.md`).
+#[test]
+fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
+    let Some(root) = benchmarks() else {
+        skipped("no benchmark set; set ELBOWROOM_SHARED to where it is");
+        return;
+    };
+    let table = std::fs::read_to_string(root.join("plans.csv")).expect("checked above");
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().expect("a header");
+    let column = |name: &str| header.iter().position(|it| *it == name).expect("a column");
+    let files = ["domain_file", "problem_file", "plan_file"].map(column);
+    let verdict = column("val_t1e-3");
+    let mut judged = 0;
+    for row in lines {
+        if NOT_READ.iter().any(|name| row[files[2]].contains(name)) {
+            continue;
+        }
+        let paths = files.map(|column| root.join(row[column]).display().to_string());
+        let answer = elbowroom(&["val", "-t", "0.001", &paths[0], &paths[1], &paths[2]]);
+        let text = String::from_utf8_lossy(&answer.stdout);
+        let says = |words: &str| text.contains(words);
+        match row[verdict] {
+            "valid" => assert!(says("Plan valid") && says("Successful plans:"), "{}: {text}", paths[2]),
+            "failed-to-execute" => {
+                let failed = says("Plan failed to execute") || says("Goal not satisfied");
+                assert!(failed && says("Failed plans:"), "{}: {text}", paths[2]);
+            }
+            _ => assert!(!says("Plan valid"), "{}: {text}", paths[2]),
+        }
+        assert_eq!(answer.status.success(), row[verdict] == "valid", "{}", paths[2]);
+        judged += 1;
+    }
+    assert!(judged > 150, "{judged} plans");
+}
+
+#[cfg(unix)]
+#[test]
+fn under_vals_name_the_command_takes_vals_arguments() {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("val");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    for name in ["Validate", "validate"] {
+        let link = folder.join(name);
+        let _ = std::fs::remove_file(&link);
+        std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_elbowroom"), &link).expect("a link");
+        let case = |file: &str| format!("cases/delivery/{file}");
+        let answer = Command::new(&link)
+            .current_dir(command::root())
+            .args(["-v", "-t", "0.001"])
+            .args(["domain.pddl", "problem.pddl", "plan.plan"].map(case))
+            .output()
+            .expect("the command can be started");
+        let text = String::from_utf8_lossy(&answer.stdout);
+        assert!(text.contains("Plan valid"), "{text}");
+        assert!(text.contains("Checking next happening (time 10.001)"), "{text}");
+    }
+}

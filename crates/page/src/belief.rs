@@ -1,0 +1,240 @@
+//! What was true while a plan was executed, and which values numbers had: what the executor
+//! believed, worked out again from what was reported.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom::answers::Exact;
+use elbowroom::execution::{Measured, Progression, Ticket};
+use elbowroom::model::ground::{Action, FactId, FluentId};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::report::line::ObservationLine;
+use elbowroom::report::short::nearest;
+
+use crate::document::{Change, SeriesLine, Texts};
+
+/// At most so many points are kept of one number, so that a long run's page stays small.
+const MOST_POINTS: usize = 20_000;
+
+/// The state during a run.
+pub(crate) struct Belief<'t> {
+    task: &'t Arc<Task>,
+    progression: Progression,
+    /// What was true when it was last looked at, by fact.
+    facts: Vec<bool>,
+    /// The values then, by fluent.
+    values: Vec<Option<Rational>>,
+    /// The changes so far.
+    changes: Vec<Change>,
+    /// The numbers so far: time and value.
+    numbers: BTreeMap<FluentId, Vec<(Rational, Rational)>>,
+}
+
+impl<'t> Belief<'t> {
+    /// Before anything has happened.
+    pub(crate) fn new(task: &'t Arc<Task>, texts: &mut Texts) -> Self {
+        let progression = Progression::new(Arc::clone(task));
+        let mut belief = Self {
+            task,
+            progression,
+            facts: Vec::new(),
+            values: Vec::new(),
+            changes: Vec::new(),
+            numbers: BTreeMap::new(),
+        };
+        belief.note(texts);
+        belief
+    }
+
+    /// Time passes.
+    pub(crate) fn advance(&mut self, to: &Rational, texts: &mut Texts) {
+        let past: Vec<Rational> = self
+            .task
+            .timed()
+            .iter()
+            .map(|timed| timed.time.clone())
+            .filter(|time| time > self.progression.time() && time < to)
+            .collect();
+        for time in past.iter().chain([to]) {
+            if time > self.progression.time() {
+                // A number without a value moves nowhere; there is nothing to show of it.
+                let _ = self.progression.advance(time);
+                self.note(texts);
+            }
+        }
+    }
+
+    /// An action that was told to last so long has started.
+    pub(crate) fn started(
+        &mut self,
+        ticket: u64,
+        action: &str,
+        planned: Option<&Rational>,
+        observation: &ObservationLine,
+        texts: &mut Texts,
+    ) {
+        let ObservationLine::Started { measured, time, .. } = observation else {
+            return;
+        };
+        let Some(action) = instantiate(self.task, action) else {
+            return;
+        };
+        self.advance(&time.0, texts);
+        let _ = self.progression.arrive(&time.0);
+        let planned = planned.cloned().unwrap_or_default();
+        let measured = self.measured(measured.iter());
+        let _ = self.progression.start(Ticket(ticket), &Arc::new(action), &planned, &measured);
+        self.note(texts);
+    }
+
+    /// Anything else was reported.
+    pub(crate) fn reported(&mut self, observation: &ObservationLine, texts: &mut Texts) {
+        match observation {
+            ObservationLine::Ended {
+                ticket,
+                outcome,
+                measured,
+                time,
+                ..
+            } => {
+                self.advance(&time.0, texts);
+                let _ = self.progression.arrive(&time.0);
+                let measured = self.measured(measured.iter());
+                if outcome == "succeeded" {
+                    let _ = self.progression.end(Ticket(*ticket), &measured);
+                } else {
+                    self.progression.stop(Ticket(*ticket));
+                }
+            }
+            ObservationLine::Fact {
+                fact,
+                becomes,
+                time,
+            } => {
+                self.advance(&time.0, texts);
+                let _ = self.progression.arrive(&time.0);
+                if let Some(fact) = self.task.fact_named(fact) {
+                    self.progression.see_fact(fact, *becomes);
+                }
+            }
+            ObservationLine::Value {
+                fluent,
+                value,
+                time,
+            } => {
+                self.advance(&time.0, texts);
+                let _ = self.progression.arrive(&time.0);
+                if let Some(fluent) = self.task.fluent_named(fluent) {
+                    self.progression.see_value(fluent, &value.0);
+                }
+            }
+            ObservationLine::Started { .. } | ObservationLine::Unintelligible { .. } => {}
+        }
+        self.note(texts);
+    }
+
+    /// The changes, and each number that has changed as a line.
+    pub(crate) fn finish(self) -> (Vec<Change>, Vec<SeriesLine>) {
+        let changed = self.numbers.into_iter().filter(|(_, points)| {
+            let first = points.first().map(|(_, value)| value);
+            points.iter().any(|(_, value)| Some(value) != first)
+        });
+        let lines = changed.map(|(fluent, points)| line(self.task.fluent_name(fluent), &points));
+        (self.changes, lines.collect())
+    }
+
+    fn measured<'m>(
+        &self,
+        measured: impl Iterator<Item = (&'m String, &'m Exact)>,
+    ) -> Vec<Measured> {
+        measured
+            .filter_map(|(fluent, amount)| {
+                Some(Measured {
+                    fluent: self.task.fluent_named(fluent)?,
+                    amount: amount.0.clone(),
+                })
+            })
+            .collect()
+    }
+
+    /// Notes what has changed since it last did.
+    fn note(&mut self, texts: &mut Texts) {
+        let time = self.progression.time().clone();
+        let at = time.to_f64();
+        self.facts.resize(self.task.fact_count(), false);
+        self.values.resize(self.task.fluent_count(), None);
+        for (fact, was_true) in (0..).map(FactId).zip(&mut self.facts) {
+            let is_true = self.progression.fact(fact);
+            if is_true != *was_true {
+                *was_true = is_true;
+                self.changes.push(Change {
+                    at,
+                    kind: "fact",
+                    name: texts.share(&self.task.fact_name(fact)),
+                    value: is_true.then(|| "true".to_owned()),
+                });
+            }
+        }
+        for (fluent, index) in (0..).map(FluentId).zip(0..self.values.len()) {
+            let Some(value) = self.progression.value(fluent) else {
+                continue;
+            };
+            if self.values[index].as_ref() == Some(value) {
+                continue;
+            }
+            let value = value.clone();
+            let before = self.values[index].replace(value.clone());
+            let is_moving = self.is_moving(fluent);
+            let points = self.numbers.entry(fluent).or_default();
+            if points.len() < MOST_POINTS {
+                // Until just now it was what it was.
+                if let (Some(before), false) = (before, is_moving) {
+                    points.push((time.clone(), before));
+                }
+                points.push((time.clone(), value.clone()));
+            }
+            self.changes.push(Change {
+                at,
+                kind: "number",
+                name: texts.share(&self.task.fluent_name(fluent)),
+                value: Some(nearest(&value)),
+            });
+        }
+    }
+
+    /// Whether a running action changes it continuously.
+    fn is_moving(&self, fluent: FluentId) -> bool {
+        self.progression.running().values().any(|underway| {
+            let body = underway.action.durative();
+            body.is_some_and(|body| body.continuous.iter().any(|effect| effect.fluent == fluent))
+        })
+    }
+}
+
+/// A number as a line, with its extremes in words.
+fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
+    let values = || points.iter().map(|(_, value)| value);
+    let word = |value: Option<&Rational>| value.map(nearest).unwrap_or_default();
+    SeriesLine {
+        name,
+        words: format!(
+            "{} at first, {} at last, between {} and {}",
+            word(values().next()),
+            word(values().last()),
+            word(values().min()),
+            word(values().max()),
+        ),
+        points: points
+            .iter()
+            .map(|(time, value)| (time.to_f64(), value.to_f64()))
+            .collect(),
+    }
+}
+
+fn instantiate(task: &Task, name: &str) -> Option<Action> {
+    let mut words = name.trim_matches(['(', ')']).split_whitespace();
+    let schema = task.problem().schema(words.next()?)?;
+    let objects: Option<Vec<_>> = words.map(|word| task.problem().object(word)).collect();
+    task.instantiate(schema, &objects?).ok()
+}

@@ -1,0 +1,293 @@
+//! What a page shows, as data: what the script in the page reads.
+//!
+//! Numbers are for drawing; whatever is read is a text, and was worked out exactly.
+
+use std::collections::HashMap;
+
+use serde::Serialize;
+
+/// A page.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Document {
+    /// The heading.
+    pub title: String,
+    /// The answer in one line.
+    pub verdict: Verdict,
+    /// What the page is about: names and values.
+    pub facts: Vec<(String, String)>,
+    /// What there is to see, from top to bottom.
+    pub sections: Vec<Section>,
+    /// Texts that occur often; see [`Text`].
+    pub texts: Vec<String>,
+}
+
+/// The answer in one line.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// How it looks.
+    pub tone: Tone,
+    /// The words.
+    pub words: String,
+}
+
+/// How an answer is to be taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tone {
+    /// Yes.
+    Good,
+    /// No.
+    Bad,
+    /// Neither.
+    Plain,
+}
+
+/// A text, or the position of one that occurs often in [`Document::texts`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum Text {
+    /// The text itself.
+    Own(String),
+    /// Its position.
+    Shared(usize),
+}
+
+impl From<String> for Text {
+    fn from(text: String) -> Self {
+        Self::Own(text)
+    }
+}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Self {
+        Self::Own(text.to_owned())
+    }
+}
+
+/// Texts that occur often, each once.
+#[derive(Debug, Default)]
+pub(crate) struct Texts {
+    texts: Vec<String>,
+    positions: HashMap<String, usize>,
+}
+
+impl Texts {
+    /// The text's position.
+    pub(crate) fn share(&mut self, text: &str) -> Text {
+        if let Some(&position) = self.positions.get(text) {
+            return Text::Shared(position);
+        }
+        let position = self.texts.len();
+        self.texts.push(text.to_owned());
+        self.positions.insert(text.to_owned(), position);
+        Text::Shared(position)
+    }
+
+    pub(crate) fn into_texts(self) -> Vec<String> {
+        self.texts
+    }
+}
+
+/// A part of a page.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "lowercase")]
+pub enum Section {
+    /// Actions in time.
+    Chart(Chart),
+    /// A table.
+    Table(Table),
+    /// Shares with their intervals.
+    Rates(Rates),
+    /// Numbers over time.
+    Series(Series),
+    /// Sentences.
+    Prose(Prose),
+}
+
+/// Actions in time, on lanes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Chart {
+    /// The heading.
+    pub heading: String,
+    /// Where the time axis ends; it begins at 0.
+    pub end: f64,
+    /// The ways to put the actions on lanes.
+    pub groupings: Vec<Grouping>,
+    /// The grouping to begin with.
+    pub chosen: usize,
+    /// The plans, by name, if there are several; [`Bar::plan`] says which one's an action is.
+    pub plans: Vec<String>,
+    /// The actions.
+    pub bars: Vec<Bar>,
+    /// Deadlines and other moments.
+    pub marks: Vec<Mark>,
+    /// What the plans order: positions in [`Chart::bars`], the one that comes first, and the other.
+    pub orderings: Vec<(usize, usize)>,
+    /// What was guaranteed, from when to when.
+    pub guarantee: Vec<Segment>,
+    /// What happened, in order of time, so that the state at any time can be shown; only of a run.
+    pub changes: Vec<Change>,
+    /// What was decided, in order of time; only of a run.
+    pub decisions: Vec<DecisionAt>,
+    /// Whether the actions were executed: there is a past to look at.
+    pub is_run: bool,
+}
+
+/// A way to put actions on lanes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Grouping {
+    /// What a lane stands for: `robot`.
+    pub name: String,
+    /// The lanes' names.
+    pub lanes: Vec<String>,
+}
+
+/// An action of a chart.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Bar {
+    /// The action.
+    pub name: String,
+    /// Planned start and end; equal for an instantaneous action.
+    pub planned: Option<(f64, f64)>,
+    /// Real start and end.
+    pub actual: Option<(f64, f64)>,
+    /// How it came out: `succeeded`, `failed`, `cancelled`, `running`, or nothing.
+    pub outcome: &'static str,
+    /// The earliest and latest start; `None` where there is no limit.
+    pub starts: Option<(Option<f64>, Option<f64>)>,
+    /// The earliest and latest end.
+    pub ends: Option<(Option<f64>, Option<f64>)>,
+    /// The lane in each grouping.
+    pub lanes: Vec<usize>,
+    /// The plan that it belongs to.
+    pub plan: usize,
+    /// What is shown when it is pointed at: names and values.
+    pub details: Vec<(&'static str, Text)>,
+}
+
+/// A moment.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mark {
+    /// When.
+    pub at: f64,
+    /// What happens.
+    pub name: String,
+    /// Whether it is a moment of the run, not one of the problem.
+    pub is_event: bool,
+}
+
+/// A stretch of time with one guarantee.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Segment {
+    /// From when on.
+    pub from: f64,
+    /// Until when.
+    pub to: f64,
+    /// 3: all of the envelope; 2: a part of it; 1: as planned; 0: luck; -1: none is made.
+    pub level: i8,
+    /// The guarantee in words.
+    pub words: String,
+}
+
+/// A fact or a number that has changed, or an action that starts or ends.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// When.
+    pub at: f64,
+    /// `fact` or `number`.
+    pub kind: &'static str,
+    /// Which fact, fluent or action.
+    pub name: Text,
+    /// What it is now; a fact that is no more has `None`.
+    pub value: Option<String>,
+}
+
+/// A decision.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DecisionAt {
+    /// When.
+    pub at: f64,
+    /// What, and why.
+    pub words: String,
+}
+
+/// A table.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Table {
+    /// The heading.
+    pub heading: String,
+    /// What there is to say about it.
+    pub note: String,
+    /// The columns: their headings, and whether they hold numbers.
+    pub columns: Vec<(String, bool)>,
+    /// The rows.
+    pub rows: Vec<Vec<Text>>,
+    /// The time of each row, in ascending order, if the rows are events of a run.
+    pub times: Vec<f64>,
+    /// The bar of the first chart that each row is about, if rows are about actions.
+    pub bars: Vec<usize>,
+}
+
+/// Shares with their intervals.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Rates {
+    /// The heading.
+    pub heading: String,
+    /// What there is to say about them.
+    pub note: String,
+    /// The groups.
+    pub groups: Vec<RateGroup>,
+}
+
+/// Shares that are compared with each other.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RateGroup {
+    /// What they have in common.
+    pub name: String,
+    /// The shares.
+    pub rates: Vec<Rate>,
+}
+
+/// A share with its interval.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Rate {
+    /// What it is the share of.
+    pub name: String,
+    /// The share, its lower and its upper end, between 0 and 1; `None` if there was no trial.
+    pub share: Option<(f64, f64, f64)>,
+    /// A share to compare it with: a published one, or the greatest possible.
+    pub mark: Option<f64>,
+    /// The same in words.
+    pub words: String,
+}
+
+/// Numbers over time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Series {
+    /// The heading.
+    pub heading: String,
+    /// Where the time axis ends.
+    pub end: f64,
+    /// One line for each.
+    pub lines: Vec<SeriesLine>,
+}
+
+/// A number over time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SeriesLine {
+    /// Its name.
+    pub name: String,
+    /// Time and value, in order of time; between them, it changes evenly.
+    pub points: Vec<(f64, f64)>,
+    /// Its first, least, greatest and last value.
+    pub words: String,
+}
+
+/// Sentences.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Prose {
+    /// The heading.
+    pub heading: String,
+    /// One paragraph each.
+    pub paragraphs: Vec<String>,
+}

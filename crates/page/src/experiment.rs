@@ -1,0 +1,251 @@
+//! An experiment: rates with intervals, paired comparisons, and how trials fail.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
+use elbowroom_laboratory::compare::{Cell, Results};
+use elbowroom_laboratory::perturbed::PerturbedResults;
+
+use crate::document::{
+    Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict,
+};
+use crate::plan::word;
+
+/// What the intervals are.
+const INTERVALS: &str = "The share of runs that reached the goal, with Wilson's 95 % interval.";
+
+/// The page about an experiment on a clock.
+pub(crate) fn timed(results: &Results) -> Document {
+    let mut sections = vec![Section::Rates(Rates {
+        heading: "Runs that reached the goal".to_owned(),
+        note: if results.optimum.is_empty() {
+            INTERVALS.to_owned()
+        } else {
+            format!("{INTERVALS} The line marks what the best of all executors can reach at most.")
+        },
+        groups: (0..results.columns.len()).map(|column| group(results, column)).collect(),
+    })];
+    if results.rows.len() > 1 {
+        sections.push(Section::Table(pairs(results)));
+    }
+    let verdicts = |cell: &Cell| cell.verdicts.clone();
+    sections.push(Section::Table(counts(results, "How runs ended", &verdicts)));
+    let causes = |cell: &Cell| cell.causes.clone();
+    let mut causes = counts(results, "Why plans were given up", &causes);
+    "The number of plans, by cause. One run may give up several.".clone_into(&mut causes.note);
+    sections.push(Section::Table(causes));
+    let runs = results.cells.iter().flatten().map(|cell| cell.runs).sum::<u64>();
+    Document {
+        title: results.title.clone(),
+        verdict: Verdict {
+            tone: Tone::Plain,
+            words: made(runs, "runs", results.is_interrupted),
+        },
+        facts: facts(results.trials, results.shards, &results.parts, &results.fingerprint),
+        sections,
+        texts: Vec::new(),
+    }
+}
+
+/// The page about an experiment in worlds without time.
+pub(crate) fn untimed(results: &PerturbedResults) -> Document {
+    let mut groups: Vec<RateGroup> = Vec::new();
+    let mut rows: Vec<Vec<Text>> = Vec::new();
+    for row in &results.rows {
+        let name = format!("{}, {}", row.case, word(&row.world));
+        let published = row.published.and_then(Proportion::share);
+        let rate = rate(word(&row.executor), row.success, published.or(row.optimum));
+        rows.push(vec![
+            row.case.as_str().into(),
+            word(&row.world).into(),
+            rate.name.as_str().into(),
+            rate.words.as_str().into(),
+            row.published.and_then(Proportion::share).map(percent).unwrap_or_default().into(),
+            row.optimum.map(percent).unwrap_or_default().into(),
+            mean(row.replans).into(),
+        ]);
+        match groups.last_mut().filter(|group| group.name == name) {
+            Some(group) => group.rates.push(rate),
+            None => groups.push(RateGroup {
+                name,
+                rates: vec![rate],
+            }),
+        }
+    }
+    let columns = [
+        ("case", false),
+        ("world", false),
+        ("executor", false),
+        ("success", true),
+        ("published", true),
+        ("optimum", true),
+        ("new plans", true),
+    ];
+    let sections = vec![
+        Section::Rates(Rates {
+            heading: "Trials that succeeded".to_owned(),
+            note: format!(
+                "{INTERVALS} The line marks the published share or, where there is none, the \
+                 greatest possible one, as far as they are known."
+            ),
+            groups,
+        }),
+        Section::Table(Table {
+            heading: "All rows".to_owned(),
+            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            rows,
+            ..Table::default()
+        }),
+    ];
+    let trials = results.rows.iter().map(|row| row.success.count).sum::<u64>();
+    Document {
+        title: results.title.clone(),
+        verdict: Verdict {
+            tone: Tone::Plain,
+            words: made(trials, "trials", results.is_interrupted),
+        },
+        facts: facts(results.trials, results.shards, &results.parts, &results.fingerprint),
+        sections,
+        texts: Vec::new(),
+    }
+}
+
+/// How many were made.
+fn made(count: u64, what: &str, is_interrupted: bool) -> String {
+    if is_interrupted {
+        return format!("{count} {what}; the experiment was interrupted before all were made.");
+    }
+    format!("{count} {what}.")
+}
+
+fn facts(trials: u64, shards: u64, parts: &[u64], fingerprint: &str) -> Vec<(String, String)> {
+    let mut facts = vec![
+        ("trials of each".to_owned(), trials.to_string()),
+        ("fingerprint".to_owned(), fingerprint.to_owned()),
+    ];
+    if shards > 1 {
+        let parts: Vec<String> = parts.iter().map(u64::to_string).collect();
+        facts.push(("parts".to_owned(), format!("{} of {shards}", parts.join(", "))));
+    }
+    facts
+}
+
+/// The executors in one column.
+fn group(results: &Results, column: usize) -> RateGroup {
+    let best = results.optimum.get(column).filter(|best| best.unknown.is_none());
+    let best = best.map(|best| best.upper);
+    let rows = results.rows.iter().zip(&results.cells);
+    RateGroup {
+        name: results.columns[column].clone(),
+        rates: rows
+            .map(|(row, cells)| {
+                let cell = &cells[column];
+                let success = Proportion {
+                    successes: cell.successes,
+                    count: cell.runs,
+                };
+                let replans = Mean {
+                    sum: cell.replans,
+                    count: cell.successes,
+                };
+                let mut rate = rate(row.clone(), success, best);
+                rate.words = format!("{}; new plans in these: {}", rate.words, mean(replans));
+                rate
+            })
+            .collect(),
+    }
+}
+
+fn rate(name: String, success: Proportion, mark: Option<f64>) -> Rate {
+    let share = success.share().zip(success.wilson());
+    Rate {
+        name,
+        share: share.map(|(share, (lower, upper))| (share, lower, upper)),
+        mark,
+        words: match share {
+            Some((share, (lower, upper))) => format!(
+                "{} [{}, {}], {} of {}",
+                percent(share),
+                percent(lower),
+                percent(upper),
+                success.successes,
+                success.count
+            ),
+            None => "no runs".to_owned(),
+        },
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", share * 100.0)
+}
+
+fn mean(mean: Mean) -> String {
+    mean.value().map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}"))
+}
+
+/// Each executor against the first one, in the same worlds.
+fn pairs(results: &Results) -> Table {
+    let first = results.rows.first().cloned().unwrap_or_default();
+    let columns = [
+        ("world".to_owned(), false),
+        ("executor".to_owned(), false),
+        (format!("only {first} reached the goal"), true),
+        ("only this one did".to_owned(), true),
+        ("p".to_owned(), true),
+    ];
+    let mut rows: Vec<Vec<Text>> = Vec::new();
+    for (column, world) in results.columns.iter().enumerate() {
+        for (row, pairs) in results.rows.iter().zip(&results.pairs).skip(1) {
+            let pair = pairs[column];
+            let p = mcnemar(pair.only_first, pair.only_this);
+            rows.push(vec![
+                world.as_str().into(),
+                row.as_str().into(),
+                pair.only_first.to_string().into(),
+                pair.only_this.to_string().into(),
+                if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}").into() },
+            ]);
+        }
+    }
+    Table {
+        heading: format!("Compared with {first}, trial by trial"),
+        note: "All executors meet the same worlds. p is that of McNemar's exact test: how likely \
+               so uneven a division would be if both were equally good. It is not corrected for \
+               the number of comparisons."
+            .to_owned(),
+        columns: columns.to_vec(),
+        rows,
+        ..Table::default()
+    }
+}
+
+/// Counts by name, a column for each name.
+fn counts(
+    results: &Results,
+    heading: &str,
+    counts: &dyn Fn(&Cell) -> BTreeMap<String, u64>,
+) -> Table {
+    let names: BTreeSet<String> =
+        results.cells.iter().flatten().flat_map(|cell| counts(cell).into_keys()).collect();
+    let mut columns = vec![("world".to_owned(), false), ("executor".to_owned(), false)];
+    columns.extend(names.iter().map(|name| (name.replace('-', " "), true)));
+    let mut rows: Vec<Vec<Text>> = Vec::new();
+    for (column, world) in results.columns.iter().enumerate() {
+        for (row, cells) in results.rows.iter().zip(&results.cells) {
+            let counted = counts(&cells[column]);
+            let mut cells: Vec<Text> = vec![world.as_str().into(), row.as_str().into()];
+            for name in &names {
+                let count = counted.get(name).copied().unwrap_or_default();
+                cells.push(count.to_string().into());
+            }
+            rows.push(cells);
+        }
+    }
+    Table {
+        heading: heading.to_owned(),
+        columns,
+        rows,
+        ..Table::default()
+    }
+}

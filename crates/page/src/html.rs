@@ -1,0 +1,114 @@
+//! A document as one HTML file.
+
+use serde::Serialize;
+
+use crate::document::Document;
+
+const TEMPLATE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("page.css");
+/// In order: later ones call earlier ones.
+const SCRIPTS: &[&str] = &[
+    include_str!("script/elements.js"),
+    include_str!("script/table.js"),
+    include_str!("script/drawing.js"),
+    include_str!("script/chart.js"),
+    include_str!("script/scrub.js"),
+    include_str!("script/plots.js"),
+    include_str!("script/page.js"),
+];
+
+/// The page as a file that needs nothing else.
+pub(crate) fn html(document: &Document) -> String {
+    let parts = [
+        ("{title}", as_text(&document.title)),
+        ("{verdict}", as_text(&document.verdict.words)),
+        ("{style}", STYLE.to_owned()),
+        ("{data}", as_data(document)),
+        ("{script}", SCRIPTS.concat()),
+    ];
+    // What is put in is not searched: it may have anything in it.
+    let mut page = String::new();
+    let mut rest = TEMPLATE;
+    while let Some((before, name, after)) = next(rest, &parts) {
+        page.push_str(before);
+        page.push_str(name);
+        rest = after;
+    }
+    page.push_str(rest);
+    page
+}
+
+/// The text before the next place that is to be filled, what comes there, and the text behind it.
+fn next<'a>(
+    template: &'a str,
+    parts: &'a [(&str, String)],
+) -> Option<(&'a str, &'a str, &'a str)> {
+    let places = parts.iter().filter_map(|(name, text)| Some((template.find(name)?, name, text)));
+    let (position, name, text) = places.min_by_key(|(position, ..)| *position)?;
+    Some((&template[..position], text, &template[position + name.len()..]))
+}
+
+/// A text between tags.
+fn as_text(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// A value as JSON in a script block: nothing in it can end the block or begin a comment.
+fn as_data(value: &impl Serialize) -> String {
+    let json = serde_json::to_string(value).unwrap_or_else(|_| "null".to_owned());
+    let mut safe = String::with_capacity(json.len());
+    for character in json.chars() {
+        match character {
+            '<' => safe.push_str("\\u003c"),
+            '>' => safe.push_str("\\u003e"),
+            '&' => safe.push_str("\\u0026"),
+            '\u{2028}' => safe.push_str("\\u2028"),
+            '\u{2029}' => safe.push_str("\\u2029"),
+            other => safe.push(other),
+        }
+    }
+    safe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{as_data, html};
+    use crate::document::{Document, Tone, Verdict};
+
+    const HOSTILE: &str = "</script><script>alert(1)</script><!-- {data} {script} & \u{2028} \u{202e}";
+
+    #[test]
+    fn a_hostile_text_in_data_stays_one_json_text() {
+        let data = as_data(&HOSTILE);
+        assert!(!data.contains(['<', '>', '&', '\u{2028}']));
+        let read: String = serde_json::from_str(&data).unwrap();
+        assert_eq!(read, HOSTILE);
+    }
+
+    #[test]
+    fn what_is_put_into_a_page_is_not_searched_for_more_places() {
+        let document = Document {
+            title: HOSTILE.to_owned(),
+            verdict: Verdict {
+                tone: Tone::Plain,
+                words: HOSTILE.to_owned(),
+            },
+            facts: Vec::new(),
+            sections: Vec::new(),
+            texts: Vec::new(),
+        };
+        let page = html(&document);
+        assert_eq!(page.matches("alert(1)</script>").count(), 0);
+        let empty = Document {
+            title: String::new(),
+            verdict: Verdict {
+                tone: Tone::Plain,
+                words: String::new(),
+            },
+            ..document
+        };
+        let tags = |page: &str| page.matches("<script").count();
+        assert_eq!(tags(&page), tags(&html(&empty)));
+        assert_eq!(page.matches("{data}").count(), 4, "twice as text, twice in the data");
+    }
+}

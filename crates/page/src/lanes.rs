@@ -1,0 +1,223 @@
+//! On which lane of a chart an action belongs.
+
+use std::collections::BTreeMap;
+
+use crate::document::Grouping;
+
+/// An action as lanes see it: its name, and when it happens.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Occupant<'a> {
+    /// `(drive rover depot shelf)`.
+    pub(crate) name: &'a str,
+    /// Start and end.
+    pub(crate) time: (f64, f64),
+}
+
+/// The ways to put actions on lanes, the one to begin with, and the lane of each action in each of
+/// them, action by action.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Lanes {
+    pub(crate) groupings: Vec<Grouping>,
+    pub(crate) chosen: usize,
+    pub(crate) of: Vec<Vec<usize>>,
+}
+
+/// What an action without an object of the lanes' type is put under.
+const OTHERS: &str = "others";
+
+/// The ways to put these actions on lanes.
+///
+/// There is one for each type of object that occurs: a lane for each object, with the actions that
+/// mention it first among those of its type. The one to begin with is the type whose objects come
+/// early in the names of most actions, as acting objects do, without having to do two things at once.
+pub(crate) fn lanes<'a>(
+    occupants: &[Occupant<'_>],
+    type_of: &dyn Fn(&str) -> Option<&'a str>,
+) -> Lanes {
+    let mut lanes = Lanes {
+        groupings: Vec::new(),
+        chosen: 0,
+        of: vec![Vec::new(); occupants.len()],
+    };
+    let mut best: Option<f64> = None;
+    for kind in kinds(occupants, type_of) {
+        let keys: Vec<Option<(usize, &str)>> = occupants
+            .iter()
+            .map(|occupant| {
+                let objects = objects(occupant.name).enumerate();
+                let mut of_kind = objects.filter(|(_, name)| kind.takes(name, type_of));
+                of_kind.next()
+            })
+            .collect();
+        let score = score(occupants, &keys);
+        if best.is_none_or(|best| score > best) {
+            (best, lanes.chosen) = (Some(score), lanes.groupings.len());
+        }
+        let keys: Vec<Option<&str>> = keys.iter().map(|key| key.map(|(_, name)| name)).collect();
+        lanes.add(kind.name().to_owned(), &keys);
+    }
+    let actions: Vec<Option<&str>> = occupants
+        .iter()
+        .map(|occupant| occupant.name.trim_start_matches('(').split([' ', ')']).next())
+        .collect();
+    lanes.add("action".to_owned(), &actions);
+    lanes
+}
+
+impl Lanes {
+    fn add(&mut self, name: String, keys: &[Option<&str>]) {
+        let mut positions: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut grouping = Grouping {
+            name,
+            lanes: Vec::new(),
+        };
+        let mut others = None;
+        for key in keys.iter().flatten() {
+            positions.entry(key).or_insert_with(|| {
+                grouping.lanes.push((*key).to_owned());
+                grouping.lanes.len() - 1
+            });
+        }
+        for (of, key) in self.of.iter_mut().zip(keys) {
+            of.push(match key {
+                Some(key) => positions[key],
+                None => *others.get_or_insert(grouping.lanes.len()),
+            });
+        }
+        if others.is_some() {
+            grouping.lanes.push(OTHERS.to_owned());
+        }
+        self.groupings.push(grouping);
+    }
+}
+
+/// What the lanes of a grouping stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind<'a> {
+    /// The objects of a type.
+    Type(&'a str),
+    /// The first object of each action, whatever it is.
+    First,
+}
+
+impl<'a> Kind<'a> {
+    fn takes(self, object: &str, type_of: &dyn Fn(&str) -> Option<&'a str>) -> bool {
+        match self {
+            Self::Type(name) => type_of(object) == Some(name),
+            Self::First => true,
+        }
+    }
+
+    fn name(self) -> &'a str {
+        match self {
+            Self::Type(name) => name,
+            Self::First => "first object",
+        }
+    }
+}
+
+/// The types that occur, in the order in which they do; without types, the first object counts.
+fn kinds<'a>(
+    occupants: &[Occupant<'_>],
+    type_of: &dyn Fn(&str) -> Option<&'a str>,
+) -> Vec<Kind<'a>> {
+    let mut kinds = Vec::new();
+    for object in occupants.iter().flat_map(|occupant| objects(occupant.name)) {
+        if let Some(kind) = type_of(object).filter(|kind| *kind != "object") {
+            let kind = Kind::Type(kind);
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+    }
+    if kinds.is_empty() && occupants.iter().any(|it| objects(it.name).next().is_some()) {
+        kinds.push(Kind::First);
+    }
+    kinds
+}
+
+/// The objects in an action's name.
+fn objects(name: &str) -> impl Iterator<Item = &str> {
+    name.trim_matches(['(', ')']).split_whitespace().skip(1)
+}
+
+/// How well objects do as lanes: one for each action that names one first, less the later it is
+/// named, and one off for each action that begins while another is on its lane.
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "positions of arguments are small"
+)]
+fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> f64 {
+    let mut order: Vec<usize> = (0..occupants.len()).collect();
+    order.sort_by(|&a, &b| occupants[a].time.0.total_cmp(&occupants[b].time.0));
+    let mut busy: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut score = 0.0;
+    for index in order {
+        let Some((position, object)) = keys[index] else {
+            continue;
+        };
+        let (start, end) = occupants[index].time;
+        let until = busy.entry(object).or_insert(f64::NEG_INFINITY);
+        score += 1.0 / (1.0 + position as f64);
+        if start < *until {
+            score -= 1.0;
+        }
+        *until = until.max(end);
+    }
+    score
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Occupant, lanes};
+
+    fn type_of(object: &str) -> Option<&'static str> {
+        match object {
+            "r1" | "r2" => Some("robot"),
+            "a" | "b" => Some("place"),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn robots_are_lanes_and_what_needs_none_is_with_the_others() {
+        let occupants = [
+            ("(drive r1 a b)", (0.0, 5.0)),
+            ("(drive r2 a b)", (0.0, 7.0)),
+            ("(open b)", (1.0, 2.0)),
+            ("(load r1 b)", (5.1, 6.0)),
+        ]
+        .map(|(name, time)| Occupant { name, time });
+        let lanes = lanes(&occupants, &type_of);
+        let names: Vec<&str> = lanes.groupings.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(names, ["robot", "place", "action"]);
+        assert_eq!(lanes.chosen, 0);
+        assert_eq!(lanes.groupings[0].lanes, ["r1", "r2", "others"]);
+        assert_eq!(lanes.groupings[1].lanes, ["a", "b"]);
+        let by_robot: Vec<usize> = lanes.of.iter().map(|of| of[0]).collect();
+        assert_eq!(by_robot, [0, 1, 2, 0]);
+    }
+
+    #[test]
+    fn objects_that_would_do_several_things_at_once_are_no_lanes_to_begin_with() {
+        let occupants = ["(serve a r1)", "(serve a r2)", "(serve a r3)"].map(|name| Occupant {
+            name,
+            time: (0.0, 9.0),
+        });
+        let type_of = |object: &str| Some(if object == "a" { "place" } else { "robot" });
+        let lanes = lanes(&occupants, &type_of);
+        assert_eq!(lanes.groupings[lanes.chosen].name, "robot");
+    }
+
+    #[test]
+    fn without_types_the_first_object_is_the_lane_and_without_objects_the_action() {
+        let untyped = [Occupant { name: "(go x y)", time: (0.0, 1.0) }];
+        let names = |occupants: &[Occupant<'_>]| -> Vec<String> {
+            let lanes = lanes(occupants, &|_| None);
+            lanes.groupings.into_iter().map(|it| it.name).collect()
+        };
+        assert_eq!(names(&untyped), ["first object", "action"]);
+        assert_eq!(names(&[Occupant { name: "(idle)", time: (0.0, 1.0) }]), ["action"]);
+        assert_eq!(names(&[]), ["action"]);
+    }
+}

@@ -1,0 +1,166 @@
+//! Plans, runs and experiments as self-contained HTML pages.
+//!
+//! In: an answer as a document, the trace of a run, or the results of an experiment. Out: one HTML
+//! file with its style, its script and its data inside, which needs no network and can be sent by
+//! mail. It knows no files, no clock and no command line, and the same input gives the same bytes.
+//!
+//! What is read on a page was worked out here, from exact numbers; the script in it draws, filters and
+//! moves through time, and computes nothing that somebody could rely on. Names and other texts that
+//! come from outside are data: they reach the page in a block of JSON, and the script only ever shows
+//! them as text.
+//!
+//! - [`document`]: what a page shows, as data.
+//! - `plan`, `run`, `experiment`: from answers, traces and results to documents.
+//! - `lanes`: on which lane of a chart an action belongs.
+//! - `html`: the document as a file.
+//! - `perfetto`, `mcap`: a run for other viewers.
+//!
+//! ```
+//! # fn main() -> Result<(), elbowroom_page::PageError> {
+//! let answer = r#"{
+//!     "format": "elbowroom-run", "version": 1, "verdict": "goal-reached", "why": null,
+//!     "time": { "exact": "7/2", "decimal": 3.5 }, "replans": 0, "reasons": [], "dead_end": [],
+//!     "starts": 1, "executed": [{
+//!         "start": { "exact": "0", "decimal": 0.0 }, "action": "(wave rover)",
+//!         "duration": { "exact": "7/2", "decimal": 3.5 }, "ticket": 0, "outcome": "succeeded" }]
+//! }"#;
+//! let page = elbowroom_page::page("outcome.json", answer)?;
+//! assert!(page.contains("The goal was reached at 3.5"));
+//! # Ok(())
+//! # }
+//! ```
+
+mod belief;
+pub mod document;
+mod experiment;
+mod html;
+mod lanes;
+mod mcap;
+mod perfetto;
+mod plan;
+mod run;
+
+use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RunAnswer};
+use elbowroom::execute::RunSpec;
+use elbowroom::report::trace::Stored;
+use elbowroom_laboratory::compare::Results;
+use elbowroom_laboratory::perturbed::PerturbedResults;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use document::Document;
+
+/// Why no page can be made of a text.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PageError {
+    /// It is something else.
+    #[error(
+        "{0} is none of what a page can be made of: the trace of a run (`run --trace`), \
+         an answer (`envelope --json`, `plan --json`, `run --json`), or the results of an experiment \
+         (`results.json` of `compare`)"
+    )]
+    Unknown(String),
+    /// It is a document of this program, but pages show nothing of its kind.
+    #[error(
+        "{name} is a document of the format {format}; pages are made of traces (`run --trace`), of \
+         the answers of `envelope`, `plan` and `run`, and of the results of `compare`"
+    )]
+    OtherFormat {
+        /// What the text is called.
+        name: String,
+        /// The format that it says it has.
+        format: String,
+    },
+    /// It is no run.
+    #[error("{0} is not the trace of a run (`run --trace`), and other viewers show nothing else")]
+    NoRun(String),
+    /// It says that it is one of these, but is damaged, or of another version.
+    #[error("{name} cannot be read: {why}")]
+    Damaged {
+        /// What the text is called.
+        name: String,
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+/// The page about an answer, a trace, or results: an HTML file. `name` is what the text is called, such
+/// as its file.
+///
+/// # Errors
+/// When the text is none of these, or damaged.
+pub fn page(name: &str, text: &str) -> Result<String, PageError> {
+    Ok(html::html(&document(name, text)?))
+}
+
+/// The run of a stored trace in the format of Perfetto, <https://ui.perfetto.dev>.
+///
+/// # Errors
+/// When the text is no trace of a run, or damaged.
+pub fn perfetto(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
+    let no_run = || PageError::NoRun(name.to_owned());
+    perfetto::trace(&document(name, text)?).ok_or_else(no_run)
+}
+
+/// The run of a stored trace as an MCAP file, <https://mcap.dev>.
+///
+/// # Errors
+/// When the text is no trace of a run, or damaged.
+pub fn mcap(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
+    let no_run = || PageError::NoRun(name.to_owned());
+    mcap::file(&document(name, text)?).ok_or_else(no_run)
+}
+
+/// What the page about an answer, a trace, or results shows.
+///
+/// # Errors
+/// As [`page`].
+pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
+    let damaged = |why: String| PageError::Damaged {
+        name: name.to_owned(),
+        why,
+    };
+    match format(text).as_deref() {
+        Some("elbowroom-trace") => {
+            let stored = Stored::read(text).map_err(|error| damaged(error.to_string()))?;
+            let spec: RunSpec = stored.header().map_err(|error| damaged(error.to_string()))?;
+            Ok(run::trace(name, &stored, &spec))
+        }
+        Some("elbowroom-envelope") => read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it)),
+        Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::found(&it)),
+        Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
+        Some("elbowroom-results") => {
+            let results = Results::read(text).map_err(|error| damaged(error.to_string()))?;
+            Ok(experiment::timed(&results))
+        }
+        Some("elbowroom-perturbed-results") => {
+            let results = PerturbedResults::read(text);
+            let results = results.map_err(|error| damaged(error.to_string()))?;
+            Ok(experiment::untimed(&results))
+        }
+        Some(format) => Err(PageError::OtherFormat {
+            name: name.to_owned(),
+            format: format.to_owned(),
+        }),
+        None => Err(PageError::Unknown(name.to_owned())),
+    }
+}
+
+/// The format that a document, or the first line of a trace, says it has.
+fn format(text: &str) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Named {
+        format: String,
+    }
+    let first = text.lines().next().unwrap_or_default();
+    let named: Named = serde_json::from_str(text).or_else(|_| serde_json::from_str(first)).ok()?;
+    Some(named.format)
+}
+
+fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, PageError> {
+    serde_json::from_str(text).map_err(|error| PageError::Damaged {
+        name: name.to_owned(),
+        why: error.to_string(),
+    })
+}

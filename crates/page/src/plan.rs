@@ -1,0 +1,353 @@
+//! A plan, with its envelope if there is one.
+
+mod tables;
+
+use std::collections::BTreeMap;
+
+use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
+use elbowroom::answers::envelope::{
+    Counterexample, EnvelopeAnswer, EnvelopeFinding, Failing, Room, Stop,
+};
+use elbowroom::answers::plan::{PlanAnswer, PlanFinding};
+use elbowroom::report::short::nearest;
+
+use crate::document::{
+    Bar, Chart, Document, Mark, Prose, Section, Table, Text, Texts, Tone, Verdict,
+};
+use crate::lanes::{Lanes, Occupant, lanes};
+use tables::{ends, quantities, ranges, rooms, times};
+
+/// The page about an envelope.
+pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
+    let mut texts = Texts::default();
+    let mut facts = vec![
+        ("domain".to_owned(), answer.domain.clone()),
+        ("problem".to_owned(), answer.problem.clone()),
+        ("plan".to_owned(), answer.plan.clone()),
+        ("guarantee".to_owned(), word(&answer.settings.guarantee)),
+        ("epsilon".to_owned(), nearest(&answer.settings.epsilon)),
+    ];
+    let mut sections = Vec::new();
+    let verdict = match &answer.finding {
+        EnvelopeFinding::Envelope {
+            parameters,
+            stop,
+            checks,
+            timeline,
+            ..
+        } => {
+            facts.push(("boxes checked".to_owned(), checks.to_string()));
+            if let Some(timeline) = timeline {
+                sections.push(Section::Chart(chart(timeline, parameters, &mut texts)));
+            }
+            sections.push(Section::Table(rooms(parameters, &mut texts)));
+            sections.extend(timeline.as_ref().map(|it| Section::Table(times(it))));
+            good(match stop {
+                Stop::Converged => "The plan works as long as each quantity stays inside its interval, whatever the others do in theirs.",
+                _ => "The plan works as long as each quantity stays inside its interval. The search was ended early: wider intervals may do, too.",
+            })
+        }
+        EnvelopeFinding::Inside { parameters } => {
+            sections.push(Section::Table(ranges(parameters)));
+            good("The plan works everywhere in this box.")
+        }
+        EnvelopeFinding::Outside {
+            parameters,
+            counterexample,
+        } => {
+            sections.extend(failure(counterexample, &mut texts));
+            sections.push(Section::Table(ranges(parameters)));
+            bad("The plan does not work everywhere in this box.")
+        }
+        EnvelopeFinding::Fails(Failing::AsPlanned {
+            parameters,
+            counterexample,
+        }) => {
+            sections.extend(failure(counterexample, &mut texts));
+            sections.push(Section::Table(quantities(parameters)));
+            bad("The plan fails even if nothing deviates.")
+        }
+        EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
+            sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            bad("The plan is not valid as it stands.")
+        }
+        EnvelopeFinding::None { stop } => Verdict {
+            tone: Tone::Plain,
+            words: format!("Nothing is known yet: the search ended before it began ({}).", word(stop)),
+        },
+    };
+    Document {
+        title: format!("Elbow room of {}", name_of(&answer.plan, &answer.problem)),
+        verdict,
+        facts,
+        sections,
+        texts: texts.into_texts(),
+    }
+}
+
+/// The page about what a planner found.
+pub(crate) fn found(answer: &PlanAnswer) -> Document {
+    let mut texts = Texts::default();
+    let mut facts = vec![
+        ("domain".to_owned(), answer.domain.clone()),
+        ("problem".to_owned(), answer.problem.clone()),
+        ("planner".to_owned(), answer.planner.clone()),
+    ];
+    let mut sections = Vec::new();
+    let verdict = match &answer.finding {
+        PlanFinding::Plan {
+            makespan,
+            metric,
+            repaired,
+            steps,
+            ..
+        } => {
+            if let Some(metric) = metric {
+                facts.push(("metric".to_owned(), nearest(metric)));
+            }
+            let actions = steps.iter().map(|step| TimedAction {
+                instance: String::new(),
+                action: step.action.clone(),
+                start: step.start.clone(),
+                end: step.duration.as_ref().map(|it| (&step.start.0 + &it.0).into()),
+                start_window: WindowAnswer::default(),
+                end_window: None,
+                parameter: None,
+            });
+            let timeline = Timeline {
+                actions: actions.collect(),
+                ..Timeline::default()
+            };
+            sections.push(Section::Chart(chart(&timeline, &[], &mut texts)));
+            sections.push(Section::Table(times(&timeline)));
+            if let Some(repaired) = repaired {
+                let heading = "What was wrong with the planner's own times";
+                sections.push(prose(heading, vec![repaired.clone()]));
+            }
+            good(&format!("A plan that reaches the goal at {}.", nearest(makespan)))
+        }
+        PlanFinding::NoPlan { reason } => bad(&format!("There is no plan: {reason}")),
+        PlanFinding::None { reason } => Verdict {
+            tone: Tone::Plain,
+            words: format!("It is not known whether there is a plan: {reason}"),
+        },
+    };
+    Document {
+        title: format!("Plan for {}", answer.problem),
+        verdict,
+        facts,
+        sections,
+        texts: texts.into_texts(),
+    }
+}
+
+/// What goes wrong, as sentences and as a schedule.
+fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
+    let mut paragraphs = vec![example.message.clone()];
+    if let Some(shortfall) = &example.shortfall {
+        paragraphs.push(format!("By {}.", nearest(shortfall)));
+    }
+    paragraphs.extend(example.verdict.clone());
+    paragraphs.extend(example.plays.iter().cloned());
+    let mut sections = vec![prose("What can go wrong", paragraphs)];
+    if !example.schedule.is_empty() {
+        let actions = example.schedule.iter().map(|happening| TimedAction {
+            instance: happening.instance.clone(),
+            action: happening.action.clone(),
+            start: happening.start.clone(),
+            end: happening.end.clone(),
+            start_window: WindowAnswer::default(),
+            end_window: None,
+            parameter: None,
+        });
+        let timeline = Timeline {
+            actions: actions.collect(),
+            ..Timeline::default()
+        };
+        let mut chart = chart(&timeline, &[], texts);
+        chart.heading = "A schedule that fails".to_owned();
+        sections.push(Section::Chart(chart));
+    }
+    if !example.values.is_empty() {
+        let row = |(name, value): (&String, &elbowroom::answers::Exact)| {
+            vec![name.as_str().into(), nearest(&value.0).into()]
+        };
+        sections.push(Section::Table(Table {
+            heading: "The values with which it fails".to_owned(),
+            columns: vec![("parameter".to_owned(), false), ("value".to_owned(), true)],
+            rows: example.values.iter().map(row).collect(),
+            ..Table::default()
+        }));
+    }
+    sections
+}
+
+/// The plan as a chart.
+fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
+    let by_name: BTreeMap<&str, &Room> = rooms
+        .iter()
+        .map(|room| (room.range.quantity.name.as_str(), room))
+        .collect();
+    let time = |action: &TimedAction| {
+        let end = action.end.as_ref().unwrap_or(&action.start);
+        (action.start.0.to_f64(), end.0.to_f64())
+    };
+    let occupants: Vec<Occupant<'_>> = timeline
+        .actions
+        .iter()
+        .map(|action| Occupant {
+            name: &action.action,
+            time: time(action),
+        })
+        .collect();
+    let type_of = |object: &str| timeline.types.get(object).map(String::as_str);
+    let Lanes {
+        groupings,
+        chosen,
+        of,
+    } = lanes(&occupants, &type_of);
+    let mut bars = Vec::with_capacity(timeline.actions.len());
+    for (action, lanes) in timeline.actions.iter().zip(of) {
+        let room = action.parameter.as_deref().and_then(|name| by_name.get(name));
+        bars.push(Bar {
+            name: action.action.clone(),
+            planned: Some(time(action)),
+            starts: band(&action.start_window),
+            ends: action.end_window.as_ref().and_then(band),
+            lanes,
+            details: details(action, room.copied(), texts),
+            ..Bar::default()
+        });
+    }
+    let marks: Vec<Mark> = timeline
+        .timed
+        .iter()
+        .map(|timed| Mark {
+            at: timed.time.0.to_f64(),
+            name: timed.changes.join(", "),
+            is_event: false,
+        })
+        .collect();
+    Chart {
+        heading: "The plan in time".to_owned(),
+        end: end_of_axis(&bars, &marks),
+        groupings,
+        chosen,
+        bars,
+        marks,
+        ..Chart::default()
+    }
+}
+
+/// Where the axis ends: behind all that is planned, and behind what may come later as far as that is
+/// not so far away that nothing else could be seen.
+pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
+    let spans = bars.iter().flat_map(|bar| [bar.planned, bar.actual]).flatten();
+    let done = spans.map(|(_, end)| end).fold(0.0, f64::max);
+    let latest = |band: Option<(Option<f64>, Option<f64>)>| band.and_then(|(_, latest)| latest);
+    let bands = bars.iter().flat_map(|bar| [latest(bar.starts), latest(bar.ends)]).flatten();
+    let later = bands.chain(marks.iter().map(|mark| mark.at));
+    let far = if done > 0.0 { 3.0 * done } else { f64::MAX };
+    let end = later.filter(|time| *time <= far).fold(done, f64::max);
+    if end > 0.0 { end } else { 1.0 }
+}
+
+/// A window for drawing; `None` if it has no end on either side.
+pub(crate) fn band(window: &WindowAnswer) -> Option<(Option<f64>, Option<f64>)> {
+    let decimal = |end: &Option<elbowroom::answers::Exact>| end.as_ref().map(|it| it.0.to_f64());
+    let band = (decimal(&window.earliest), decimal(&window.latest));
+    (band != (None, None)).then_some(band)
+}
+
+/// A window in words; `None` if it says nothing.
+pub(crate) fn window_words(window: &WindowAnswer) -> Option<String> {
+    match (&window.earliest, &window.latest) {
+        (None, None) => None,
+        (Some(earliest), None) => Some(format!("{} or later", nearest(&earliest.0))),
+        (None, Some(latest)) => Some(format!("{} or earlier", nearest(&latest.0))),
+        (Some(earliest), Some(latest)) if earliest == latest => Some(nearest(&earliest.0)),
+        (Some(earliest), Some(latest)) => Some(format!(
+            "{} to {}",
+            nearest(&earliest.0),
+            nearest(&latest.0)
+        )),
+    }
+}
+
+fn details(
+    action: &TimedAction,
+    room: Option<&Room>,
+    texts: &mut Texts,
+) -> Vec<(&'static str, Text)> {
+    let mut details: Vec<(&'static str, Text)> = Vec::new();
+    let start = nearest(&action.start.0);
+    details.push(match &action.end {
+        Some(end) => ("planned", format!("{start} to {}", nearest(&end.0)).into()),
+        None => ("planned", start.into()),
+    });
+    let windows = [
+        ("may start at", Some(&action.start_window)),
+        ("may end at", action.end_window.as_ref()),
+    ];
+    for (label, window) in windows {
+        if let Some(words) = window.and_then(window_words) {
+            details.push((label, words.into()));
+        }
+    }
+    let Some(room) = room else {
+        if let Some(end) = &action.end {
+            details.push(("takes", nearest(&(&end.0 - &action.start.0)).into()));
+        }
+        return details;
+    };
+    let nominal = &room.range.quantity.nominal;
+    let (lower, upper) = ends(&room.range);
+    details.push(("takes", nearest(nominal).into()));
+    details.push(("may take", format!("{lower} to {upper} ({})", room.range.quantity.name).into()));
+    let limits = [
+        ("not less, because", &room.lower_limit),
+        ("not more, because", &room.upper_limit),
+    ];
+    for (label, limit) in limits {
+        if let Some(limit) = limit {
+            details.push((label, texts.share(limit)));
+        }
+    }
+    details
+}
+
+pub(crate) fn prose(heading: &str, paragraphs: Vec<String>) -> Section {
+    Section::Prose(Prose {
+        heading: heading.to_owned(),
+        paragraphs,
+    })
+}
+
+pub(crate) fn good(words: &str) -> Verdict {
+    Verdict {
+        tone: Tone::Good,
+        words: words.to_owned(),
+    }
+}
+
+pub(crate) fn bad(words: &str) -> Verdict {
+    Verdict {
+        tone: Tone::Bad,
+        words: words.to_owned(),
+    }
+}
+
+/// The last part of a path, or something else where there is none.
+fn name_of(path: &str, otherwise: &str) -> String {
+    let name = path.rsplit(['/', '\\']).next().unwrap_or_default();
+    let name = if name.is_empty() { otherwise } else { name };
+    name.to_owned()
+}
+
+/// The word by which documents mention it.
+pub(crate) fn word(value: &impl serde::Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(word)) => word,
+        _ => String::new(),
+    }
+}

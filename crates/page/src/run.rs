@@ -1,0 +1,221 @@
+//! A run beside its plans.
+
+mod bars;
+mod guarantee;
+mod log;
+mod windows;
+
+use std::sync::Arc;
+
+use elbowroom::answers::RunAnswer;
+use elbowroom::answers::envelope::timeline;
+use elbowroom::execute::RunSpec;
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::pddl;
+use elbowroom::report::line::{ReasonLine, ReportLine};
+use elbowroom::report::short::nearest;
+use elbowroom::report::trace::{Line, Stored};
+
+use crate::belief::Belief;
+use crate::document::{Chart, Document, Mark, Section, Series, Texts, Tone, Verdict};
+use crate::lanes::{Lanes, Occupant, lanes};
+use crate::plan::{end_of_axis, prose};
+use crate::run::bars::Bars;
+use crate::run::guarantee::Guarantees;
+use crate::run::log::Log;
+
+/// The page about a stored run.
+///
+/// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be, the
+/// page does without them.
+pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec) -> Document {
+    let mut texts = Texts::default();
+    let task = task(spec).map(Arc::new);
+    let mut belief = task.as_ref().map(|task| Belief::new(task, &mut texts));
+    let (mut bars, mut guarantees, mut log) =
+        (Bars::default(), Guarantees::default(), Log::default());
+    let mut report = None;
+    for line in &stored.lines {
+        if let (Some(belief), Line::Observed(observed)) = (&mut belief, line)
+            && observed.remark.is_none()
+        {
+            match bars.command_of(&observed.observation) {
+                Some((ticket, action, planned)) => {
+                    let planned = planned.as_ref();
+                    belief.started(ticket, &action, planned, &observed.observation, &mut texts);
+                }
+                None => belief.reported(&observed.observation, &mut texts),
+            }
+        }
+        bars.read(line);
+        guarantees.read(line, &bars);
+        log.read(line, &bars);
+        if let Line::Over(over) = line {
+            report = Some(over);
+        }
+    }
+    let now = log.now.clone();
+    if let Some(belief) = &mut belief {
+        belief.advance(&now, &mut texts);
+    }
+    let (changes, numbers) = belief.map(Belief::finish).unwrap_or_default();
+    let mut chart = bars.chart(task.as_deref(), &now);
+    chart.guarantee = guarantees.finish(now.to_f64());
+    chart.changes = changes;
+    chart.decisions = log.decisions();
+    chart.end = chart.end.max(now.to_f64());
+    let end = chart.end;
+    let table = bars.table();
+    let mut sections = vec![Section::Chart(chart)];
+    sections.extend(report.into_iter().flat_map(why));
+    sections.push(Section::Table(table));
+    if !numbers.is_empty() {
+        sections.push(Section::Series(Series {
+            heading: "Numbers over time".to_owned(),
+            end,
+            lines: numbers,
+        }));
+    }
+    sections.push(Section::Table(log.table(&mut texts)));
+    let (domain, problem) = match &task {
+        Some(task) => (task.problem().domain.clone(), task.problem().name.clone()),
+        None => (spec.domain.name.clone(), spec.problem.name.clone()),
+    };
+    let mut facts = vec![
+        ("domain".to_owned(), domain),
+        ("problem".to_owned(), problem.clone()),
+        ("executor".to_owned(), spec.executor.to_string()),
+        ("seed".to_owned(), spec.seed.to_string()),
+        ("planner".to_owned(), spec.planner.clone()),
+        ("trace".to_owned(), name.to_owned()),
+    ];
+    if let Some(report) = report {
+        facts.push(("new plans".to_owned(), report.replans.to_string()));
+        facts.push(("actions started".to_owned(), report.starts.to_string()));
+    }
+    Document {
+        title: format!("Run of {problem}"),
+        verdict: match report {
+            Some(report) => verdict(report),
+            None => Verdict {
+                tone: Tone::Plain,
+                words: format!("The trace ends at {} before the run was over.", nearest(&now)),
+            },
+        },
+        facts,
+        sections,
+        texts: texts.into_texts(),
+    }
+}
+
+/// The page about the outcome of a run.
+pub(crate) fn outcome(answer: &RunAnswer) -> Document {
+    let report = &answer.report;
+    let mut bars = Bars::default();
+    bars.executed(&report.executed);
+    let chart = bars.chart(None, &report.time);
+    let mut sections = vec![Section::Chart(chart)];
+    sections.extend(why(report));
+    sections.push(Section::Table(bars.table()));
+    Document {
+        title: "Outcome of a run".to_owned(),
+        verdict: verdict(report),
+        facts: vec![
+            ("new plans".to_owned(), report.replans.to_string()),
+            ("actions started".to_owned(), report.starts.to_string()),
+        ],
+        sections,
+        texts: Vec::new(),
+    }
+}
+
+fn task(spec: &RunSpec) -> Option<Task> {
+    let read = pddl::read_problem(&spec.domain.source(), &spec.problem.source());
+    let (problem, _warnings) = read.ok()?;
+    Some(Task::new(problem).with_epsilon(spec.epsilon.clone()))
+}
+
+fn verdict(report: &ReportLine) -> Verdict {
+    let time = nearest(&report.time);
+    let more = match &report.why {
+        Some(why) if !why.is_empty() => format!(": {why}"),
+        _ => ".".to_owned(),
+    };
+    let plans = match report.replans {
+        0 => "without a new plan".to_owned(),
+        1 => "after 1 new plan".to_owned(),
+        count => format!("after {count} new plans"),
+    };
+    let (tone, words) = match report.verdict.as_str() {
+        "goal-reached" => (Tone::Good, "The goal was reached".to_owned()),
+        "interrupted" => (Tone::Plain, "The run was interrupted".to_owned()),
+        other => (Tone::Bad, format!("The run failed ({})", other.replace('-', " "))),
+    };
+    Verdict {
+        tone,
+        words: format!("{words} at {time}, {plans}{more}"),
+    }
+}
+
+/// Why plans were given up, and why there is no way on.
+fn why(report: &ReportLine) -> Vec<Section> {
+    let sentences = |reasons: &[ReasonLine]| -> Vec<String> {
+        reasons.iter().map(|reason| reason.words.clone()).collect()
+    };
+    let mut sections = Vec::new();
+    if !report.reasons.is_empty() {
+        sections.push(prose("Why plans were given up", sentences(&report.reasons)));
+    }
+    if !report.dead_end.is_empty() {
+        sections.push(prose("Why no plan reaches the goal", sentences(&report.dead_end)));
+    }
+    sections
+}
+
+impl Bars {
+    /// The plans and what was done, as a chart.
+    fn chart(&self, task: Option<&Task>, now: &Rational) -> Chart {
+        let mut bars = self.drawn(now);
+        let occupants: Vec<Occupant<'_>> = bars
+            .iter()
+            .map(|bar| Occupant {
+                name: &bar.name,
+                time: bar.actual.or(bar.planned).unwrap_or((0.0, 0.0)),
+            })
+            .collect();
+        let types = task.map(|task| timeline::types(task, bars.iter().map(|it| it.name.as_str())));
+        let type_of = |object: &str| types.as_ref()?.get(object).map(String::as_str);
+        let Lanes {
+            groupings,
+            chosen,
+            of,
+        } = lanes(&occupants, &type_of);
+        for (bar, lanes) in bars.iter_mut().zip(of) {
+            bar.lanes = lanes;
+        }
+        let timed = task.map(|task| task.timed().iter().enumerate());
+        let mut marks: Vec<Mark> = timed
+            .into_iter()
+            .flatten()
+            .map(|(index, timed)| Mark {
+                at: timed.time.to_f64(),
+                name: task.map_or_else(String::new, |task| timeline::changes(task, index).join(", ")),
+                is_event: false,
+            })
+            .collect();
+        marks.extend(self.events());
+        Chart {
+            heading: "The run beside its plan".to_owned(),
+            end: end_of_axis(&bars, &marks),
+            groupings,
+            chosen,
+            orderings: self.drawn_orderings(),
+            plans: self.plan_names(),
+            bars,
+            marks,
+            is_run: true,
+            ..Chart::default()
+        }
+    }
+}

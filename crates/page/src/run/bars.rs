@@ -1,0 +1,456 @@
+//! Plans and what was done, action by action.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use elbowroom::answers::envelope::timeline::WindowAnswer;
+use elbowroom::num::Rational;
+use elbowroom::report::line::{
+    BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine,
+    WindowLine,
+};
+use elbowroom::report::short::nearest;
+use elbowroom::report::trace::Line;
+
+use super::windows::Windows;
+use crate::document::{Bar, Mark, Table, Text};
+use crate::plan::{band, window_words};
+
+/// What has been read of plans and starts so far.
+#[derive(Default)]
+pub(super) struct Bars {
+    /// When each plan was taken up.
+    plans: Vec<Rational>,
+    /// The steps of all plans.
+    steps: Vec<Step>,
+    /// What the plans order: steps, the one that comes first, and the other.
+    orderings: Vec<(usize, usize)>,
+    /// Where the steps of the present plan begin.
+    first: usize,
+    /// The steps that the last decision starts, in order.
+    ordered: VecDeque<usize>,
+    /// Starts, by ticket.
+    starts: BTreeMap<u64, Start>,
+    /// The moments when a plan was given up, and why.
+    given_up: Vec<(Rational, String)>,
+}
+
+/// A step of a plan, in the world's time.
+struct Step {
+    plan: usize,
+    action: String,
+    start: Rational,
+    end: Option<Rational>,
+    start_window: WindowAnswer,
+    end_window: WindowAnswer,
+    is_ordered: bool,
+}
+
+/// An action that the world was told to start.
+struct Start {
+    action: String,
+    step: Option<usize>,
+    ordered: Rational,
+    planned: Option<Rational>,
+    due: WindowLine,
+    end_due: WindowLine,
+    started: Option<Rational>,
+    ended: Option<Rational>,
+    outcome: Option<String>,
+    why: Option<String>,
+}
+
+impl Bars {
+    /// Takes in a line of the trace.
+    pub(super) fn read(&mut self, line: &Line) {
+        match line {
+            Line::Plan(plan) => self.plan(plan),
+            Line::Decided(decided) => match &decided.decision {
+                DecisionLine::Start { orders } => {
+                    let steps = orders.iter().map(|order| self.first + order.step as usize);
+                    self.ordered = steps.filter(|step| *step < self.steps.len()).collect();
+                }
+                DecisionLine::Replan => {
+                    let words = decided.reason.words.clone();
+                    self.given_up.push((decided.now.0.clone(), words));
+                }
+                _ => {}
+            },
+            Line::Command(command) => {
+                if let GivenLine::Start {
+                    ticket,
+                    action,
+                    duration,
+                } = &command.command
+                {
+                    let step = self.next_ordered(action);
+                    let start = Start {
+                        action: action.clone(),
+                        step,
+                        ordered: command.now.0.clone(),
+                        planned: duration.as_ref().map(|it| it.0.clone()),
+                        due: command.planned.clone(),
+                        end_due: WindowLine::default(),
+                        started: None,
+                        ended: None,
+                        outcome: None,
+                        why: None,
+                    };
+                    self.starts.insert(*ticket, start);
+                }
+            }
+            Line::Observed(observed) => match &observed.observation {
+                ObservationLine::Started { ticket, time, .. } => {
+                    if let Some(start) = self.starts.get_mut(ticket) {
+                        start.started.get_or_insert_with(|| time.0.clone());
+                    }
+                }
+                ObservationLine::Ended {
+                    ticket,
+                    outcome,
+                    why,
+                    time,
+                    ..
+                } => {
+                    if let Some(start) = self.starts.get_mut(ticket)
+                        && start.ended.is_none()
+                    {
+                        start.ended = Some(time.0.clone());
+                        start.outcome = Some(outcome.clone());
+                        start.why.clone_from(why);
+                        start.end_due = observed.planned.clone();
+                    }
+                }
+                _ => {}
+            },
+            Line::Over(report) => self.executed(&report.executed),
+            _ => {}
+        }
+    }
+
+    /// What was done, as the report on the run has it: it counts where reports contradict each other.
+    pub(super) fn executed(&mut self, executed: &[ExecutedLine]) {
+        for done in executed {
+            let begun = done.start.0.clone();
+            let start = self.starts.entry(done.ticket).or_insert_with(|| Start {
+                action: done.action.clone(),
+                step: None,
+                ordered: begun.clone(),
+                planned: None,
+                due: WindowLine::default(),
+                end_due: WindowLine::default(),
+                started: None,
+                ended: None,
+                outcome: None,
+                why: None,
+            });
+            start.outcome.clone_from(&done.outcome);
+            start.ended = match (&done.duration, &done.outcome) {
+                (Some(duration), Some(_)) => Some(&begun + &duration.0),
+                (None, Some(_)) => Some(begun.clone()),
+                (_, None) => None,
+            };
+            start.started = Some(begun);
+        }
+    }
+
+    /// The start that is reported: its ticket, its action, and how long it was told to last.
+    pub(super) fn command_of(
+        &self,
+        observation: &ObservationLine,
+    ) -> Option<(u64, String, Option<Rational>)> {
+        let ObservationLine::Started { ticket, .. } = observation else {
+            return None;
+        };
+        let start = self.starts.get(ticket)?;
+        Some((*ticket, start.action.clone(), start.planned.clone()))
+    }
+
+    /// The action that was started under that number.
+    pub(super) fn action(&self, ticket: u64) -> Option<&str> {
+        self.starts.get(&ticket).map(|start| start.action.as_str())
+    }
+
+    /// The actions of these steps of the present plan.
+    pub(super) fn step_names(&self, steps: &[u32]) -> Vec<&str> {
+        let steps = steps.iter().filter_map(|&step| self.steps.get(self.first + step as usize));
+        steps.map(|step| step.action.as_str()).collect()
+    }
+
+    /// The number of plans taken up so far.
+    pub(super) fn plan_count(&self) -> usize {
+        self.plans.len()
+    }
+
+    fn plan(&mut self, line: &PlanLine) {
+        let plan = self.plans.len();
+        self.plans.push(line.now.0.clone());
+        self.first = self.steps.len();
+        self.ordered.clear();
+        self.orderings(line);
+        let windows = Windows::of(&line.network, &line.parameters);
+        let origin = &line.origin.0;
+        for (index, step) in line.steps.iter().enumerate() {
+            let start = origin + &step.start.0;
+            let instance = line.network.instances.get(index);
+            let label = instance.filter(|it| it.action == step.action).map(|it| it.label.as_str());
+            let window = |node: String| match (&windows, label) {
+                (Some(windows), Some(_)) => windows.at(&node, origin),
+                _ => WindowAnswer::default(),
+            };
+            let label = label.unwrap_or_default();
+            let (start_window, end_window) = match &step.duration {
+                Some(_) => (window(format!("{label}.start")), window(format!("{label}.end"))),
+                None => (window(label.to_owned()), WindowAnswer::default()),
+            };
+            self.steps.push(Step {
+                plan,
+                action: step.action.clone(),
+                end: step.duration.as_ref().map(|duration| &start + &duration.0),
+                start,
+                start_window,
+                end_window,
+                is_ordered: false,
+            });
+        }
+    }
+
+    /// Notes which steps of the plan its network puts in order.
+    fn orderings(&mut self, line: &PlanLine) {
+        let instances = line.network.instances.iter().enumerate();
+        let positions: BTreeMap<&str, usize> =
+            instances.map(|(index, it)| (it.label.as_str(), index)).collect();
+        let step = |node: &str| {
+            let label = node.strip_suffix(".start").or_else(|| node.strip_suffix(".end"));
+            positions.get(label.unwrap_or(node)).copied().filter(|index| *index < line.steps.len())
+        };
+        let is_sign = |bound: &Option<BoundLine>, is_it: fn(&Rational) -> bool| {
+            matches!(bound, Some(BoundLine::Number(number)) if is_it(&number.0))
+        };
+        for constraint in &line.network.constraints {
+            let (Some(from), Some(to)) = (step(&constraint.from), step(&constraint.to)) else {
+                continue;
+            };
+            let (from, to) = (self.first + from, self.first + to);
+            if from == to {
+                continue;
+            }
+            if is_sign(&constraint.lower, |bound| !bound.is_negative()) {
+                self.orderings.push((from, to));
+            } else if is_sign(&constraint.upper, |bound| !bound.is_positive()) {
+                self.orderings.push((to, from));
+            }
+        }
+    }
+
+    /// What the plans order, by the positions of [`Bars::drawn`].
+    pub(super) fn drawn_orderings(&self) -> Vec<(usize, usize)> {
+        let mut bars = vec![None; self.steps.len()];
+        for (bar, start) in self.starts.values().enumerate() {
+            if let Some(step) = start.step {
+                bars[step] = Some(bar);
+            }
+        }
+        let waiting = self.steps.iter().enumerate().filter(|(_, step)| !step.is_ordered);
+        for (bar, (step, _)) in (self.starts.len()..).zip(waiting) {
+            bars[step] = Some(bar);
+        }
+        let mut drawn: Vec<(usize, usize)> =
+            self.orderings.iter().filter_map(|&(from, to)| bars[from].zip(bars[to])).collect();
+        drawn.sort_unstable();
+        drawn.dedup();
+        drawn
+    }
+
+    /// The step that a command carries out: commands come in the order of their decision.
+    fn next_ordered(&mut self, action: &str) -> Option<usize> {
+        let position = self.ordered.iter().position(|&step| self.steps[step].action == action)?;
+        let step = self.ordered.remove(position)?;
+        self.steps[step].is_ordered = true;
+        Some(step)
+    }
+
+    /// The names of the plans, if there are several.
+    pub(super) fn plan_names(&self) -> Vec<String> {
+        let names = self.plans.iter().enumerate().map(|(index, since)| {
+            let since = nearest(since);
+            match index {
+                0 => format!("first plan, from {since}"),
+                _ => format!("plan {}, from {since}", index + 1),
+            }
+        });
+        let names: Vec<String> = names.collect();
+        if names.len() > 1 { names } else { Vec::new() }
+    }
+
+    /// The moments at which a plan was given up.
+    pub(super) fn events(&self) -> impl Iterator<Item = Mark> + '_ {
+        self.given_up.iter().map(|(time, words)| Mark {
+            at: time.to_f64(),
+            name: format!("plan given up: {words}"),
+            is_event: true,
+        })
+    }
+
+    /// Everything as bars: starts in order, and then the steps that were not started.
+    pub(super) fn drawn(&self, now: &Rational) -> Vec<Bar> {
+        let starts = self.starts.values().map(|start| self.started(start, now));
+        let waiting = self.steps.iter().filter(|step| !step.is_ordered);
+        starts.chain(waiting.map(not_started)).collect()
+    }
+
+    fn started(&self, start: &Start, now: &Rational) -> Bar {
+        let step = start.step.map(|step| &self.steps[step]);
+        let begun = start.started.as_ref();
+        let end = start.ended.as_ref().or(begun.map(|_| now));
+        let outcome = match (&start.outcome, begun) {
+            (Some(outcome), _) => known(outcome),
+            (None, Some(_)) => "running",
+            (None, None) => "ordered",
+        };
+        let mut details: Vec<(&'static str, Text)> = Vec::new();
+        if let Some(step) = step {
+            details.push(("planned", step.words().into()));
+        }
+        if let Some(begun) = begun {
+            let until = start.ended.as_ref().map_or_else(|| "…".to_owned(), nearest);
+            details.push(("was done", format!("{} to {until}", nearest(begun)).into()));
+        }
+        if let (Some(begun), Some(ended)) = (begun, &start.ended) {
+            let took = nearest(&(ended - begun));
+            details.push(("took", match &start.planned {
+                Some(planned) => format!("{took}, planned {}", nearest(planned)).into(),
+                None => took.into(),
+            }));
+        }
+        let why = start.why.as_deref().unwrap_or_default();
+        let words = match (outcome, why) {
+            ("ordered", _) => format!("ordered at {}, nothing heard", nearest(&start.ordered)),
+            (outcome, "") => outcome.to_owned(),
+            (outcome, why) => format!("{outcome}: {why}"),
+        };
+        details.push(("outcome", words.into()));
+        for (label, due) in [("start was due", &start.due), ("end was due", &start.end_due)] {
+            if let Some(words) = window_words(&answer(due)) {
+                details.push((label, words.into()));
+            }
+        }
+        Bar {
+            name: start.action.clone(),
+            planned: step.map(Step::span),
+            actual: begun.zip(end).map(|(begun, end)| (begun.to_f64(), end.to_f64())),
+            outcome,
+            starts: limited(&start.due),
+            ends: limited(&start.end_due).or_else(|| step.and_then(|it| band(&it.end_window))),
+            plan: step.map_or(0, |step| step.plan),
+            details,
+            ..Bar::default()
+        }
+    }
+
+    /// What was planned beside what was done.
+    pub(super) fn table(&self) -> Table {
+        let columns = [
+            ("action", false),
+            ("planned start", true),
+            ("start", true),
+            ("planned end", true),
+            ("end", true),
+            ("outcome", false),
+        ];
+        let number = |value: Option<&Rational>| -> Text {
+            value.map(nearest).unwrap_or_default().into()
+        };
+        let mut rows = Vec::new();
+        for start in self.starts.values() {
+            let step = start.step.map(|step| &self.steps[step]);
+            let outcome = start.outcome.as_deref();
+            let unknown = if start.started.is_some() { "running" } else { "ordered" };
+            rows.push(vec![
+                start.action.as_str().into(),
+                number(step.map(|step| &step.start)),
+                number(start.started.as_ref()),
+                number(step.and_then(|step| step.end.as_ref())),
+                number(start.ended.as_ref()),
+                match &start.why {
+                    Some(why) => format!("{}: {why}", outcome.unwrap_or(unknown)).into(),
+                    None => outcome.unwrap_or(unknown).into(),
+                },
+            ]);
+        }
+        for step in self.steps.iter().filter(|step| !step.is_ordered) {
+            rows.push(vec![
+                step.action.as_str().into(),
+                number(Some(&step.start)),
+                "".into(),
+                number(step.end.as_ref()),
+                "".into(),
+                "not started".into(),
+            ]);
+        }
+        let has_plan = !self.steps.is_empty();
+        Table {
+            heading: if has_plan { "Planned and done" } else { "What was done" }.to_owned(),
+            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            bars: (0..rows.len()).collect(),
+            rows,
+            ..Table::default()
+        }
+    }
+}
+
+impl Step {
+    fn span(&self) -> (f64, f64) {
+        let end = self.end.as_ref().unwrap_or(&self.start);
+        (self.start.to_f64(), end.to_f64())
+    }
+
+    fn words(&self) -> String {
+        match &self.end {
+            Some(end) => format!("{} to {}", nearest(&self.start), nearest(end)),
+            None => nearest(&self.start),
+        }
+    }
+}
+
+fn not_started(step: &Step) -> Bar {
+    let mut details: Vec<(&'static str, Text)> = vec![("planned", step.words().into())];
+    let windows = [("may start at", &step.start_window), ("may end at", &step.end_window)];
+    for (label, window) in windows {
+        if let Some(words) = window_words(window) {
+            details.push((label, words.into()));
+        }
+    }
+    details.push(("outcome", "not started".into()));
+    Bar {
+        name: step.action.clone(),
+        planned: Some(step.span()),
+        outcome: "not-started",
+        starts: band(&step.start_window),
+        ends: band(&step.end_window),
+        plan: step.plan,
+        details,
+        ..Bar::default()
+    }
+}
+
+/// A window for drawing, if there is a limit to it.
+fn limited(due: &WindowLine) -> Option<(Option<f64>, Option<f64>)> {
+    band(&answer(due)).filter(|(_, latest)| latest.is_some())
+}
+
+/// An outcome that traces can have.
+fn known(outcome: &str) -> &'static str {
+    match outcome {
+        "succeeded" => "succeeded",
+        "failed" => "failed",
+        "cancelled" => "cancelled",
+        _ => "unknown",
+    }
+}
+
+pub(super) fn answer(window: &WindowLine) -> WindowAnswer {
+    WindowAnswer {
+        earliest: window.earliest.clone(),
+        latest: window.latest.clone(),
+    }
+}

@@ -1,0 +1,125 @@
+//! What was guaranteed during a run: kept, kept in part, or lost, since when and why.
+
+use elbowroom::report::line::{DecisionLine, ObservationLine, WindowLine};
+use elbowroom::report::short::nearest;
+use elbowroom::report::trace::Line;
+
+use super::bars::Bars;
+use crate::document::Segment;
+
+/// The guarantees so far.
+#[derive(Default)]
+pub(super) struct Guarantees {
+    segments: Vec<Segment>,
+    /// What was last observed outside the window in which it was planned.
+    deviation: Option<String>,
+}
+
+impl Guarantees {
+    /// Takes in a line of the trace.
+    pub(super) fn read(&mut self, line: &Line, bars: &Bars) {
+        match line {
+            Line::Observed(observed) => {
+                let (ticket, what, time) = match &observed.observation {
+                    ObservationLine::Started { ticket, time, .. } => (ticket, "started", time),
+                    ObservationLine::Ended {
+                        ticket,
+                        outcome,
+                        time,
+                        ..
+                    } if outcome == "succeeded" => (ticket, "ended", time),
+                    ObservationLine::Ended {
+                        ticket,
+                        outcome,
+                        time,
+                        ..
+                    } => {
+                        let action = bars.action(*ticket).unwrap_or("an action");
+                        let at = nearest(&time.0);
+                        self.deviation = Some(format!("{action} {outcome} at {at}"));
+                        return;
+                    }
+                    _ => return,
+                };
+                if let Some(allowed) = missed(&observed.planned, &time.0) {
+                    let action = bars.action(*ticket).unwrap_or("an action");
+                    let at = nearest(&time.0);
+                    self.deviation = Some(format!("{action} {what} at {at}, planned {allowed}"));
+                }
+            }
+            Line::Decided(decided) => {
+                let at = decided.now.0.to_f64();
+                match (&decided.decision, &decided.reason.promise) {
+                    (DecisionLine::GoalReached, _) => {}
+                    (DecisionLine::Replan, _) => {
+                        let words = format!("none: {}", decided.reason.words);
+                        self.change(at, -1, "none", &words);
+                    }
+                    (_, Some(promise)) => {
+                        let (level, words) = meaning(promise);
+                        self.change(at, level, promise, words);
+                    }
+                    (_, None) => self.change(at, -1, "none", "none: this executor gives none"),
+                }
+            }
+            Line::Plan(_) => self.deviation = None,
+            _ => {}
+        }
+    }
+
+    /// All of them, the last one until the end of the run; none if none was ever given.
+    pub(super) fn finish(mut self, end: f64) -> Vec<Segment> {
+        if self.segments.iter().all(|segment| segment.level < 0) {
+            return Vec::new();
+        }
+        if let Some(last) = self.segments.last_mut() {
+            last.to = end;
+        }
+        self.segments
+    }
+
+    fn change(&mut self, at: f64, level: i8, name: &str, words: &str) {
+        let deviation = self.deviation.as_deref();
+        if let Some(last) = self.segments.last_mut() {
+            if last.level == level && (level >= 0 || name == "none") {
+                return;
+            }
+            last.to = at;
+        }
+        let is_worse = self.segments.last().is_some_and(|last| level < last.level);
+        let because = match deviation {
+            Some(deviation) if is_worse && level >= 0 => format!("; {deviation}"),
+            _ => String::new(),
+        };
+        self.segments.push(Segment {
+            from: at,
+            to: at,
+            level,
+            words: format!("{words}{because}"),
+        });
+    }
+}
+
+/// How good a promise is, and what it means.
+fn meaning(promise: &str) -> (i8, &'static str) {
+    match promise {
+        "envelope" => (3, "works whatever happens within the envelope"),
+        "part-of-envelope" => (2, "works whatever happens within a part of the envelope"),
+        "planned" => (1, "works if what is still to start takes as long as planned"),
+        "luck" => (0, "can still work, with luck"),
+        _ => (-1, "none"),
+    }
+}
+
+/// The window in words, if the time is outside.
+fn missed(window: &WindowLine, time: &elbowroom::num::Rational) -> Option<String> {
+    match (&window.earliest, &window.latest) {
+        (Some(earliest), _) if *time < earliest.0 => {
+            Some(format!("{} at the earliest", nearest(&earliest.0)))
+        }
+        (_, Some(latest)) if *time > latest.0 => {
+            Some(format!("{} at the latest", nearest(&latest.0)))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,217 @@
+//! Everything that a trace has, line by line, in words.
+
+use elbowroom::num::Rational;
+use elbowroom::report::line::{DecisionLine, GivenLine, ObservationLine, WindowLine};
+use elbowroom::report::short::nearest;
+use elbowroom::report::trace::Line;
+
+use super::bars::{Bars, answer};
+use crate::document::{DecisionAt, Table, Text, Texts};
+use crate::plan::window_words;
+
+/// The lines so far.
+#[derive(Default)]
+pub(super) struct Log {
+    /// The time of the last line.
+    pub(super) now: Rational,
+    rows: Vec<Row>,
+}
+
+struct Row {
+    at: f64,
+    time: String,
+    kind: &'static str,
+    what: String,
+    due: String,
+    why: String,
+}
+
+impl Log {
+    /// Takes in a line of the trace, after `bars` has.
+    pub(super) fn read(&mut self, line: &Line, bars: &Bars) {
+        match line {
+            Line::Plan(plan) => {
+                let count = plan.steps.len();
+                let what = match bars.plan_count() {
+                    1 => format!("the first plan is taken up: {count} actions"),
+                    number => format!("plan {number} is taken up: {count} actions"),
+                };
+                self.add(&plan.now.0, "plan", what, String::new(), String::new());
+            }
+            Line::Decided(decided) => {
+                let what = decision(&decided.decision, bars);
+                let why = decided.reason.words.clone();
+                self.add(&decided.now.0, "decision", what, String::new(), why);
+            }
+            Line::Command(command) => {
+                let what = match &command.command {
+                    GivenLine::Start { action, .. } => format!("start {action}"),
+                    GivenLine::Cancel { ticket } => {
+                        format!("cancel {}", bars.action(*ticket).unwrap_or("an action"))
+                    }
+                };
+                let due = due(&command.planned);
+                self.add(&command.now.0, "command", what, due, String::new());
+            }
+            Line::Observed(observed) => {
+                let (time, what) = observation(&observed.observation, bars);
+                let remark = observed.remark.clone().unwrap_or_default();
+                self.add(time, "observation", what, due(&observed.planned), remark);
+            }
+            Line::Planning(planning) => {
+                let why = planning.reason.words.clone();
+                let what = "a new plan is asked for".to_owned();
+                self.add(&planning.now.0, "planning", what, String::new(), why);
+            }
+            Line::Planned(planned) => {
+                let what = match (&planned.plan, planned.is_unsolvable) {
+                    (Some(steps), _) => format!(
+                        "a plan of {} actions, made in {}",
+                        steps.len(),
+                        nearest(&planned.took.0)
+                    ),
+                    (None, true) => "there is no plan any more".to_owned(),
+                    (None, false) => "no plan was found".to_owned(),
+                };
+                let why = planned.why_not.clone().unwrap_or_default();
+                self.add(&planned.now.0, "planning", what, String::new(), why);
+            }
+            Line::Interrupted(line) => {
+                let what = "somebody asked the run to end".to_owned();
+                self.add(&line.now.0, "end", what, String::new(), String::new());
+            }
+            Line::Over(report) => {
+                let why = report.why.clone().unwrap_or_default();
+                let what = report.verdict.replace('-', " ");
+                self.add(&report.time, "end", what, String::new(), why);
+            }
+            // What was reported meanwhile has lines of its own.
+            Line::Passed(passed) => self.passed(&passed.now.0),
+            Line::Looked(looked) => self.passed(&looked.now.0),
+            _ => {}
+        }
+    }
+
+    fn passed(&mut self, time: &Rational) {
+        if *time > self.now {
+            self.now.clone_from(time);
+        }
+    }
+
+    fn add(&mut self, time: &Rational, kind: &'static str, what: String, due: String, why: String) {
+        self.passed(time);
+        // Rows stay in order, also where something was reported late.
+        let last = self.rows.last().map_or(f64::NEG_INFINITY, |row| row.at);
+        self.rows.push(Row {
+            at: time.to_f64().max(last),
+            time: nearest(time),
+            kind,
+            what,
+            due,
+            why,
+        });
+    }
+
+    /// The decisions with their reasons.
+    pub(super) fn decisions(&self) -> Vec<DecisionAt> {
+        let decisions = self.rows.iter().filter(|row| row.kind == "decision");
+        decisions
+            .map(|row| DecisionAt {
+                at: row.at,
+                words: if row.what == row.why {
+                    row.what.clone()
+                } else {
+                    format!("{}, because {}", row.what, row.why)
+                },
+            })
+            .collect()
+    }
+
+    /// As a table.
+    pub(super) fn table(self, texts: &mut Texts) -> Table {
+        let columns = [
+            ("time", true),
+            ("kind", false),
+            ("what", false),
+            ("was due", true),
+            ("why", false),
+        ];
+        let times = self.rows.iter().map(|row| row.at).collect();
+        let rows = self.rows.into_iter().map(|row| -> Vec<Text> {
+            vec![
+                row.time.into(),
+                texts.share(row.kind),
+                texts.share(&row.what),
+                row.due.into(),
+                texts.share(&row.why),
+            ]
+        });
+        Table {
+            heading: "What happened, and why".to_owned(),
+            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            rows: rows.collect(),
+            times,
+            ..Table::default()
+        }
+    }
+}
+
+fn due(window: &WindowLine) -> String {
+    window_words(&answer(window)).unwrap_or_default()
+}
+
+fn decision(decision: &DecisionLine, bars: &Bars) -> String {
+    match decision {
+        DecisionLine::Start { orders } => {
+            let names: Vec<&str> = orders.iter().map(|order| order.action.as_str()).collect();
+            format!("start {}", names.join(", "))
+        }
+        DecisionLine::Wait { until: Some(until) } => {
+            format!("wait until {} at most", nearest(&until.0))
+        }
+        DecisionLine::Wait { until: None } => "wait".to_owned(),
+        DecisionLine::Cancel { steps } => match bars.step_names(steps) {
+            names if names.is_empty() => "cancel".to_owned(),
+            names => format!("cancel {}", names.join(", ")),
+        },
+        DecisionLine::Replan => "give up the plan".to_owned(),
+        DecisionLine::GoalReached => "the goal is reached".to_owned(),
+    }
+}
+
+fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Rational, String) {
+    let action = |ticket: &u64| bars.action(*ticket).unwrap_or("something").to_owned();
+    match observation {
+        ObservationLine::Started { ticket, time, .. } => {
+            (&time.0, format!("{} has started", action(ticket)))
+        }
+        ObservationLine::Ended {
+            ticket,
+            outcome,
+            why,
+            time,
+            ..
+        } => {
+            let why = why.as_deref().filter(|why| !why.is_empty());
+            let why = why.map(|why| format!(": {why}")).unwrap_or_default();
+            let how = match outcome.as_str() {
+                "cancelled" => "was cancelled".to_owned(),
+                other => format!("has {other}"),
+            };
+            (&time.0, format!("{} {how}{why}", action(ticket)))
+        }
+        ObservationLine::Fact {
+            fact,
+            becomes,
+            time,
+        } => (&time.0, format!("{fact} is {becomes}")),
+        ObservationLine::Value {
+            fluent,
+            value,
+            time,
+        } => (&time.0, format!("{fluent} = {}", nearest(&value.0))),
+        ObservationLine::Unintelligible { said, why, time } => {
+            (&time.0, format!("cannot be understood ({why}): {said}"))
+        }
+    }
+}

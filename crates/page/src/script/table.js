@@ -1,0 +1,86 @@
+// Tables: filtered as one types, sorted by a column, and never more rows in the page than are asked for.
+
+const ROWS = 200;
+
+function tableView(table, textOf, onBar) {
+  const body = element("tbody");
+  const count = element("span", { class: "note", role: "status" });
+  const more = element("button", { type: "button" }, "show all");
+  let limit = ROWS, sorted = null, query = "", shown = [], current = -1;
+  const plain = table.rows.map((row) => row.map(textOf));
+  const lower = plain.map((row) => row.join("\u0000").toLowerCase());
+
+  // Columns of numbers and of short words do not break.
+  const kinds = table.columns.map(([, isNumber], column) =>
+    isNumber ? "number" : plain.every((row) => row[column].length <= 14) ? "short" : null);
+  const heads = table.columns.map(([name, isNumber], column) => {
+    const button = element("button", { type: "button", onclick: () => {
+      sorted = sorted?.column === column && !sorted.down ? { column, down: true } : { column, down: false };
+      for (const [index, head] of heads.entries()) {
+        head.setAttribute("aria-sort", index !== column ? "none" : sorted.down ? "descending" : "ascending");
+      }
+      fill();
+    } }, name);
+    return element("th", { scope: "col", class: kinds[column], "aria-sort": "none" }, button);
+  });
+
+  function order() {
+    const rows = [...plain.keys()].filter((row) => lower[row].includes(query));
+    if (!sorted) return rows;
+    const { column, down } = sorted;
+    const isNumber = table.columns[column][1];
+    const key = (row) => (isNumber ? parseFloat(plain[row][column]) : plain[row][column]);
+    const compare = (a, b) => {
+      const [x, y] = [key(a), key(b)];
+      if (!isNumber) return x < y ? -1 : x > y ? 1 : 0;
+      return (Number.isNaN(x) ? 1 : 0) - (Number.isNaN(y) ? 1 : 0) || x - y || 0;
+    };
+    rows.sort((a, b) => (down ? compare(b, a) : compare(a, b)));
+    return rows;
+  }
+
+  function fill() {
+    shown = order();
+    const visible = shown.slice(0, limit);
+    body.replaceChildren(...visible.map((row) => {
+      const bar = table.bars[row];
+      const cells = plain[row].map((text, column) =>
+        element("td", { class: kinds[column] }, words(text)));
+      return element("tr", {
+        "data-row": row, "data-bar": bar, class: row === current ? "current" : null,
+        onclick: bar === undefined ? null : () => onBar(bar),
+      }, ...cells);
+    }));
+    more.hidden = shown.length <= limit;
+    more.textContent = `show all ${shown.length}`;
+    count.textContent = shown.length <= limit ? `${shown.length} rows` : `${limit} of ${shown.length} rows`;
+  }
+
+  more.addEventListener("click", () => { limit = Infinity; fill(); });
+  const search = element("input", { type: "search", "aria-label": `Filter: ${table.heading}`, placeholder: "filter", oninput: () => {
+    query = search.value.toLowerCase();
+    fill();
+  } });
+  fill();
+  const box = element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": table.heading },
+    element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body));
+  const node = element("section", {},
+    element("h2", {}, table.heading),
+    table.note ? element("p", { class: "note" }, table.note) : null,
+    plain.length > 8 ? element("div", { class: "controls" }, search, count, more) : null,
+    box);
+
+  // The row of a moment; rows beyond those shown are brought in.
+  function at(time) {
+    current = lastAt(table.times, time);
+    const position = shown.indexOf(current);
+    if (position >= limit) { limit = position + ROWS; fill(); }
+    for (const row of body.querySelectorAll("tr.current")) row.classList.remove("current");
+    body.querySelector(`tr[data-row="${current}"]`)?.classList.add("current");
+  }
+  function pick(bar) {
+    for (const row of body.querySelectorAll("tr.picked")) row.classList.remove("picked");
+    body.querySelector(`tr[data-bar="${bar}"]`)?.classList.add("picked");
+  }
+  return { node, at: table.times.length ? at : null, pick: table.bars.length ? pick : null };
+}

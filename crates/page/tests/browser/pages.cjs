@@ -1,0 +1,330 @@
+// Opens pages in a real browser, and compares what is on them with the documents they were made of.
+//
+//   node pages.cjs ELBOWROOM CASES WORK [CHROMIUM]
+//
+// ELBOWROOM is the command, CASES the folder of that name, WORK a folder for what is made here. Wants
+// `playwright-core` and `axe-core` from npm on NODE_PATH. With SCREENSHOTS=DIR it also writes pictures.
+
+"use strict";
+const assert = require("node:assert/strict");
+const { execFileSync, spawnSync } = require("node:child_process");
+const fs = require("node:fs");
+const path = require("node:path");
+const { pathToFileURL } = require("node:url");
+const { chromium } = require("playwright-core");
+
+const [, , elbowroom, cases, work, executablePath = "/usr/bin/chromium"] = process.argv;
+const screenshots = process.env.SCREENSHOTS;
+fs.mkdirSync(work, { recursive: true });
+
+const file = (name) => path.join(work, name);
+const pddl = (name) => ["domain.pddl", "problem.pddl"].map((it) => path.join(cases, name, it));
+// Exit code 1 says that the answer is no, which is an answer.
+const run = (...args) => {
+  const done = spawnSync(elbowroom, args, { encoding: "utf8", maxBuffer: 1 << 28 });
+  assert.ok(done.status === 0 || done.status === 1, `${args.join(" ")}: ${done.stderr}`);
+  return done.stdout;
+};
+const page = (name, input) => { run("report", input, "-o", file(name)); return file(name); };
+
+const delivery = pddl("delivery"), plan = path.join(cases, "delivery/plan.plan");
+const world = `format = "elbowroom-world"
+version = 1
+[[duration]]
+action = "drive"
+uniform = { from = 0.8, to = 1.6 }
+relative = true
+[[failure]]
+action = "pick"
+probability = 0.1
+`;
+
+let browser;
+const tests = [];
+const test = (name, body) => tests.push([name, body]);
+
+// A tab in which nothing goes wrong unseen, and which reaches nothing.
+async function open(name, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, offline: true, ...options });
+  const tab = await context.newPage();
+  tab.wrong = [];
+  tab.on("pageerror", (error) => tab.wrong.push(String(error)));
+  tab.on("console", (message) => { if (message.type() === "error") tab.wrong.push(message.text()); });
+  tab.on("request", (request) => { if (!request.url().startsWith("file:")) tab.wrong.push(`asks for ${request.url()}`); });
+  await tab.goto(pathToFileURL(name).href);
+  await tab.waitForFunction(() => document.documentElement.dataset.ready === "true");
+  return tab;
+}
+async function close(tab) {
+  assert.deepEqual(tab.wrong, []);
+  await tab.context().close();
+}
+const rowsOf = (tab, heading) => tab.locator("section", { has: tab.locator("h2", { hasText: heading }) }).locator("tbody tr");
+const cellsOf = (rows) => rows.evaluateAll((all) => all.map((row) => [...row.cells].map((cell) => cell.textContent)));
+
+test("the intervals on the page are those of the document", async () => {
+  const text = run("envelope", ...delivery, plan, "--json");
+  fs.writeFileSync(file("envelope.json"), text);
+  const { parameters, timeline } = JSON.parse(text);
+  const tab = await open(page("envelope.html", file("envelope.json")));
+  const cells = await cellsOf(rowsOf(tab, "How far each quantity may deviate"));
+  assert.equal(cells.length, parameters.length);
+  for (const [index, parameter] of parameters.entries()) {
+    const [name, quantity, nominal, lower, upper, low, high] = cells[index];
+    assert.deepEqual([name, quantity, low, high],
+      [parameter.name, parameter.quantity, parameter.lower_limit ?? "", parameter.upper_limit ?? ""]);
+    assert.equal(Number(nominal), parameter.nominal.decimal);
+    // Rounded inwards, to three digits.
+    assert.ok(Number(lower) >= parameter.lower.decimal && Number(lower) - parameter.lower.decimal < 0.001);
+    assert.ok(Number(upper) <= parameter.upper.decimal && parameter.upper.decimal - Number(upper) < 0.001);
+  }
+  const bars = await tab.locator("svg rect[data-bar]").count();
+  assert.equal(bars, timeline.actions.length);
+  await close(tab);
+});
+
+test("bars lie where the document says, whatever the zoom", async () => {
+  const { timeline } = JSON.parse(fs.readFileSync(file("envelope.json"), "utf8"));
+  const tab = await open(file("envelope.html"));
+  const compare = async () => {
+    const boxes = await tab.locator("svg rect[data-bar]").evaluateAll((all) =>
+      all.map((it) => [Number(it.dataset.bar), Number(it.getAttribute("width"))]));
+    boxes.sort((a, b) => a[0] - b[0]);
+    const [first, width] = boxes[0];
+    const scale = width / (timeline.actions[first].end.decimal - timeline.actions[first].start.decimal);
+    for (const [index, wide] of boxes) {
+      const { start, end } = timeline.actions[index];
+      assert.ok(Math.abs(wide - Math.max(2, (end.decimal - start.decimal) * scale)) < 0.5, `bar ${index}`);
+    }
+    return scale;
+  };
+  const before = await compare();
+  await tab.getByRole("button", { name: "zoom in" }).click();
+  await tab.locator(".scroll").evaluate((it) => { it.scrollLeft = 0; });
+  await tab.waitForTimeout(200);
+  assert.ok(await compare() > before * 1.3);
+  await close(tab);
+});
+
+test("arrow keys go from action to action and say what limits it", async () => {
+  const tab = await open(file("envelope.html"));
+  const { parameters, timeline } = JSON.parse(fs.readFileSync(file("envelope.json"), "utf8"));
+  await tab.locator(".scroll").focus();
+  const seen = new Set();
+  for (let step = 0; step < timeline.actions.length; step++) {
+    await tab.keyboard.press("ArrowRight");
+    const text = await tab.locator(".panel").textContent();
+    const action = timeline.actions.find((it) => text.startsWith(it.action) && !seen.has(it.instance));
+    assert.ok(action, text);
+    seen.add(action.instance);
+    const limit = parameters.find((it) => it.name === action.parameter).upper_limit;
+    if (limit) assert.ok(text.includes(limit), text);
+  }
+  assert.equal(seen.size, timeline.actions.length);
+  await close(tab);
+});
+
+test("lanes can be chosen, and the first choice is the robot", async () => {
+  const tab = await open(file("envelope.html"));
+  const lanes = () => tab.locator("svg text.lane").allTextContents();
+  assert.deepEqual(await lanes(), ["rover", "others"]);
+  await tab.getByLabel("Lanes").selectOption({ label: "place" });
+  assert.deepEqual(new Set(await lanes()), new Set(["depot", "shelf", "office"]));
+  await close(tab);
+});
+
+test("a run is shown beside its plan, and any moment of it can be looked at", async () => {
+  fs.writeFileSync(file("world.toml"), world);
+  run("run", ...delivery, "--plan", plan, "--world", file("world.toml"), "--seed", "3", "--executor", "live", "--trace", file("run.jsonl"));
+  const lines = fs.readFileSync(file("run.jsonl"), "utf8").trim().split("\n").map((line) => JSON.parse(line));
+  const over = lines.at(-1);
+  const tab = await open(page("run.html", file("run.jsonl")));
+  const cells = await cellsOf(rowsOf(tab, "Planned and done"));
+  assert.equal(cells.length, over.executed.length);
+  for (const [index, done] of over.executed.entries()) {
+    assert.equal(cells[index][0], done.action);
+    assert.ok(Math.abs(Number(cells[index][2]) - done.start.decimal) < 0.001);
+    assert.ok(Math.abs(Number(cells[index][4]) - done.start.decimal - done.duration.decimal) < 0.001);
+    assert.equal(cells[index][5], done.outcome);
+  }
+  // In the middle of each action it is running, and the last decision is the last one of the trace.
+  const slider = tab.locator("#time");
+  for (const done of over.executed) {
+    const time = done.start.decimal + done.duration.decimal / 2;
+    await slider.evaluate((it, value) => { it.value = value; it.dispatchEvent(new Event("input")); }, time);
+    const now = await tab.locator(".now").textContent();
+    assert.ok(now.includes(done.action), `${done.action} at ${time}: ${now}`);
+    const decision = lines.filter((line) => line.event === "decided" && line.now.decimal <= time).at(-1);
+    assert.ok(now.includes(decision.reason.words), now);
+  }
+  // Dragged to the left end with the mouse, and on with a key.
+  const box = await slider.boundingBox();
+  await tab.mouse.move(box.x + box.width - 3, box.y + box.height / 2);
+  await tab.mouse.down();
+  await tab.mouse.move(box.x, box.y + box.height / 2, { steps: 5 });
+  await tab.mouse.up();
+  assert.equal(Number(await slider.inputValue()), 0);
+  await slider.press("ArrowRight");
+  assert.ok(Number(await slider.inputValue()) > 0);
+  // Each decision is in the log, with its reason.
+  const log = await cellsOf(rowsOf(tab, "What happened, and why"));
+  const decided = lines.filter((line) => line.event === "decided");
+  const rows = log.filter((row) => row[1] === "decision");
+  assert.deepEqual(rows.map((row) => row[4]), decided.map((line) => line.reason.words));
+  await close(tab);
+});
+
+test("a table is filtered by what is typed", async () => {
+  const tab = await open(file("run.html"));
+  const rows = rowsOf(tab, "What happened, and why");
+  const all = await rows.count();
+  await tab.getByLabel("Filter: What happened, and why").fill("has succeeded");
+  const some = await cellsOf(rows);
+  assert.ok(some.length > 0 && some.length < all);
+  assert.ok(some.every((row) => row.join(" ").includes("has succeeded")));
+  await close(tab);
+});
+
+test("the rates of an experiment are those of its results", async () => {
+  fs.writeFileSync(file("experiment.toml"), `format = "elbowroom-experiment"
+version = 1
+title = "Busy <b>corridors</b>"
+domain = ${JSON.stringify(delivery[0])}
+problem = ${JSON.stringify(delivery[1])}
+trials = 40
+executors = ["guarded", "live", "fixed:20"]
+[[column]]
+name = "busy"
+world = "world.toml"
+`);
+  run("compare", file("experiment.toml"), "-o", file("results"));
+  const results = JSON.parse(fs.readFileSync(file("results/results.json"), "utf8"));
+  const tab = await open(page("experiment.html", file("results")));
+  assert.equal(await tab.locator("h1").textContent(), "Busy <b>corridors</b>");
+  const rates = await tab.locator(".rate .words").allTextContents();
+  assert.equal(rates.length, results.rows.length);
+  for (const [row, words] of rates.entries()) {
+    const { runs, successes } = results.cells[row][0];
+    assert.ok(words.includes(`, ${successes} of ${runs}`), words);
+    assert.ok(words.startsWith(`${((100 * successes) / runs).toFixed(1)} %`), words);
+  }
+  const pairs = await cellsOf(rowsOf(tab, "Compared with guarded"));
+  assert.deepEqual(pairs.map((row) => row.slice(2, 4).map(Number)),
+    results.pairs.slice(1).map(([pair]) => [pair.only_first, pair.only_this]));
+  await close(tab);
+});
+
+const hostile = [
+  "(<img src=x onerror=window.hit=1> a)", "</script><script>window.hit=1</script>", "(go \"' & <!--)",
+  `(${"x".repeat(10_000)} a)`, "(اذهب إلى المكتب)", "(a \u202e desrever \u2028 b)", "(javascript:window.hit=1 a)",
+];
+test("hostile names and texts are shown as text", async () => {
+  const envelope = JSON.parse(fs.readFileSync(file("envelope.json"), "utf8"));
+  const { actions } = envelope.timeline;
+  envelope.timeline.actions = hostile.map((action, index) => ({ ...actions[index % actions.length], action, instance: `n${index}` }));
+  envelope.timeline.timed[0].changes = [hostile[1]];
+  envelope.problem = envelope.domain = envelope.plan = hostile[1];
+  envelope.parameters[0].name = envelope.parameters[0].upper_limit = hostile[0];
+  fs.writeFileSync(file("hostile.json"), JSON.stringify(envelope));
+  const tab = await open(page("hostile.html", file("hostile.json")));
+  const names = (await cellsOf(rowsOf(tab, "Actions"))).map((row) => row[0]);
+  for (const name of hostile) assert.ok(names.some((cell) => cell.endsWith(name)), name.slice(0, 40));
+  await tab.locator(".scroll").focus();
+  for (let step = 0; step < hostile.length; step++) await tab.keyboard.press("ArrowRight");
+  assert.equal(await tab.evaluate(() => window.hit), undefined);
+  assert.equal(await tab.locator("img").count(), 0);
+  const width = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  assert.ok(width <= 0, `the page is ${width} px too wide`);
+  await close(tab);
+});
+
+test("no page is wider than a telephone, and none has what axe objects to", async () => {
+  const axe = fs.readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+  for (const name of ["envelope", "run", "experiment", "hostile"]) {
+    for (const width of [1280, 400]) {
+      for (const colorScheme of ["light", "dark"]) {
+        const tab = await open(file(`${name}.html`), { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });
+        const over = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        assert.ok(over <= 0, `${name} at ${width}: ${over} px too wide`);
+        await tab.evaluate(axe);
+        const { violations } = await tab.evaluate(() => axe.run());
+        assert.deepEqual(violations.map((it) => `${it.id}: ${it.nodes.map((node) => node.html.slice(0, 200)).join(" | ")}`), [], `${name} at ${width}, ${colorScheme}`);
+        if (screenshots) await tab.screenshot({ path: path.join(screenshots, `${name}-${width}-${colorScheme}.png`), fullPage: true });
+        await close(tab);
+      }
+    }
+  }
+});
+
+test("a printed page has all lanes and no controls", async () => {
+  const tab = await open(file("run.html"));
+  await tab.emulateMedia({ media: "print" });
+  assert.equal(await tab.locator(".controls:visible").count(), 0);
+  const printed = await tab.pdf({ format: "A4" });
+  assert.ok(printed.length > 10_000 && printed.subarray(0, 4).toString() === "%PDF");
+  if (screenshots) fs.writeFileSync(path.join(screenshots, "run.pdf"), printed);
+  await close(tab);
+});
+
+test("ten thousand actions load, scroll and scrub smoothly", async () => {
+  const envelope = JSON.parse(fs.readFileSync(file("envelope.json"), "utf8"));
+  const number = (value) => ({ exact: String(value), decimal: value });
+  const many = Array.from({ length: 10_000 }, (_, index) => {
+    const start = Math.floor(index / 10) * 11;
+    return {
+      instance: `n${index}`, action: `(drive rover${index % 10} place${index % 97} place${(index + 1) % 97})`,
+      start: number(start), end: number(start + 10),
+      start_window: { earliest: number(start), latest: number(start + 4) },
+      end_window: { earliest: number(start + 7), latest: number(start + 14) },
+    };
+  });
+  envelope.timeline = { ...envelope.timeline, actions: many, types: Object.fromEntries(Array.from({ length: 10 }, (_, it) => [`rover${it}`, "robot"])) };
+  fs.writeFileSync(file("many.json"), JSON.stringify(envelope));
+  const made = page("many.html", file("many.json"));
+  const begun = Date.now();
+  const tab = await open(made);
+  const loaded = Date.now() - begun;
+  await tab.getByRole("button", { name: "zoom in" }).click({ clickCount: 8 });
+  // The time of the frames while it scrolls from one end to the other.
+  const frames = await tab.evaluate(() => new Promise((resolve) => {
+    const scroll = document.querySelector(".scroll"), times = [];
+    let last = performance.now(), step = 0;
+    const next = (now) => {
+      times.push(now - last);
+      last = now;
+      scroll.scrollLeft = (step / 60) * scroll.scrollWidth;
+      scroll.scrollTop = (step % 10) * 40;
+      if (step++ < 60) requestAnimationFrame(next);
+      else resolve(times.slice(1));
+    };
+    requestAnimationFrame(next);
+  }));
+  frames.sort((a, b) => a - b);
+  const [middle, worst] = [frames[frames.length >> 1], frames.at(-1)];
+  const drawn = await tab.locator("svg rect[data-bar]").count();
+  console.log(`   10,000 actions: ${(fs.statSync(made).size / 1e6).toFixed(1)} MB, loaded in ${loaded} ms, frames ${middle.toFixed(0)} ms in the middle, ${worst.toFixed(0)} ms at worst, ${drawn} bars in the page`);
+  assert.ok(drawn < 2000, `${drawn} bars are in the page`);
+  if (screenshots) await tab.screenshot({ path: path.join(screenshots, "many.png") });
+  await close(tab);
+});
+
+test("the same input gives the same bytes", async () => {
+  assert.equal(run("report", file("run.jsonl")), fs.readFileSync(file("run.html"), "utf8"));
+});
+
+(async () => {
+  browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
+  let failed = 0;
+  for (const [name, body] of tests) {
+    try {
+      await body();
+      console.log(`ok  ${name}`);
+    } catch (error) {
+      failed += 1;
+      console.log(`NOT ${name}\n${error.stack}`);
+    }
+  }
+  await browser.close();
+  console.log(failed ? `${failed} of ${tests.length} failed` : `all ${tests.length} hold`);
+  process.exit(failed ? 1 : 0);
+})();

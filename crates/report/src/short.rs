@@ -1,0 +1,66 @@
+//! Exact numbers for people: short decimals, rounded in a known direction.
+
+use elbowroom_num::Rational;
+
+/// Digits after the point that people get to see.
+const DIGITS: u32 = 3;
+
+/// In which direction a number may be changed to be short.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// Towards minus infinity: for upper ends.
+    Down,
+    /// Towards infinity: for lower ends.
+    Up,
+}
+
+/// The number with three digits at most, rounded to the nearest.
+pub fn nearest(value: &Rational) -> String {
+    value.to_decimal(DIGITS)
+}
+
+/// The number with `digits` digits at most, rounded in that direction.
+pub fn rounded(value: &Rational, digits: u32, rounding: Rounding) -> String {
+    round(value, digits, rounding).to_decimal(digits)
+}
+
+/// An end of an interval around `inside`, rounded inwards; as an exact fraction where rounding
+/// would step over `inside`.
+pub fn between(end: &Rational, inside: &Rational, rounding: Rounding) -> String {
+    let short = round(end, DIGITS, rounding);
+    let stays = match rounding {
+        Rounding::Up => short <= *inside,
+        Rounding::Down => short >= *inside,
+    };
+    if stays {
+        short.to_decimal(DIGITS)
+    } else {
+        end.to_string()
+    }
+}
+
+fn round(value: &Rational, digits: u32, rounding: Rounding) -> Rational {
+    let scale = Rational::from(10_i64.pow(digits));
+    let scaled = value * &scale;
+    let whole = match rounding {
+        Rounding::Down => scaled.floor(),
+        Rounding::Up => scaled.ceil(),
+    };
+    &whole / &scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Rounding, between, nearest, rounded};
+    use elbowroom_num::Rational;
+
+    #[test]
+    fn ends_are_rounded_inwards() {
+        let third = Rational::new(1, 3);
+        assert_eq!(between(&third, &Rational::ONE, Rounding::Up), "0.334");
+        assert_eq!(between(&third, &Rational::ZERO, Rounding::Down), "0.333");
+        assert_eq!(between(&third, &third, Rounding::Up), "1/3");
+        assert_eq!(rounded(&Rational::new(-1, 3), 0, Rounding::Down), "-1");
+        assert_eq!(nearest(&Rational::new(2, 3)), "0.667");
+    }
+}
