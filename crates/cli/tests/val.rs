@@ -29,7 +29,9 @@ fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
         return;
     };
     let table = std::fs::read_to_string(root.join("plans.csv")).expect("checked above");
-    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().expect("a header");
     let column = |name: &str| header.iter().position(|it| *it == name).expect("a column");
     let files = ["domain_file", "problem_file", "plan_file"].map(column);
@@ -44,14 +46,23 @@ fn scripts_that_look_for_vals_words_come_to_vals_recorded_verdicts() {
         let text = String::from_utf8_lossy(&answer.stdout);
         let says = |words: &str| text.contains(words);
         match row[verdict] {
-            "valid" => assert!(says("Plan valid") && says("Successful plans:"), "{}: {text}", paths[2]),
+            "valid" => assert!(
+                says("Plan valid") && says("Successful plans:"),
+                "{}: {text}",
+                paths[2]
+            ),
             "failed-to-execute" => {
                 let failed = says("Plan failed to execute") || says("Goal not satisfied");
                 assert!(failed && says("Failed plans:"), "{}: {text}", paths[2]);
             }
             _ => assert!(!says("Plan valid"), "{}: {text}", paths[2]),
         }
-        assert_eq!(answer.status.success(), row[verdict] == "valid", "{}", paths[2]);
+        assert_eq!(
+            answer.status.success(),
+            row[verdict] == "valid",
+            "{}",
+            paths[2]
+        );
         judged += 1;
     }
     assert!(judged > 150, "{judged} plans");
@@ -75,6 +86,9 @@ fn under_vals_name_the_command_takes_vals_arguments() {
             .expect("the command can be started");
         let text = String::from_utf8_lossy(&answer.stdout);
         assert!(text.contains("Plan valid"), "{text}");
-        assert!(text.contains("Checking next happening (time 10.001)"), "{text}");
+        assert!(
+            text.contains("Checking next happening (time 10.001)"),
+            "{text}"
+        );
     }
 }

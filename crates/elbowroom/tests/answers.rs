@@ -329,7 +329,10 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
         panic!("an envelope");
     };
     let timeline = timeline.as_ref().expect("a timeline");
-    let (plan, envelope) = (outcome.plan.expect("a plan"), outcome.envelope.expect("a box"));
+    let (plan, envelope) = (
+        outcome.plan.expect("a plan"),
+        outcome.envelope.expect("a box"),
+    );
     let ends = |interval: &Interval| {
         [&interval.lower, &interval.upper].map(|end| end.value().cloned().expect("a number"))
     };
@@ -337,8 +340,9 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
     let mut widest = vec![None::<(Rational, Rational)>; plan.plan.nodes.len()];
     for corner in 0..1_usize << ends.len() {
         let values = ends.iter().enumerate();
-        let values: Valuation =
-            values.map(|(index, ends)| ends[corner >> index & 1].clone()).collect();
+        let values: Valuation = values
+            .map(|(index, ends)| ends[corner >> index & 1].clone())
+            .collect();
         let network = ConsistentNetwork::try_from(plan.plan.network(&values));
         let windows = network.expect("a schedule").windows(NodeId(0));
         for ((_, window), widest) in windows.iter().zip(&mut widest) {

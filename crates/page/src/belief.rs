@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use elbowroom::answers::Exact;
 use elbowroom::execution::{Measured, Progression, Ticket};
-use elbowroom::model::ground::{Action, FactId, FluentId};
 use elbowroom::model::Task;
+use elbowroom::model::ground::{Action, FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::line::ObservationLine;
 use elbowroom::report::short::nearest;
@@ -84,7 +84,9 @@ impl<'t> Belief<'t> {
         let _ = self.progression.arrive(&time.0);
         let planned = planned.cloned().unwrap_or_default();
         let measured = self.measured(measured.iter());
-        let _ = self.progression.start(Ticket(ticket), &Arc::new(action), &planned, &measured);
+        let _ = self
+            .progression
+            .start(Ticket(ticket), &Arc::new(action), &planned, &measured);
         self.note(texts);
     }
 

@@ -6,9 +6,7 @@ use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
 use elbowroom_laboratory::compare::{Cell, Results};
 use elbowroom_laboratory::perturbed::PerturbedResults;
 
-use crate::document::{
-    Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict,
-};
+use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 use crate::plan::word;
 
 /// What the intervals are.
@@ -23,7 +21,9 @@ pub(crate) fn timed(results: &Results) -> Document {
         } else {
             format!("{INTERVALS} The line marks what the best of all executors can reach at most.")
         },
-        groups: (0..results.columns.len()).map(|column| group(results, column)).collect(),
+        groups: (0..results.columns.len())
+            .map(|column| group(results, column))
+            .collect(),
     })];
     if results.rows.len() > 1 {
         sections.push(Section::Table(pairs(results)));
@@ -34,14 +34,24 @@ pub(crate) fn timed(results: &Results) -> Document {
     let mut causes = counts(results, "Why plans were given up", &causes);
     "The number of plans, by cause. One run may give up several.".clone_into(&mut causes.note);
     sections.push(Section::Table(causes));
-    let runs = results.cells.iter().flatten().map(|cell| cell.runs).sum::<u64>();
+    let runs = results
+        .cells
+        .iter()
+        .flatten()
+        .map(|cell| cell.runs)
+        .sum::<u64>();
     Document {
         title: results.title.clone(),
         verdict: Verdict {
             tone: Tone::Plain,
             words: made(runs, "runs", results.is_interrupted),
         },
-        facts: facts(results.trials, results.shards, &results.parts, &results.fingerprint),
+        facts: facts(
+            results.trials,
+            results.shards,
+            &results.parts,
+            &results.fingerprint,
+        ),
         sections,
         texts: Vec::new(),
     }
@@ -60,7 +70,11 @@ pub(crate) fn untimed(results: &PerturbedResults) -> Document {
             word(&row.world).into(),
             rate.name.as_str().into(),
             rate.words.as_str().into(),
-            row.published.and_then(Proportion::share).map(percent).unwrap_or_default().into(),
+            row.published
+                .and_then(Proportion::share)
+                .map(percent)
+                .unwrap_or_default()
+                .into(),
             row.optimum.map(percent).unwrap_or_default().into(),
             mean(row.replans).into(),
         ]);
@@ -92,19 +106,30 @@ pub(crate) fn untimed(results: &PerturbedResults) -> Document {
         }),
         Section::Table(Table {
             heading: "All rows".to_owned(),
-            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            columns: columns
+                .map(|(name, is_number)| (name.to_owned(), is_number))
+                .to_vec(),
             rows,
             ..Table::default()
         }),
     ];
-    let trials = results.rows.iter().map(|row| row.success.count).sum::<u64>();
+    let trials = results
+        .rows
+        .iter()
+        .map(|row| row.success.count)
+        .sum::<u64>();
     Document {
         title: results.title.clone(),
         verdict: Verdict {
             tone: Tone::Plain,
             words: made(trials, "trials", results.is_interrupted),
         },
-        facts: facts(results.trials, results.shards, &results.parts, &results.fingerprint),
+        facts: facts(
+            results.trials,
+            results.shards,
+            &results.parts,
+            &results.fingerprint,
+        ),
         sections,
         texts: Vec::new(),
     }
@@ -125,14 +150,20 @@ fn facts(trials: u64, shards: u64, parts: &[u64], fingerprint: &str) -> Vec<(Str
     ];
     if shards > 1 {
         let parts: Vec<String> = parts.iter().map(u64::to_string).collect();
-        facts.push(("parts".to_owned(), format!("{} of {shards}", parts.join(", "))));
+        facts.push((
+            "parts".to_owned(),
+            format!("{} of {shards}", parts.join(", ")),
+        ));
     }
     facts
 }
 
 /// The executors in one column.
 fn group(results: &Results, column: usize) -> RateGroup {
-    let best = results.optimum.get(column).filter(|best| best.unknown.is_none());
+    let best = results
+        .optimum
+        .get(column)
+        .filter(|best| best.unknown.is_none());
     let best = best.map(|best| best.upper);
     let rows = results.rows.iter().zip(&results.cells);
     RateGroup {
@@ -181,7 +212,8 @@ fn percent(share: f64) -> String {
 }
 
 fn mean(mean: Mean) -> String {
-    mean.value().map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}"))
+    mean.value()
+        .map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}"))
 }
 
 /// Each executor against the first one, in the same worlds.
@@ -204,7 +236,11 @@ fn pairs(results: &Results) -> Table {
                 row.as_str().into(),
                 pair.only_first.to_string().into(),
                 pair.only_this.to_string().into(),
-                if p < 0.0001 { "< 0.0001".into() } else { format!("{p:.4}").into() },
+                if p < 0.0001 {
+                    "< 0.0001".into()
+                } else {
+                    format!("{p:.4}").into()
+                },
             ]);
         }
     }
@@ -226,8 +262,12 @@ fn counts(
     heading: &str,
     counts: &dyn Fn(&Cell) -> BTreeMap<String, u64>,
 ) -> Table {
-    let names: BTreeSet<String> =
-        results.cells.iter().flatten().flat_map(|cell| counts(cell).into_keys()).collect();
+    let names: BTreeSet<String> = results
+        .cells
+        .iter()
+        .flatten()
+        .flat_map(|cell| counts(cell).into_keys())
+        .collect();
     let mut columns = vec![("world".to_owned(), false), ("executor".to_owned(), false)];
     columns.extend(names.iter().map(|name| (name.replace('-', " "), true)));
     let mut rows: Vec<Vec<Text>> = Vec::new();

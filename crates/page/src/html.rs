@@ -39,18 +39,23 @@ pub(crate) fn html(document: &Document) -> String {
 }
 
 /// The text before the next place that is to be filled, what comes there, and the text behind it.
-fn next<'a>(
-    template: &'a str,
-    parts: &'a [(&str, String)],
-) -> Option<(&'a str, &'a str, &'a str)> {
-    let places = parts.iter().filter_map(|(name, text)| Some((template.find(name)?, name, text)));
+fn next<'a>(template: &'a str, parts: &'a [(&str, String)]) -> Option<(&'a str, &'a str, &'a str)> {
+    let places = parts
+        .iter()
+        .filter_map(|(name, text)| Some((template.find(name)?, name, text)));
     let (position, name, text) = places.min_by_key(|(position, ..)| *position)?;
-    Some((&template[..position], text, &template[position + name.len()..]))
+    Some((
+        &template[..position],
+        text,
+        &template[position + name.len()..],
+    ))
 }
 
 /// A text between tags.
 fn as_text(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
 }
 
 /// A value as JSON in a script block: nothing in it can end the block or begin a comment.
@@ -75,7 +80,8 @@ mod tests {
     use super::{as_data, html};
     use crate::document::{Document, Tone, Verdict};
 
-    const HOSTILE: &str = "</script><script>alert(1)</script><!-- {data} {script} & \u{2028} \u{202e}";
+    const HOSTILE: &str =
+        "</script><script>alert(1)</script><!-- {data} {script} & \u{2028} \u{202e}";
 
     #[test]
     fn a_hostile_text_in_data_stays_one_json_text() {
@@ -109,6 +115,10 @@ mod tests {
         };
         let tags = |page: &str| page.matches("<script").count();
         assert_eq!(tags(&page), tags(&html(&empty)));
-        assert_eq!(page.matches("{data}").count(), 4, "twice as text, twice in the data");
+        assert_eq!(
+            page.matches("{data}").count(),
+            4,
+            "twice as text, twice in the data"
+        );
     }
 }

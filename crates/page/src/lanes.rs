@@ -58,7 +58,13 @@ pub(crate) fn lanes<'a>(
     }
     let actions: Vec<Option<&str>> = occupants
         .iter()
-        .map(|occupant| occupant.name.trim_start_matches('(').split([' ', ')']).next())
+        .map(|occupant| {
+            occupant
+                .name
+                .trim_start_matches('(')
+                .split([' ', ')'])
+                .next()
+        })
         .collect();
     lanes.add("action".to_owned(), &actions);
     lanes
@@ -211,13 +217,22 @@ mod tests {
 
     #[test]
     fn without_types_the_first_object_is_the_lane_and_without_objects_the_action() {
-        let untyped = [Occupant { name: "(go x y)", time: (0.0, 1.0) }];
+        let untyped = [Occupant {
+            name: "(go x y)",
+            time: (0.0, 1.0),
+        }];
         let names = |occupants: &[Occupant<'_>]| -> Vec<String> {
             let lanes = lanes(occupants, &|_| None);
             lanes.groupings.into_iter().map(|it| it.name).collect()
         };
         assert_eq!(names(&untyped), ["first object", "action"]);
-        assert_eq!(names(&[Occupant { name: "(idle)", time: (0.0, 1.0) }]), ["action"]);
+        assert_eq!(
+            names(&[Occupant {
+                name: "(idle)",
+                time: (0.0, 1.0)
+            }]),
+            ["action"]
+        );
         assert_eq!(names(&[]), ["action"]);
     }
 }

@@ -124,10 +124,14 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
     match format(text).as_deref() {
         Some("elbowroom-trace") => {
             let stored = Stored::read(text).map_err(|error| damaged(error.to_string()))?;
-            let spec: RunSpec = stored.header().map_err(|error| damaged(error.to_string()))?;
+            let spec: RunSpec = stored
+                .header()
+                .map_err(|error| damaged(error.to_string()))?;
             Ok(run::trace(name, &stored, &spec))
         }
-        Some("elbowroom-envelope") => read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it)),
+        Some("elbowroom-envelope") => {
+            read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it))
+        }
         Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::found(&it)),
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
         Some("elbowroom-results") => {
@@ -154,7 +158,9 @@ fn format(text: &str) -> Option<String> {
         format: String,
     }
     let first = text.lines().next().unwrap_or_default();
-    let named: Named = serde_json::from_str(text).or_else(|_| serde_json::from_str(first)).ok()?;
+    let named: Named = serde_json::from_str(text)
+        .or_else(|_| serde_json::from_str(first))
+        .ok()?;
     Some(named.format)
 }
 

@@ -97,9 +97,10 @@ impl File {
             "file": { "type": "string" },
             "line": { "type": "integer" },
         });
-        let (Some(log), Some(channel)) =
-            (log, self.channel("/elbowroom/log", "foxglove.Log", &members))
-        else {
+        let (Some(log), Some(channel)) = (
+            log,
+            self.channel("/elbowroom/log", "foxglove.Log", &members),
+        ) else {
             return;
         };
         let words = |text: &Text| -> String {
@@ -113,7 +114,11 @@ impl File {
                 continue;
             };
             let (what, why) = (words(what), words(why));
-            let message = if why.is_empty() { what } else { format!("{what}: {why}") };
+            let message = if why.is_empty() {
+                what
+            } else {
+                format!("{what}: {why}")
+            };
             let time = nanoseconds(*at);
             let data = json!({
                 "timestamp": { "sec": time / NANOSECONDS, "nsec": time % NANOSECONDS },
@@ -130,7 +135,11 @@ impl File {
         };
         for (lane, name) in grouping.lanes.iter().enumerate() {
             let mut changes: Vec<(f64, bool, &str)> = Vec::new();
-            for bar in chart.bars.iter().filter(|bar| bar.lanes.get(chart.chosen) == Some(&lane)) {
+            for bar in chart
+                .bars
+                .iter()
+                .filter(|bar| bar.lanes.get(chart.chosen) == Some(&lane))
+            {
                 if let Some((start, end)) = bar.actual {
                     changes.push((start, true, &bar.name));
                     if bar.outcome != "running" {
@@ -148,7 +157,11 @@ impl File {
             let mut running: BTreeMap<&str, usize> = BTreeMap::new();
             for (at, is_start, action) in changes {
                 let count = running.entry(action).or_default();
-                *count = if is_start { *count + 1 } else { count.saturating_sub(1) };
+                *count = if is_start {
+                    *count + 1
+                } else {
+                    count.saturating_sub(1)
+                };
                 running.retain(|_, count| *count > 0);
                 let names: Vec<&str> = running.keys().copied().collect();
                 self.message(channel, at, json!({ "action": names.join(", ") }));
@@ -161,7 +174,8 @@ impl File {
         if chart.guarantee.is_empty() {
             return;
         }
-        if let Some(channel) = self.channel("/elbowroom/guarantee", "elbowroom.Guarantee", &members) {
+        if let Some(channel) = self.channel("/elbowroom/guarantee", "elbowroom.Guarantee", &members)
+        {
             for segment in &chart.guarantee {
                 let data = json!({ "level": segment.level, "words": segment.words });
                 self.message(channel, segment.from, data);
@@ -256,7 +270,10 @@ impl Record {
 fn word(name: &str) -> String {
     let trimmed = name.trim_matches(['(', ')']);
     let kept = |letter: char| letter.is_ascii_alphanumeric() || letter == '-' || letter == '_';
-    trimmed.chars().map(|letter| if kept(letter) { letter } else { '_' }).collect()
+    trimmed
+        .chars()
+        .map(|letter| if kept(letter) { letter } else { '_' })
+        .collect()
 }
 
 const NANOSECONDS: u64 = 1_000_000_000;

@@ -109,9 +109,13 @@ impl Trace {
                 continue;
             }
             let parent = self.track(name, Some(run), false);
-            let done = bars.iter().filter_map(|&(index, bar)| Some((index, bar, bar.actual?)));
+            let done = bars
+                .iter()
+                .filter_map(|&(index, bar)| Some((index, bar, bar.actual?)));
             self.slices("done", parent, done.collect(), Some(&flows), document);
-            let planned = bars.iter().filter_map(|&(index, bar)| Some((index, bar, bar.planned?)));
+            let planned = bars
+                .iter()
+                .filter_map(|&(index, bar)| Some((index, bar, bar.planned?)));
             self.slices("planned", parent, planned.collect(), None, document);
         }
     }
@@ -137,7 +141,14 @@ impl Trace {
             tracks[row].0 = end;
             let track = tracks[row].1;
             let fill = |event: &mut Message| {
-                event.text(22, if flows.is_some() { bar.outcome } else { "planned" });
+                event.text(
+                    22,
+                    if flows.is_some() {
+                        bar.outcome
+                    } else {
+                        "planned"
+                    },
+                );
                 event.text(23, &bar.name);
                 for (label, text) in &bar.details {
                     let text = match text {
@@ -173,7 +184,11 @@ impl Trace {
         };
         if !chart.guarantee.is_empty() {
             let track = self.track("guarantee", Some(run), false);
-            for segment in chart.guarantee.iter().filter(|segment| segment.to > segment.from) {
+            for segment in chart
+                .guarantee
+                .iter()
+                .filter(|segment| segment.to > segment.from)
+            {
                 self.event(segment.from, Kind::Begin, track, named(&segment.words));
                 self.event(segment.to, Kind::End, track, |_| {});
             }
@@ -197,15 +212,21 @@ impl Trace {
         for line in &series.lines {
             let track = self.track(&line.name, Some(run), true);
             for (time, value) in &line.points {
-                self.event(*time, Kind::Counter, track, |event| event.double(44, *value));
+                self.event(*time, Kind::Counter, track, |event| {
+                    event.double(44, *value)
+                });
             }
         }
     }
 
     fn finish(mut self) -> Vec<u8> {
-        self.events.sort_by_key(|event| (event.nanoseconds, event.rank));
+        self.events
+            .sort_by_key(|event| (event.nanoseconds, event.rank));
         let mut trace = Message::default();
-        let packets = self.tracks.iter().chain(self.events.iter().map(|event| &event.message));
+        let packets = self
+            .tracks
+            .iter()
+            .chain(self.events.iter().map(|event| &event.message));
         for packet in packets {
             trace.message(1, packet);
         }

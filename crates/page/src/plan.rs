@@ -43,8 +43,12 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             sections.push(Section::Table(rooms(parameters, &mut texts)));
             sections.extend(timeline.as_ref().map(|it| Section::Table(times(it))));
             good(match stop {
-                Stop::Converged => "The plan works as long as each quantity stays inside its interval, whatever the others do in theirs.",
-                _ => "The plan works as long as each quantity stays inside its interval. The search was ended early: wider intervals may do, too.",
+                Stop::Converged => {
+                    "The plan works as long as each quantity stays inside its interval, whatever the others do in theirs."
+                }
+                _ => {
+                    "The plan works as long as each quantity stays inside its interval. The search was ended early: wider intervals may do, too."
+                }
             })
         }
         EnvelopeFinding::Inside { parameters } => {
@@ -73,7 +77,10 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         }
         EnvelopeFinding::None { stop } => Verdict {
             tone: Tone::Plain,
-            words: format!("Nothing is known yet: the search ended before it began ({}).", word(stop)),
+            words: format!(
+                "Nothing is known yet: the search ended before it began ({}).",
+                word(stop)
+            ),
         },
     };
     Document {
@@ -109,7 +116,10 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
                 instance: String::new(),
                 action: step.action.clone(),
                 start: step.start.clone(),
-                end: step.duration.as_ref().map(|it| (&step.start.0 + &it.0).into()),
+                end: step
+                    .duration
+                    .as_ref()
+                    .map(|it| (&step.start.0 + &it.0).into()),
                 start_window: WindowAnswer::default(),
                 end_window: None,
                 parameter: None,
@@ -124,7 +134,10 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
                 let heading = "What was wrong with the planner's own times";
                 sections.push(prose(heading, vec![repaired.clone()]));
             }
-            good(&format!("A plan that reaches the goal at {}.", nearest(makespan)))
+            good(&format!(
+                "A plan that reaches the goal at {}.",
+                nearest(makespan)
+            ))
         }
         PlanFinding::NoPlan { reason } => bad(&format!("There is no plan: {reason}")),
         PlanFinding::None { reason } => Verdict {
@@ -208,7 +221,10 @@ fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
     } = lanes(&occupants, &type_of);
     let mut bars = Vec::with_capacity(timeline.actions.len());
     for (action, lanes) in timeline.actions.iter().zip(of) {
-        let room = action.parameter.as_deref().and_then(|name| by_name.get(name));
+        let room = action
+            .parameter
+            .as_deref()
+            .and_then(|name| by_name.get(name));
         bars.push(Bar {
             name: action.action.clone(),
             planned: Some(time(action)),
@@ -242,10 +258,16 @@ fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
 /// Where the axis ends: behind all that is planned, and behind what may come later as far as that is
 /// not so far away that nothing else could be seen.
 pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
-    let spans = bars.iter().flat_map(|bar| [bar.planned, bar.actual]).flatten();
+    let spans = bars
+        .iter()
+        .flat_map(|bar| [bar.planned, bar.actual])
+        .flatten();
     let done = spans.map(|(_, end)| end).fold(0.0, f64::max);
     let latest = |band: Option<(Option<f64>, Option<f64>)>| band.and_then(|(_, latest)| latest);
-    let bands = bars.iter().flat_map(|bar| [latest(bar.starts), latest(bar.ends)]).flatten();
+    let bands = bars
+        .iter()
+        .flat_map(|bar| [latest(bar.starts), latest(bar.ends)])
+        .flatten();
     let later = bands.chain(marks.iter().map(|mark| mark.at));
     let far = if done > 0.0 { 3.0 * done } else { f64::MAX };
     let end = later.filter(|time| *time <= far).fold(done, f64::max);
@@ -303,7 +325,10 @@ fn details(
     let nominal = &room.range.quantity.nominal;
     let (lower, upper) = ends(&room.range);
     details.push(("takes", nearest(nominal).into()));
-    details.push(("may take", format!("{lower} to {upper} ({})", room.range.quantity.name).into()));
+    details.push((
+        "may take",
+        format!("{lower} to {upper} ({})", room.range.quantity.name).into(),
+    ));
     let limits = [
         ("not less, because", &room.lower_limit),
         ("not more, because", &room.upper_limit),

@@ -100,7 +100,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec) -> Document {
             Some(report) => verdict(report),
             None => Verdict {
                 tone: Tone::Plain,
-                words: format!("The trace ends at {} before the run was over.", nearest(&now)),
+                words: format!(
+                    "The trace ends at {} before the run was over.",
+                    nearest(&now)
+                ),
             },
         },
         facts,
@@ -150,7 +153,10 @@ fn verdict(report: &ReportLine) -> Verdict {
     let (tone, words) = match report.verdict.as_str() {
         "goal-reached" => (Tone::Good, "The goal was reached".to_owned()),
         "interrupted" => (Tone::Plain, "The run was interrupted".to_owned()),
-        other => (Tone::Bad, format!("The run failed ({})", other.replace('-', " "))),
+        other => (
+            Tone::Bad,
+            format!("The run failed ({})", other.replace('-', " ")),
+        ),
     };
     Verdict {
         tone,
@@ -168,7 +174,10 @@ fn why(report: &ReportLine) -> Vec<Section> {
         sections.push(prose("Why plans were given up", sentences(&report.reasons)));
     }
     if !report.dead_end.is_empty() {
-        sections.push(prose("Why no plan reaches the goal", sentences(&report.dead_end)));
+        sections.push(prose(
+            "Why no plan reaches the goal",
+            sentences(&report.dead_end),
+        ));
     }
     sections
 }
@@ -200,7 +209,9 @@ impl Bars {
             .flatten()
             .map(|(index, timed)| Mark {
                 at: timed.time.to_f64(),
-                name: task.map_or_else(String::new, |task| timeline::changes(task, index).join(", ")),
+                name: task.map_or_else(String::new, |task| {
+                    timeline::changes(task, index).join(", ")
+                }),
                 is_event: false,
             })
             .collect();

@@ -28,7 +28,9 @@ const WORLD: &str = "
 ";
 
 fn source(name: &str) -> Source {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../cases")
+        .join(name);
     Source::new(name, std::fs::read_to_string(path).expect("a case"))
 }
 
@@ -54,7 +56,9 @@ fn trace(case: &str, seed: u64) -> String {
     let mut sink = |line: &str| lines.push_str(line);
     let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
     writer.header(&spec).expect("a header");
-    let request = RunRequest::new(&spec, &task).beginning_with(plan).recorded_by(&mut writer);
+    let request = RunRequest::new(&spec, &task)
+        .beginning_with(plan)
+        .recorded_by(&mut writer);
     simulate(request, &mut Unwatched).expect("a run");
     lines
 }
@@ -100,9 +104,8 @@ fn the_page_of_an_envelope_has_each_action_and_each_interval() {
         assert_eq!(rooms.len(), parameters.len(), "{case}");
         for (row, room) in rooms.iter().zip(parameters) {
             assert_eq!(words(&document, &row[0]), room.range.quantity.name);
-            let cell = |column: usize| -> Option<Rational> {
-                words(&document, &row[column]).parse().ok()
-            };
+            let cell =
+                |column: usize| -> Option<Rational> { words(&document, &row[column]).parse().ok() };
             assert_eq!(cell(3).is_some(), room.range.lower.value().is_some());
             let interval = room.range.interval();
             for end in [cell(3), cell(4)].into_iter().flatten() {
@@ -128,13 +131,19 @@ fn the_page_of_a_run_has_what_was_done_beside_what_was_planned() {
         for done in &report.executed {
             let start = done.start.0.to_f64();
             let is_it = |bar: &&elbowroom_page::document::Bar| {
-                bar.name == done.action && bar.actual.is_some_and(|(begun, _)| begun.total_cmp(&start).is_eq())
+                bar.name == done.action
+                    && bar
+                        .actual
+                        .is_some_and(|(begun, _)| begun.total_cmp(&start).is_eq())
             };
             let bar = chart.bars.iter().find(is_it).expect("a bar");
             assert_eq!(Some(bar.outcome), done.outcome.as_deref(), "seed {seed}");
             assert!(bar.planned.is_some(), "it was planned");
         }
-        let decided = stored.lines.iter().filter(|line| matches!(line, Line::Decided(_)));
+        let decided = stored
+            .lines
+            .iter()
+            .filter(|line| matches!(line, Line::Decided(_)));
         assert_eq!(chart.decisions.len(), decided.count());
         let is_good = report.verdict == "goal-reached";
         assert_eq!(document.verdict.tone == Tone::Good, is_good);
@@ -149,9 +158,16 @@ fn the_page_of_a_run_has_what_was_done_beside_what_was_planned() {
                 None => facts.remove(&name),
             };
         }
-        assert_eq!(facts.contains("(lies parcel office)"), is_good, "seed {seed}: {facts:?}");
+        assert_eq!(
+            facts.contains("(lies parcel office)"),
+            is_good,
+            "seed {seed}: {facts:?}"
+        );
     }
-    assert!(reached > 0 && failed > 0, "{reached} reached, {failed} failed");
+    assert!(
+        reached > 0 && failed > 0,
+        "{reached} reached, {failed} failed"
+    );
 }
 
 #[test]
@@ -161,7 +177,11 @@ fn numbers_that_change_are_drawn_with_the_values_that_the_judge_computes() {
         Section::Series(series) => Some(series),
         _ => None,
     });
-    let charge = series.expect("numbers").lines.iter().find(|line| line.name == "(charge rover)");
+    let charge = series
+        .expect("numbers")
+        .lines
+        .iter()
+        .find(|line| line.name == "(charge rover)");
     let charge = charge.expect("the charge changes");
     // `elbowroom check` prints 20 for it at the end of the plan.
     let last = charge.points.last().expect("points").1;
@@ -187,16 +207,40 @@ fn the_same_input_gives_the_same_bytes() {
 #[test]
 fn what_is_no_document_is_refused_with_one_sentence() {
     let refused = |text: &str| page("file", text).expect_err("no page").to_string();
-    for text in ["", "hello", "{}", "[1, 2]", "\u{0}\u{1}", "{\"format\": 7}", "(define (domain d))"] {
+    for text in [
+        "",
+        "hello",
+        "{}",
+        "[1, 2]",
+        "\u{0}\u{1}",
+        "{\"format\": 7}",
+        "(define (domain d))",
+    ] {
         let sentence = refused(text);
-        assert!(sentence.starts_with("file is none of what"), "{text}: {sentence}");
+        assert!(
+            sentence.starts_with("file is none of what"),
+            "{text}: {sentence}"
+        );
         assert!(!sentence.contains('\n'));
     }
     let other = refused("{\"format\": \"elbowroom-check\", \"version\": 1}");
-    assert!(other.contains("a document of the format elbowroom-check"), "{other}");
-    for format in ["envelope", "plan", "run", "results", "perturbed-results", "trace"] {
+    assert!(
+        other.contains("a document of the format elbowroom-check"),
+        "{other}"
+    );
+    for format in [
+        "envelope",
+        "plan",
+        "run",
+        "results",
+        "perturbed-results",
+        "trace",
+    ] {
         let text = format!("{{\"format\": \"elbowroom-{format}\", \"version\": 1}}");
         let error = page("file", &text).expect_err("no page");
-        assert!(matches!(error, PageError::Damaged { .. }), "{format}: {error}");
+        assert!(
+            matches!(error, PageError::Damaged { .. }),
+            "{format}: {error}"
+        );
     }
 }

@@ -118,7 +118,10 @@ mod tests {
             for second in 0..8 {
                 let counted = mcnemar_by_counting(first, second);
                 let computed = mcnemar(first, second);
-                assert!((computed - counted).abs() < 1e-12, "{first} {second}: {computed} {counted}");
+                assert!(
+                    (computed - counted).abs() < 1e-12,
+                    "{first} {second}: {computed} {counted}"
+                );
             }
         }
         let many = mcnemar(49_000, 51_000);

@@ -41,7 +41,10 @@ fn line(finding: &Record) -> String {
         Severity::Error => "Error",
         Severity::Warning => "Warning",
     };
-    let mut line = format!("{}: line: {}: {severity}: {}", finding.file, finding.line, finding.message);
+    let mut line = format!(
+        "{}: line: {}: {severity}: {}",
+        finding.file, finding.line, finding.message
+    );
     if let Some(advice) = &finding.advice {
         let _ = write!(line, " ({advice})");
     }

@@ -68,7 +68,10 @@ fn read(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPl
     match input::any_plan(task, path, output)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
-            format!("{} is an STN plan file, which stands for many plans", path.display()),
+            format!(
+                "{} is an STN plan file, which stands for many plans",
+                path.display()
+            ),
             "`elbowroom envelope` says whether all of them work",
         )),
     }
@@ -149,9 +152,18 @@ impl Tally {
 }
 
 fn push_plan(text: &mut String, name: &str, plan: &TimeTriggeredPlan) {
-    let _ = writeln!(text, "Checking plan: {name}\nPlan to validate:\n\nPlan size: {}", plan.steps.len());
+    let _ = writeln!(
+        text,
+        "Checking plan: {name}\nPlan to validate:\n\nPlan size: {}",
+        plan.steps.len()
+    );
     for step in &plan.steps {
-        let _ = write!(text, "{}:\n{}", step.start.to_decimal(DIGITS), step.action.name);
+        let _ = write!(
+            text,
+            "{}:\n{}",
+            step.start.to_decimal(DIGITS),
+            step.action.name
+        );
         if let Some(duration) = &step.duration {
             let _ = write!(text, " [{}]", duration.to_decimal(DIGITS));
         }
@@ -172,7 +184,10 @@ fn push_happenings(
         times.insert(step.start.clone());
         times.insert(step.end());
     }
-    for time in times.iter().filter(|time| until.is_none_or(|until| *time <= until)) {
+    for time in times
+        .iter()
+        .filter(|time| until.is_none_or(|until| *time <= until))
+    {
         let mut time = time.to_decimal(DIGITS);
         // A point is looked for.
         if !time.contains('.') {

@@ -22,7 +22,10 @@ pub(super) fn ends(range: &Range) -> (String, String) {
 }
 
 fn columns(names: &[(&str, bool)]) -> Vec<(String, bool)> {
-    names.iter().map(|(name, is_number)| ((*name).to_owned(), *is_number)).collect()
+    names
+        .iter()
+        .map(|(name, is_number)| ((*name).to_owned(), *is_number))
+        .collect()
 }
 
 /// The table of the envelope.
@@ -105,7 +108,10 @@ pub(super) fn quantities(quantities: &[Quantity]) -> Table {
 
 /// The actions with their times.
 pub(super) fn times(timeline: &Timeline) -> Table {
-    let has_windows = timeline.actions.iter().any(|it| window_words(&it.start_window).is_some());
+    let has_windows = timeline
+        .actions
+        .iter()
+        .any(|it| window_words(&it.start_window).is_some());
     let mut names = vec![("action", false), ("start", true), ("end", true)];
     if has_windows {
         names.extend([("may start at", true), ("may end at", true)]);

@@ -5,8 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use elbowroom::answers::envelope::timeline::WindowAnswer;
 use elbowroom::num::Rational;
 use elbowroom::report::line::{
-    BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine,
-    WindowLine,
+    BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine, WindowLine,
 };
 use elbowroom::report::short::nearest;
 use elbowroom::report::trace::Line;
@@ -172,7 +171,9 @@ impl Bars {
 
     /// The actions of these steps of the present plan.
     pub(super) fn step_names(&self, steps: &[u32]) -> Vec<&str> {
-        let steps = steps.iter().filter_map(|&step| self.steps.get(self.first + step as usize));
+        let steps = steps
+            .iter()
+            .filter_map(|&step| self.steps.get(self.first + step as usize));
         steps.map(|step| step.action.as_str()).collect()
     }
 
@@ -192,14 +193,19 @@ impl Bars {
         for (index, step) in line.steps.iter().enumerate() {
             let start = origin + &step.start.0;
             let instance = line.network.instances.get(index);
-            let label = instance.filter(|it| it.action == step.action).map(|it| it.label.as_str());
+            let label = instance
+                .filter(|it| it.action == step.action)
+                .map(|it| it.label.as_str());
             let window = |node: String| match (&windows, label) {
                 (Some(windows), Some(_)) => windows.at(&node, origin),
                 _ => WindowAnswer::default(),
             };
             let label = label.unwrap_or_default();
             let (start_window, end_window) = match &step.duration {
-                Some(_) => (window(format!("{label}.start")), window(format!("{label}.end"))),
+                Some(_) => (
+                    window(format!("{label}.start")),
+                    window(format!("{label}.end")),
+                ),
                 None => (window(label.to_owned()), WindowAnswer::default()),
             };
             self.steps.push(Step {
@@ -217,15 +223,19 @@ impl Bars {
     /// Notes which steps of the plan its network puts in order.
     fn orderings(&mut self, line: &PlanLine) {
         let instances = line.network.instances.iter().enumerate();
-        let positions: BTreeMap<&str, usize> =
-            instances.map(|(index, it)| (it.label.as_str(), index)).collect();
+        let positions: BTreeMap<&str, usize> = instances
+            .map(|(index, it)| (it.label.as_str(), index))
+            .collect();
         let step = |node: &str| {
-            let label = node.strip_suffix(".start").or_else(|| node.strip_suffix(".end"));
-            positions.get(label.unwrap_or(node)).copied().filter(|index| *index < line.steps.len())
+            let label = node
+                .strip_suffix(".start")
+                .or_else(|| node.strip_suffix(".end"));
+            positions
+                .get(label.unwrap_or(node))
+                .copied()
+                .filter(|index| *index < line.steps.len())
         };
-        let is_sign = |bound: &Option<BoundLine>, is_it: fn(&Rational) -> bool| {
-            matches!(bound, Some(BoundLine::Number(number)) if is_it(&number.0))
-        };
+        let is_sign = |bound: &Option<BoundLine>, is_it: fn(&Rational) -> bool| matches!(bound, Some(BoundLine::Number(number)) if is_it(&number.0));
         for constraint in &line.network.constraints {
             let (Some(from), Some(to)) = (step(&constraint.from), step(&constraint.to)) else {
                 continue;
@@ -250,12 +260,19 @@ impl Bars {
                 bars[step] = Some(bar);
             }
         }
-        let waiting = self.steps.iter().enumerate().filter(|(_, step)| !step.is_ordered);
+        let waiting = self
+            .steps
+            .iter()
+            .enumerate()
+            .filter(|(_, step)| !step.is_ordered);
         for (bar, (step, _)) in (self.starts.len()..).zip(waiting) {
             bars[step] = Some(bar);
         }
-        let mut drawn: Vec<(usize, usize)> =
-            self.orderings.iter().filter_map(|&(from, to)| bars[from].zip(bars[to])).collect();
+        let mut drawn: Vec<(usize, usize)> = self
+            .orderings
+            .iter()
+            .filter_map(|&(from, to)| bars[from].zip(bars[to]))
+            .collect();
         drawn.sort_unstable();
         drawn.dedup();
         drawn
@@ -263,7 +280,10 @@ impl Bars {
 
     /// The step that a command carries out: commands come in the order of their decision.
     fn next_ordered(&mut self, action: &str) -> Option<usize> {
-        let position = self.ordered.iter().position(|&step| self.steps[step].action == action)?;
+        let position = self
+            .ordered
+            .iter()
+            .position(|&step| self.steps[step].action == action)?;
         let step = self.ordered.remove(position)?;
         self.steps[step].is_ordered = true;
         Some(step)
@@ -317,10 +337,13 @@ impl Bars {
         }
         if let (Some(begun), Some(ended)) = (begun, &start.ended) {
             let took = nearest(&(ended - begun));
-            details.push(("took", match &start.planned {
-                Some(planned) => format!("{took}, planned {}", nearest(planned)).into(),
-                None => took.into(),
-            }));
+            details.push((
+                "took",
+                match &start.planned {
+                    Some(planned) => format!("{took}, planned {}", nearest(planned)).into(),
+                    None => took.into(),
+                },
+            ));
         }
         let why = start.why.as_deref().unwrap_or_default();
         let words = match (outcome, why) {
@@ -329,7 +352,10 @@ impl Bars {
             (outcome, why) => format!("{outcome}: {why}"),
         };
         details.push(("outcome", words.into()));
-        for (label, due) in [("start was due", &start.due), ("end was due", &start.end_due)] {
+        for (label, due) in [
+            ("start was due", &start.due),
+            ("end was due", &start.end_due),
+        ] {
             if let Some(words) = window_words(&answer(due)) {
                 details.push((label, words.into()));
             }
@@ -337,7 +363,9 @@ impl Bars {
         Bar {
             name: start.action.clone(),
             planned: step.map(Step::span),
-            actual: begun.zip(end).map(|(begun, end)| (begun.to_f64(), end.to_f64())),
+            actual: begun
+                .zip(end)
+                .map(|(begun, end)| (begun.to_f64(), end.to_f64())),
             outcome,
             starts: limited(&start.due),
             ends: limited(&start.end_due).or_else(|| step.and_then(|it| band(&it.end_window))),
@@ -357,14 +385,17 @@ impl Bars {
             ("end", true),
             ("outcome", false),
         ];
-        let number = |value: Option<&Rational>| -> Text {
-            value.map(nearest).unwrap_or_default().into()
-        };
+        let number =
+            |value: Option<&Rational>| -> Text { value.map(nearest).unwrap_or_default().into() };
         let mut rows = Vec::new();
         for start in self.starts.values() {
             let step = start.step.map(|step| &self.steps[step]);
             let outcome = start.outcome.as_deref();
-            let unknown = if start.started.is_some() { "running" } else { "ordered" };
+            let unknown = if start.started.is_some() {
+                "running"
+            } else {
+                "ordered"
+            };
             rows.push(vec![
                 start.action.as_str().into(),
                 number(step.map(|step| &step.start)),
@@ -389,8 +420,15 @@ impl Bars {
         }
         let has_plan = !self.steps.is_empty();
         Table {
-            heading: if has_plan { "Planned and done" } else { "What was done" }.to_owned(),
-            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            heading: if has_plan {
+                "Planned and done"
+            } else {
+                "What was done"
+            }
+            .to_owned(),
+            columns: columns
+                .map(|(name, is_number)| (name.to_owned(), is_number))
+                .to_vec(),
             bars: (0..rows.len()).collect(),
             rows,
             ..Table::default()
@@ -414,7 +452,10 @@ impl Step {
 
 fn not_started(step: &Step) -> Bar {
     let mut details: Vec<(&'static str, Text)> = vec![("planned", step.words().into())];
-    let windows = [("may start at", &step.start_window), ("may end at", &step.end_window)];
+    let windows = [
+        ("may start at", &step.start_window),
+        ("may end at", &step.end_window),
+    ];
     for (label, window) in windows {
         if let Some(words) = window_words(window) {
             details.push((label, words.into()));

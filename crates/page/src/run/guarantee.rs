@@ -105,7 +105,10 @@ fn meaning(promise: &str) -> (i8, &'static str) {
     match promise {
         "envelope" => (3, "works whatever happens within the envelope"),
         "part-of-envelope" => (2, "works whatever happens within a part of the envelope"),
-        "planned" => (1, "works if what is still to start takes as long as planned"),
+        "planned" => (
+            1,
+            "works if what is still to start takes as long as planned",
+        ),
         "luck" => (0, "can still work, with luck"),
         _ => (-1, "none"),
     }

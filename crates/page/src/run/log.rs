@@ -148,7 +148,9 @@ impl Log {
         });
         Table {
             heading: "What happened, and why".to_owned(),
-            columns: columns.map(|(name, is_number)| (name.to_owned(), is_number)).to_vec(),
+            columns: columns
+                .map(|(name, is_number)| (name.to_owned(), is_number))
+                .to_vec(),
             rows: rows.collect(),
             times,
             ..Table::default()

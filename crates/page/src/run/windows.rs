@@ -45,7 +45,10 @@ impl<'a> Windows<'a> {
             relaxed.add(Constraint::at_least(NodeId(0), node, Rational::ZERO));
         }
         for constraint in &network.constraints {
-            let (from, to) = (nodes[constraint.from.as_str()], nodes[constraint.to.as_str()]);
+            let (from, to) = (
+                nodes[constraint.from.as_str()],
+                nodes[constraint.to.as_str()],
+            );
             if let Some(lower) = bound(&constraint.lower, true) {
                 relaxed.add(Constraint::at_least(from, to, lower));
             }
@@ -53,7 +56,9 @@ impl<'a> Windows<'a> {
                 relaxed.add(Constraint::at_most(from, to, upper));
             }
         }
-        let windows = ConsistentNetwork::try_from(relaxed).ok()?.windows(NodeId(0));
+        let windows = ConsistentNetwork::try_from(relaxed)
+            .ok()?
+            .windows(NodeId(0));
         Some(Self { nodes, windows })
     }
 

@@ -164,7 +164,11 @@ fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
     let mut network = Network::with_nodes(plan.plan.nodes.len());
     let zero = network_node(NodeId::ZERO);
     for (node, _) in plan.plan.nodes().skip(1) {
-        network.add(Constraint::at_least(zero, network_node(node), Rational::ZERO));
+        network.add(Constraint::at_least(
+            zero,
+            network_node(node),
+            Rational::ZERO,
+        ));
     }
     let interval = |id: ParameterId| -> &Interval { envelope.interval(id) };
     for constraint in &plan.plan.constraints {
