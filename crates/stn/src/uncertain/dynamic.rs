@@ -86,6 +86,8 @@ pub(super) struct Search<'a, W> {
     frames: Vec<Frame<W>>,
     /// Whether negative edges found are kept, for the sake of dispatching.
     keeps_edges: bool,
+    /// The ways of the conflict that was found.
+    cycle: Vec<WayId>,
 }
 
 /// A negative node being dealt with.
@@ -128,7 +130,13 @@ impl<'a, W: Weight> Search<'a, W> {
             regions: vec![Vec::new(); count],
             frames: Vec::new(),
             keeps_edges,
+            cycle: Vec::new(),
         }
+    }
+
+    /// The ways of the conflict that was found, each from where the one before ends.
+    pub(super) fn into_cycle(self) -> Vec<WayId> {
+        self.cycle
     }
 
     /// Deals with a node, and with those that have to be dealt with before.
@@ -341,6 +349,7 @@ impl<'a, W: Weight> Search<'a, W> {
         let mut from = node;
         while self.frames.len() > first {
             let way = self.way(from);
+            self.cycle.push(way);
             let frame = self.frames.pop().expect("there are more frames than that");
             total = total.plus(&frame.reached[&from].distance);
             let mut edges = Vec::new();

@@ -1,0 +1,96 @@
+//! Refutations hold for whatever bounds they add up with.
+
+#![allow(
+    clippy::unwrap_used,
+    dead_code,
+    reason = "the helpers of a test are part of it, and the game has some for other tests"
+)]
+
+mod game;
+
+use elbowroom_stn::uncertain::{ContingentLink, Part, Refutation, Refuted, UncertainNetwork, Way};
+use game::{Board, Random};
+
+/// The length of a way with a network's bounds, and whether it may be taken with them: what follows
+/// a lower-case edge is negative.
+fn length(way: &Way, network: &UncertainNetwork<i64>) -> (i64, bool) {
+    let mut length = 0;
+    let mut is_legal = true;
+    for part in way.parts.iter().rev() {
+        length += match part {
+            Part::Requirement(id) => network.requirements().constraint(*id).bound,
+            Part::Early(link) => {
+                is_legal &= length < 0;
+                network.link(*link).lower
+            }
+            Part::Late(link) => -network.link(*link).upper.unwrap(),
+            Part::Way(way) => {
+                let (own, own_legal) = self::length(way, network);
+                is_legal &= own_legal;
+                own
+            }
+        };
+    }
+    if let Some(link) = way.unlabelled {
+        length = length.max(-network.link(link).lower);
+    }
+    (length, is_legal)
+}
+
+fn refutes(refutation: &Refutation, network: &UncertainNetwork<i64>) -> bool {
+    let lengths = refutation.cycle.iter().map(|way| length(way, network));
+    let (total, is_legal) = lengths.fold((0, true), |(sum, all), (own, legal)| {
+        (sum + own, all && legal)
+    });
+    total < 0 && is_legal
+}
+
+/// The same requirements, with links of other lengths.
+fn changed(network: &UncertainNetwork<i64>, random: &mut Random) -> UncertainNetwork<i64> {
+    let links = network.links().iter().map(|link| {
+        let lower = (link.lower + random.whole(-2, 2)).max(0);
+        let upper = (link.upper.unwrap() + random.whole(-2, 2)).max(lower);
+        ContingentLink {
+            lower,
+            upper: Some(upper),
+            ..link.clone()
+        }
+    });
+    UncertainNetwork::new(network.requirements().clone(), links.collect()).unwrap()
+}
+
+#[test]
+fn a_network_that_a_refutation_still_fits_is_not_controllable() {
+    let mut random = Random(7);
+    let (mut refuted, mut fits, mut waits) = (0, 0, 0);
+    for _ in 0..20_000 {
+        let network = Board::random(&mut random).network();
+        let refutation = match network.refutation() {
+            Refuted::No => {
+                assert!(network.is_dynamically_controllable());
+                continue;
+            }
+            Refuted::Because(refutation) => refutation,
+            Refuted::TooLong => continue,
+        };
+        assert!(!network.is_dynamically_controllable());
+        assert!(refutes(&refutation, &network), "{network:?} {refutation:?}");
+        refuted += 1;
+        let is_wait = |part: &Part| matches!(part, Part::Way(way) if way.unlabelled.is_some());
+        waits += usize::from(refutation.cycle.iter().any(|way| way.parts.iter().any(is_wait)));
+        for _ in 0..10 {
+            let other = changed(&network, &mut random);
+            if refutes(&refutation, &other) {
+                fits += 1;
+                assert!(
+                    !other.is_dynamically_controllable(),
+                    "{network:?} {other:?} {refutation:?}"
+                );
+            }
+        }
+    }
+    assert!(
+        refuted > 1_000 && fits > 1_000 && waits > 30,
+        "{refuted} {fits} {waits}"
+    );
+}
