@@ -16,7 +16,7 @@ use clap_complete::Shell;
 use elbowroom::num::Rational;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use envelope::{EnvelopeArgs, Growth, controllable};
+pub(crate) use envelope::{EnvelopeArgs, Growth, Method, Order, controllable};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};

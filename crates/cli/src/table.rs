@@ -27,6 +27,20 @@ pub(crate) struct Row {
     pub(crate) interval: Interval,
 }
 
+impl Row {
+    /// The smaller one of the two deviations that there is room for, in relation to the nominal
+    /// value where that is not 0.
+    pub(crate) fn room(&self) -> Rational {
+        let (lower, upper) = (&self.interval.lower, &self.interval.upper);
+        let distance = |end: &End| Some((end.value()? - &self.nominal).abs());
+        let room = [distance(lower), distance(upper)];
+        let room = room.into_iter().flatten().min();
+        let share = |room: Rational| room.checked_div(&self.nominal.abs()).unwrap_or(room);
+        // Without any end there is more room than anywhere.
+        room.map_or_else(|| Rational::from(i64::MAX), share)
+    }
+}
+
 /// Columns of the bar: the first of these that fits.
 const BARS: [usize; 3] = [11, 9, 7];
 /// Names up to this width have a column of their own even where the numbers stand below.

@@ -1,7 +1,7 @@
 //! Which end moves next, and how far.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{BoxEnd, ParameterId, ParametrizedPlan, Side};
+use elbowroom_plan::{BoxEnd, Parameter, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
 /// The step size after a successful widening.
@@ -23,7 +23,6 @@ pub enum Growth {
 #[derive(Clone, Debug)]
 pub(crate) struct Frontier {
     growth: Growth,
-    precision: Rational,
     parameters: Vec<Progress>,
     /// Where the round robin stands.
     next: usize,
@@ -33,6 +32,8 @@ pub(crate) struct Frontier {
 #[derive(Clone, Debug)]
 struct Progress {
     step: Rational,
+    /// The parameter's precision.
+    precision: Rational,
     /// Open directions with the present step: lower, upper.
     is_open: [bool; 2],
     /// Directions in which nothing is left to gain: lower, upper.
@@ -42,16 +43,27 @@ struct Progress {
 }
 
 impl Frontier {
-    /// All directions open; steps as in the authors' code, `max(nominal, 1) · weight`, but at
-    /// least the precision.
-    pub(crate) fn new(plan: &ParametrizedPlan, precision: &Rational, growth: Growth) -> Self {
+    /// All directions open; steps as in the authors' code, `max(nominal, 1) · weight`, or `scale ·
+    /// weight` if there are scales, but at least the precision.
+    pub(crate) fn new(
+        plan: &ParametrizedPlan,
+        precisions: Vec<Rational>,
+        scales: Option<Vec<Rational>>,
+        growth: Growth,
+    ) -> Self {
+        let scale = |index: usize, parameter: &Parameter| match &scales {
+            Some(scales) => scales[index].clone(),
+            None => parameter.nominal.abs().max(Rational::ONE),
+        };
         let parameters = plan
             .parameters
             .iter()
-            .map(|parameter| {
-                let scale = parameter.nominal.abs().max(Rational::ONE);
+            .zip(precisions)
+            .enumerate()
+            .map(|(index, (parameter, precision))| {
                 Progress {
-                    step: (&scale * &parameter.weight).max(precision.clone()),
+                    step: (&scale(index, parameter) * &parameter.weight).max(precision.clone()),
+                    precision,
                     is_open: [true; 2],
                     is_done: [false; 2],
                     has_halved: false,
@@ -60,7 +72,6 @@ impl Frontier {
             .collect();
         Self {
             growth,
-            precision: precision.clone(),
             parameters,
             next: 0,
         }
@@ -75,16 +86,15 @@ impl Frontier {
         let go_on = self
             .parameters
             .iter()
-            .any(|progress| unfinished(progress) && progress.step >= self.precision);
+            .any(|progress| unfinished(progress) && progress.step >= progress.precision);
         if !go_on {
             return None;
         }
-        let least = &self.precision * &Rational::new(1, 2);
         let count = self.parameters.len();
         for offset in 0..count {
             let index = (self.next + offset) % count;
             let progress = &self.parameters[index];
-            if progress.step < least {
+            if &progress.step + &progress.step < progress.precision {
                 continue;
             }
             for side in [Side::Upper, Side::Lower] {

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::{ControlConflict, DynamicControl, strong_conflict};
 use crate::feasibility::{Feasibility, Infeasible, MOST_BRANCHES};
+use crate::learn::{Learnt, without_fixed_times, without_schedule, without_strategy};
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::reduction::Reduction;
@@ -116,10 +117,7 @@ impl Controllability {
         match self {
             Self::Weak(feasibility) => {
                 let found = feasibility.infeasible(envelope, moved);
-                let found = found.map_err(|TooManyBranches| Refusal::TooManyCases {
-                    place: "parameters on constraints in both directions".to_owned(),
-                    limit: MOST_BRANCHES,
-                })?;
+                let found = found.map_err(too_many)?;
                 Ok(found.map(Uncontrollable::Weak))
             }
             Self::Dynamic(control, dynamic) => {
@@ -130,6 +128,28 @@ impl Controllability {
                 let conflict = strong_conflict(&control.plan, envelope);
                 Ok(conflict.map(Uncontrollable::Conflict))
             }
+        }
+    }
+
+    /// What stands against the box, in terms of other boxes.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub(crate) fn learn(
+        &mut self,
+        plan: &ParametrizedPlan,
+        envelope: &DecoupledEnvelope,
+    ) -> Result<Learnt, Refusal> {
+        match self {
+            Self::Weak(feasibility) => {
+                let found = feasibility.infeasible(envelope, None).map_err(too_many)?;
+                Ok(found.map_or(Learnt::Nothing, |found| {
+                    let values = feasibility.values(envelope, found);
+                    without_schedule(plan, &values, envelope)
+                }))
+            }
+            Self::Dynamic(..) => Ok(without_strategy(plan, envelope)),
+            Self::Strong(_) => Ok(without_fixed_times(plan, envelope)),
         }
     }
 
@@ -154,5 +174,12 @@ impl Controllability {
                 }
             }
         }
+    }
+}
+
+fn too_many(TooManyBranches: TooManyBranches) -> Refusal {
+    Refusal::TooManyCases {
+        place: "parameters on constraints in both directions".to_owned(),
+        limit: MOST_BRANCHES,
     }
 }

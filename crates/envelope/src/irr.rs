@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::obligations::Refusal;
 use elbowroom_num::{End, Interval, Rational};
-use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, Side};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Parameter, ParameterId, ParametrizedPlan, Side};
 
 use crate::frontier::{Frontier, Growth};
 use crate::objection::Objection;
@@ -18,6 +18,9 @@ pub struct Settings {
     /// when both ends of its parameter have refused it, so an end may still have room for almost
     /// twice as much: [`sharpen`](crate::sharpen()) moves each end onto its limit.
     pub precision: Rational,
+    /// If there is one, each parameter's precision is this share of its nominal value instead, and
+    /// its first step the nominal value, so that units of time do not matter.
+    pub relative: Option<Rational>,
     /// How steps change after a success.
     pub growth: Growth,
     /// The limit on box checks.
@@ -28,10 +31,36 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             precision: Rational::ONE,
+            relative: None,
             growth: Growth::default(),
             most_checks: None,
         }
     }
+}
+
+impl Settings {
+    /// The precision of each of a plan's parameters. A nominal value of 0 has no shares; there the
+    /// smallest one of the plan's that is not counts.
+    pub fn precisions(&self, plan: &ParametrizedPlan) -> Vec<Rational> {
+        match &self.relative {
+            None => vec![self.precision.clone(); plan.parameters.len()],
+            Some(share) => scales(plan).iter().map(|scale| scale * share).collect(),
+        }
+    }
+}
+
+/// The size of each parameter: that of its nominal value, or of the smallest one of the plan's that
+/// is not 0.
+pub(crate) fn scales(plan: &ParametrizedPlan) -> Vec<Rational> {
+    let sizes = plan.parameters.iter().map(|own| own.nominal.abs());
+    let sizes: Vec<Rational> = sizes.collect();
+    let other = sizes.iter().filter(|size| !size.is_zero()).min();
+    let other = other.cloned().unwrap_or(Rational::ONE);
+    let scales = sizes.iter().map(|size| match size.is_zero() {
+        true => other.clone(),
+        false => size.clone(),
+    });
+    scales.collect()
 }
 
 /// A larger box was found.
@@ -119,7 +148,12 @@ pub fn irr(
             stop: StopReason::Converged,
         });
     }
-    let mut frontier = Frontier::new(&plan, &settings.precision, settings.growth);
+    let mut frontier = Frontier::new(
+        &plan,
+        settings.precisions(&plan),
+        settings.relative.is_some().then(|| scales(&plan)),
+        settings.growth,
+    );
     let mut widenings = 0;
     let mut undecided = 0;
     let stop = loop {
@@ -192,11 +226,11 @@ fn widen(
 }
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
-/// can still move by less than `step` is asked what would stop it at `step`.
+/// can still move by less than its parameter's `step` is asked what would stop it there.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
-    step: &Rational,
+    steps: &[Rational],
 ) -> Vec<[Option<Limit>; 2]> {
     let plan = Arc::clone(oracle.plan());
     let mut limits = Vec::with_capacity(plan.parameters.len());
@@ -207,7 +241,7 @@ pub fn limits(
                 parameter: ParameterId::from(index),
                 side,
             };
-            pair[side.index()] = limit(oracle, envelope, parameter, end, step);
+            pair[side.index()] = limit(oracle, envelope, parameter, end, &steps[index]);
         }
         limits.push(pair);
     }

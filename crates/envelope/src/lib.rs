@@ -53,23 +53,33 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod balance;
+mod best;
 mod control;
+mod cut;
 mod cycles;
 mod enforce;
 mod feasibility;
 mod frontier;
 mod guarantee;
 mod irr;
+mod learn;
 pub mod linear;
 mod method;
 mod objection;
 pub mod obligations;
 mod oracle;
+mod ray;
 pub mod reduction;
 mod sharpen;
 pub mod soundness;
 
+pub use balance::{Balance, Share, balance};
+pub use best::{
+    BestProof, BestRun, BestSettings, BestStep, Case, Objective, Reasons, Source, Stopped, best,
+};
 pub use control::{ControlConflict, ControlGround};
+pub use cut::{Cut, Ground, ProofPart, ProofWay, Row};
 pub use enforce::enforced;
 pub use frontier::Growth;
 pub use guarantee::Guarantee;

@@ -14,6 +14,8 @@ pub enum Method {
     /// One end of the box at a time is moved out: [`irr`](crate::irr()).
     #[default]
     Irr,
+    /// The largest box by some objective, with a proof: [`best`](crate::best()).
+    Best,
 }
 
 impl Method {
@@ -21,6 +23,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Irr => "irr",
+            Self::Best => "best",
         }
     }
 }

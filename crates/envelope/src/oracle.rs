@@ -1,5 +1,7 @@
 //! The exact box check.
 
+mod learn;
+
 use std::sync::Arc;
 
 use elbowroom_model::Task;

@@ -11,6 +11,7 @@ mod bad_case;
 mod certificate;
 mod corner;
 mod flow;
+mod half_space;
 mod lazy;
 mod linear_program;
 mod proof;

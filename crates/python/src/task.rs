@@ -252,9 +252,14 @@ impl Task {
                         Some(precision) => positive(precision, "precision")?,
                         None => search.precision.clone(),
                     },
+                    relative: match options.precision {
+                        Some(_) => None,
+                        None => search.relative.clone(),
+                    },
                     growth: options.growth,
                     sharpen: options.sharpen,
                     most_checks: options.most_checks,
+                    best: search.best.clone(),
                 },
                 ..EnvelopeRequest::new(&self.task, self.any_plan(plan)?)
             };

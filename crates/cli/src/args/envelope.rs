@@ -23,9 +23,20 @@ pub(crate) struct EnvelopeArgs {
     /// The algorithm
     #[arg(long, value_enum, default_value_t = Method::Irr)]
     pub(crate) method: Method,
-    /// Step size at which the search ends: each bound is closer to its limit than this
-    #[arg(long, value_name = "B", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
-    pub(crate) precision: Rational,
+    /// With --method best: what the box is the greatest of
+    #[arg(long, value_enum, default_value_t = Objective::LeastSlack)]
+    pub(crate) objective: Objective,
+    /// With --method best: both bounds of an interval equally far from the nominal value
+    #[arg(long)]
+    pub(crate) symmetric: bool,
+    /// With --method best: bounds count up to a deviation of N times the nominal value, unless `in
+    /// [LB, UB]` of --vary says less; what nothing stops is infinite all the same
+    #[arg(long, value_name = "N", default_value = "9", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) cap: Rational,
+    /// Step size at which the search ends, in the unit of the plan: each bound is closer to its limit
+    /// than twice this. By default a hundredth of each nominal value
+    #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) precision: Option<Rational>,
     /// Whether the step size doubles after a success or stays constant
     #[arg(long, value_enum, default_value_t = Growth::Doubling)]
     pub(crate) growth: Growth,
@@ -53,6 +64,9 @@ pub(crate) struct EnvelopeArgs {
     /// parameters that are not named keep their nominal value
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,
+    /// The order of the rows: as in the plan, or the one with the least room first
+    #[arg(long, value_enum, default_value_t = Order::Plan)]
+    pub(crate) order: Order,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
@@ -78,6 +92,36 @@ a constant or condition also by `shared`: one parameter for all instances.";
 pub(crate) enum Method {
     /// Incremental rectangular robustification: widen one bound at a time
     Irr,
+    /// The largest box by --objective, with a proof that none is larger
+    Best,
+}
+
+/// What a box is to be the greatest of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Objective {
+    /// The least deviation for which any bound has room, in relation to the nominal value; then the
+    /// second least, and so on
+    LeastSlack,
+    /// The sum of the widths of all intervals, times the weights of --vary
+    Widths,
+}
+
+impl From<Objective> for elbowroom::envelope::Objective {
+    fn from(objective: Objective) -> Self {
+        match objective {
+            Objective::LeastSlack => Self::LeastSlack,
+            Objective::Widths => Self::Widths,
+        }
+    }
+}
+
+/// The order of the rows of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Order {
+    /// As in the plan
+    Plan,
+    /// The one with the least room in relation to its nominal value first
+    Tightness,
 }
 
 /// The step size after a successful widening.

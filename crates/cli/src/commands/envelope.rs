@@ -26,6 +26,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         &arguments.controllable,
     ))?);
     let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let search = Search::default();
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
@@ -33,13 +34,26 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         enforce: arguments.enforce,
         contains: arguments.contains.clone(),
         search: Search {
-            precision: arguments.precision.clone(),
+            precision: arguments.precision.clone().unwrap_or(search.precision),
+            relative: match arguments.precision {
+                Some(_) => None,
+                None => search.relative,
+            },
             growth: match arguments.growth {
                 args::Growth::Doubling => library::Growth::Doubling,
                 args::Growth::Constant => library::Growth::Constant,
             },
             sharpen: arguments.sharpen,
-            ..Search::default()
+            method: match arguments.method {
+                args::Method::Irr => library::Method::Irr,
+                args::Method::Best => library::Method::Best,
+            },
+            most_checks: search.most_checks,
+            best: library::BestSettings {
+                objective: arguments.objective.into(),
+                symmetric: arguments.symmetric,
+                most: arguments.cap.clone(),
+            },
         },
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
@@ -49,7 +63,12 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
-        output::print(&text::text(&request, &outcome, Look::of_stdout()))?;
+        output::print(&text::text(
+            &request,
+            &outcome,
+            arguments.order,
+            Look::of_stdout(),
+        ))?;
     }
     Ok(exit(&outcome))
 }

@@ -1,6 +1,8 @@
 //! How far may each quantity of a plan deviate?
 
 mod answer;
+mod balance;
+mod best;
 mod conditions;
 mod foresight;
 mod limits;
@@ -10,7 +12,7 @@ pub mod timeline;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use elbowroom_envelope::{Growth, Guarantee, Method, Oracle};
+use elbowroom_envelope::{BestSettings, Growth, Guarantee, Method, Oracle};
 use elbowroom_model::Task;
 use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
@@ -25,6 +27,8 @@ pub use answer::{
     Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
     Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
+pub use balance::{Balance, Deviation};
+pub use best::Best;
 pub use conditions::Conditions;
 pub use foresight::Foresight;
 pub use timeline::Timeline;
@@ -59,24 +63,42 @@ pub struct Search {
     pub method: Method,
     /// The search ends when all steps are below this; positive.
     pub precision: Rational,
+    /// If there is one, the precision of each parameter is this share of its nominal value instead.
+    pub relative: Option<Rational>,
     /// How steps change after a success.
     pub growth: Growth,
     /// Whether each end is moved onto its limit when the search has ended.
     pub sharpen: bool,
     /// The search ends after that many box checks.
     pub most_checks: Option<usize>,
+    /// Which box is wanted, with [`Method::Best`].
+    pub best: BestSettings,
 }
 
 impl Default for Search {
-    /// Precision 1, doubling steps, no sharpening and no limit.
+    /// Precision a hundredth of each nominal value, doubling steps, no sharpening and no limit.
     fn default() -> Self {
         let settings = elbowroom_envelope::Settings::default();
         Self {
             method: Method::default(),
             precision: settings.precision,
+            relative: Some(Rational::new(1, 100)),
             growth: settings.growth,
             sharpen: false,
             most_checks: settings.most_checks,
+            best: BestSettings::default(),
+        }
+    }
+}
+
+impl Search {
+    /// The settings of the search for a box.
+    fn settings(&self) -> elbowroom_envelope::Settings {
+        elbowroom_envelope::Settings {
+            precision: self.precision.clone(),
+            relative: self.relative.clone(),
+            growth: self.growth,
+            most_checks: self.most_checks,
         }
     }
 }
@@ -116,6 +138,7 @@ impl EnvelopeRequest {
         self.vary.clone_from(&settings.vary);
         self.guarantee = settings.guarantee;
         self.search.precision = settings.search.precision.clone();
+        self.search.relative.clone_from(&settings.search.relative);
         self.search.growth = settings.search.growth;
         self.search.most_checks = settings.search.most_checks;
         self

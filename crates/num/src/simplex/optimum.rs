@@ -29,6 +29,19 @@ impl Simplex {
     /// # Errors
     /// Bounds that contradict each other.
     pub fn maximize(&mut self, objective: &Combination) -> Result<Optimum, Infeasible> {
+        Ok(self.maximize_with_proof(objective)?.0)
+    }
+
+    /// Like [`maximize`](Self::maximize), with the proof that no value is larger: the bounds with
+    /// these tags, written as `term <= bound`, each times its multiplier, which is positive, add up to
+    /// `objective <= value`. Empty if there are values larger than any number.
+    ///
+    /// # Errors
+    /// Bounds that contradict each other.
+    pub fn maximize_with_proof(
+        &mut self,
+        objective: &Combination,
+    ) -> Result<(Optimum, Vec<(usize, Rational)>), Infeasible> {
         self.check()?;
         // The objective as a variable without bounds never leaves the basis, so its row can go
         // again afterwards.
@@ -43,9 +56,32 @@ impl Simplex {
                 Limit::Basic(basic, target) => self.pivot_and_update(basic, entering, target),
             }
         };
+        let proof = match optimum {
+            Optimum::Unbounded => Vec::new(),
+            Optimum::Value(_) => self.proof(value),
+        };
         self.tableau.remove_newest();
         self.variables.pop();
-        Ok(optimum)
+        Ok((optimum, proof))
+    }
+
+    /// The bounds that hold the objective back at its optimum: every variable in its row is at one.
+    fn proof(&self, objective: VariableId) -> Vec<(usize, Rational)> {
+        let row = self.tableau.row(objective).iter();
+        let mut proof: Vec<(usize, Rational)> = row
+            .map(|(other, factor)| {
+                let variable = &self.variables[other.index()];
+                let bound = if factor.is_positive() {
+                    &variable.upper
+                } else {
+                    &variable.lower
+                };
+                let bound = bound.as_ref().expect("what has no bound could still move");
+                (bound.tag, factor.abs())
+            })
+            .collect();
+        proof.sort_by_key(|(tag, _)| *tag);
+        proof
     }
 
     /// The least value of `Σ coefficient · variable`; like [`Simplex::maximize`].

@@ -5,24 +5,31 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    Conditions, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans,
+    Balance, Best, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans,
     QuantityKind, Range, Room, Stop,
 };
 
+use elbowroom::envelope::Objective;
 use elbowroom::num::Rational;
 
 use crate::limits::{self, push_paragraph, push_wrapped};
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
-use crate::number;
+use crate::args::Order;
+use crate::number::{self, Rounding};
 use crate::table::{self, Row};
 use crate::words::counted;
 use example::{example, what};
 
 /// The answer, whatever it is.
-pub(super) fn text(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+pub(super) fn text(
+    request: &EnvelopeRequest,
+    outcome: &EnvelopeOutcome,
+    order: Order,
+    look: Look,
+) -> String {
     let file = &request.name;
     match &outcome.answer.finding {
-        EnvelopeFinding::Envelope { .. } => envelope(request, outcome, look),
+        EnvelopeFinding::Envelope { .. } => envelope(request, outcome, order, look),
         EnvelopeFinding::Fails(Failing::Invalid { violation }) => {
             let mut text = no_room(file, FAILS);
             push_wrapped(&mut text, &violation.message, 2, look.width);
@@ -93,7 +100,12 @@ fn push_reason(
 }
 
 /// The table, what it means, what limits it, and how it was found.
-fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) -> String {
+fn envelope(
+    request: &EnvelopeRequest,
+    outcome: &EnvelopeOutcome,
+    order: Order,
+    look: Look,
+) -> String {
     let EnvelopeFinding::Envelope {
         parameters,
         makespans,
@@ -101,6 +113,8 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
         stop,
         checks,
         widenings,
+        balance,
+        best,
         conditions,
         foresight,
         seconds,
@@ -108,12 +122,19 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     else {
         return String::new();
     };
-    let rows: Vec<Row> = parameters.iter().map(row).collect();
+    let mut rows: Vec<Row> = parameters.iter().map(row).collect();
+    if order == Order::Tightness {
+        rows.sort_by_key(Row::room);
+    }
     let title = format!("Elbow room of {}", request.name);
     let mut text = format!("{}\n\n", styled(STRONG, &title));
     if rows.is_empty() {
         text.push_str(" Nothing in this plan is left open. It works as it is.\n");
         return text;
+    }
+    if let Some(balance) = balance {
+        push_paragraph(&mut text, &headline(balance, parameters), look.width);
+        text.push('\n');
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
@@ -134,8 +155,8 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
         push_paragraph(&mut text, &met, look.width);
     }
     let course = format!(
-        "{}. {}, {}, {}.",
-        ended(request, *stop),
+        "{} {}, {}, {}.",
+        sentence(&ended(request, *stop, parameters, best.as_ref())),
         counted(*checks, "check"),
         counted(widenings.len(), "widening"),
         duration(*seconds)
@@ -145,6 +166,41 @@ fn envelope(request: &EnvelopeRequest, outcome: &EnvelopeOutcome, look: Look) ->
     text.push_str(&styled(FAINT, how.trim_end()));
     text.push('\n');
     text
+}
+
+/// By how much everything may deviate at once.
+fn headline(balance: &Balance, parameters: &[Room]) -> String {
+    let is_duration = |room: &Room| room.range.quantity.kind == QuantityKind::Duration;
+    let (subject, more, less) = if parameters.iter().all(is_duration) {
+        ("take", "longer", "less time")
+    } else {
+        ("be", "more", "less")
+    };
+    let all = if parameters.len() == 1 { "It" } else { "All of it" };
+    let way = |deviation: &Deviation, which: &str| {
+        let share = &deviation.share * &Rational::from(100);
+        let digits = u32::from(share < Rational::from(10));
+        let percent = number::rounded(&share, digits, Rounding::Down);
+        match &deviation.limit {
+            _ if deviation.share.is_zero() => format!("no {which}"),
+            // Everything is at its least value.
+            _ if which == less && deviation.share >= Rational::ONE => format!("any {which}"),
+            Some(_) => format!("up to {percent} % {which}"),
+            None => format!("more than {percent} % {which}"),
+        }
+    };
+    let at_once = if parameters.len() == 1 { "" } else { " at once" };
+    let mut line = format!(
+        "{all} may {subject} {}{at_once}, or {}",
+        way(&balance.more, more),
+        way(&balance.less, less),
+    );
+    let either = &balance.either;
+    if either.share < balance.more.share.clone().min(balance.less.share.clone()) {
+        let _ = write!(line, ", or {}", way(either, "off either way"));
+    }
+    line.push('.');
+    line
 }
 
 /// How conditions on numbers are met, and what the dispatcher keeps to beside the network.
@@ -236,14 +292,38 @@ fn makespan(makespans: &Makespans) -> String {
     line
 }
 
+/// With a full stop at its end.
+fn sentence(text: &str) -> String {
+    format!("{}.", text.trim_end_matches('.'))
+}
+
 /// How the search ended.
-fn ended(request: &EnvelopeRequest, stop: Stop) -> String {
+fn ended(
+    request: &EnvelopeRequest,
+    stop: Stop,
+    parameters: &[Room],
+    best: Option<&Best>,
+) -> String {
     match stop {
+        Stop::Converged if best.is_some() => best.map(goodness).unwrap_or_default(),
         Stop::Converged if request.search.sharpen => "Each end is at its limit".to_owned(),
-        Stop::Converged => format!(
-            "The search ended at steps of {} (--precision); --sharpen moves each end to its limit",
-            number::nearest(&request.search.precision)
-        ),
+        Stop::Converged => {
+            let steps = match &request.search.relative {
+                Some(share) => {
+                    let percent = share * &Rational::from(100);
+                    format!("{} % of the nominal values", number::nearest(&percent))
+                }
+                None => number::nearest(&request.search.precision),
+            };
+            let untold = match parameters.iter().any(is_untold) {
+                true => " Where no reason is given, an end could still move.",
+                false => "",
+            };
+            format!(
+                "The search ended at steps of {steps} (--precision); --sharpen moves each end to its \
+                 limit.{untold}"
+            )
+        }
         Stop::CheckLimit | Stop::TimeLimit => {
             "The time limit came before the search was done; the intervals could be wider"
                 .to_owned()
@@ -256,6 +336,50 @@ fn ended(request: &EnvelopeRequest, stop: Stop) -> String {
             "Interrupted before the search was done; the intervals could be wider".to_owned()
         }
     }
+}
+
+/// How good the box is.
+fn goodness(best: &Best) -> String {
+    let number = |value: &Rational| match best.objective {
+        Objective::LeastSlack => {
+            let percent = value * &Rational::from(100);
+            format!("{} %", number::rounded(&percent, 1, Rounding::Down))
+        }
+        _ => number::nearest(value),
+    };
+    let value = number(&best.value);
+    let what = match best.objective {
+        Objective::LeastSlack => "least deviation that any end has room for",
+        _ => "sum of the widths",
+    };
+    let counted = format!(
+        "counted up to {} times the nominal values",
+        number::nearest(&best.most)
+    );
+    match (best.is_proved, best.objective) {
+        (true, Objective::LeastSlack) => format!(
+            "The {what} is {value}, {counted}. It is proved that none can have more unless one that \
+             has no more gets less"
+        ),
+        (true, _) => format!("The {what} is {value}, {counted}. It is proved that no box has more"),
+        (false, _) if best.value < best.bound => format!(
+            "The {what} is {value}, {counted}. No box has more than {}",
+            number(&best.bound)
+        ),
+        (false, _) => format!(
+            "The {what} is {value}, {counted}. No box has more, but other ends could have"
+        ),
+    }
+}
+
+/// Whether nothing is known to limit one of the finite ends.
+fn is_untold(room: &Room) -> bool {
+    let ends = [
+        (&room.range.lower, &room.lower_limit),
+        (&room.range.upper, &room.upper_limit),
+    ];
+    ends.into_iter()
+        .any(|(end, limit)| !end.is_infinite() && limit.is_none())
 }
 
 fn duration(seconds: f64) -> String {

@@ -9,7 +9,7 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Conditions, EnvelopeRequest, Foresight, Subject, Timeline};
+use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Subject, Timeline};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -55,6 +55,9 @@ pub struct EnvelopeSettings {
     /// The search ends when all steps are below this.
     #[serde(with = "exact")]
     pub precision: Rational,
+    /// If there is one, the precision of each parameter was this share of its nominal value instead.
+    #[serde(with = "exact::option", default, skip_serializing_if = "Option::is_none")]
+    pub relative_precision: Option<Rational>,
     /// The least separation of interfering happenings (ε).
     #[serde(with = "exact")]
     pub epsilon: Rational,
@@ -78,6 +81,12 @@ pub enum EnvelopeFinding {
         seconds: f64,
         /// Each box found to be inside, in order.
         widenings: Vec<Widened>,
+        /// By how much everything may deviate at once, if that is known.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        balance: Option<Balance>,
+        /// What the box is the greatest of, if the best one was asked for.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        best: Option<Best>,
         /// How the conditions that the plan has to meet are met.
         #[serde(default)]
         conditions: Conditions,
@@ -308,6 +317,7 @@ impl EnvelopeAnswer {
                 guarantee: request.guarantee,
                 growth: search.growth,
                 precision: search.precision.clone(),
+                relative_precision: search.relative.clone(),
                 epsilon: request.task.epsilon().clone(),
                 sharpen: search.sharpen,
             },

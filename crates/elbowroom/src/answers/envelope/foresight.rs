@@ -8,11 +8,12 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, S
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
-use super::limits::FARTHER;
 use super::search::flow;
 use crate::answers::{Exact, RequestError, Watcher};
 use crate::flow::FlowError;
 
+/// How often the step is doubled to see what stops an end.
+const FARTHER: usize = 3;
 /// In sums of widths an end counts up to that many times the nominal value.
 const CAP: i64 = 10;
 
@@ -42,7 +43,7 @@ pub(super) fn foresight(
         subject.plan,
         oracle,
         envelope,
-        &request.search.precision,
+        &request.search.settings().precisions(subject.plan),
         watcher,
     )?;
     if unknown.is_empty() || flow(watcher).is_break() {
@@ -50,11 +51,7 @@ pub(super) fn foresight(
     }
     let weak = Oracle::new(&request.task, subject.plan, Guarantee::Weak);
     let mut weak = weak.map_err(FlowError::Refused)?;
-    let settings = elbowroom_envelope::Settings {
-        precision: request.search.precision.clone(),
-        growth: request.search.growth,
-        most_checks: request.search.most_checks,
-    };
+    let settings = request.search.settings();
     let run = irr(&mut weak, &settings, &mut |_| flow(watcher)).map_err(FlowError::Refused)?;
     let (StopReason::Converged, Ok(weak)) = (run.stop, run.envelope) else {
         return Ok(None);
@@ -76,7 +73,7 @@ fn unknown(
     plan: &ParametrizedPlan,
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
-    step: &Rational,
+    steps: &[Rational],
     watcher: &mut dyn Watcher,
 ) -> Result<Vec<ParameterId>, RequestError> {
     let mut unknown = Vec::new();
@@ -93,7 +90,7 @@ fn unknown(
                 continue;
             };
             // An end that has room for one step may still be stopped by the next larger one.
-            let mut distance = step.clone();
+            let mut distance = steps[index].clone();
             for _ in 0..=FARTHER {
                 let farther = end.with_reach(envelope, Some(&reach + &distance));
                 match oracle.objection(&farther).map_err(FlowError::Refused)? {

@@ -1,6 +1,6 @@
 //! What keeps each end of a box where it is, in words.
 
-use elbowroom_envelope::{Limit, Oracle, limits};
+use elbowroom_envelope::{Limit, Method, Oracle, limits};
 use elbowroom_num::Rational;
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, Side};
 
@@ -10,8 +10,10 @@ use crate::answers::Watcher;
 
 /// By what part of the precision a sharpened end is moved to see what it touches.
 const SHARP: i64 = 1_000_000_000;
-/// How often the step is doubled to see what stops an end.
-pub(super) const FARTHER: usize = 3;
+/// How often the step is doubled to see what stops an end: the search has tried no end further.
+const FARTHER: usize = 1;
+/// What lies further out than this share of the nominal value is not what limits an end.
+const NEAR: (i64, i64) = (1, 4);
 
 /// For each parameter, what keeps the lower and the upper end of its interval; `None` if nothing
 /// does, or if there is no time left to ask.
@@ -25,20 +27,28 @@ pub(super) fn what_limits(
     if flow(watcher).is_break() {
         return vec![[None, None]; subject.plan.parameters.len()];
     }
-    // A sharpened end has no room at all, so the smallest step tells what it touches.
-    let mut distance = if how.sharpen {
-        &how.precision * &Rational::new(1, SHARP)
-    } else {
-        how.precision.clone()
-    };
-    let mut words = at_distance(subject, oracle, envelope, &distance);
+    let mut distances = how.settings().precisions(subject.plan);
+    for (distance, parameter) in distances.iter_mut().zip(&subject.plan.parameters) {
+        let nominal = parameter.nominal.abs();
+        if how.sharpen || how.method == Method::Best {
+            // A sharpened end has no room at all, so the smallest step tells what it touches.
+            *distance = &*distance * &Rational::new(1, SHARP);
+        } else if how.relative.is_none() && !nominal.is_zero() {
+            // Of an end that was tried in large steps only it is not known what stops it first.
+            let near = &nominal * &Rational::new(NEAR.0, NEAR.1);
+            *distance = near.min(distance.clone());
+        }
+    }
+    let mut words = at_distance(subject, oracle, envelope, &distances);
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
         if flow(watcher).is_break() || words.iter().flatten().all(Option::is_some) {
             break;
         }
-        distance = &distance + &distance;
-        let farther = at_distance(subject, oracle, envelope, &distance);
+        for distance in &mut distances {
+            *distance = &*distance + &*distance;
+        }
+        let farther = at_distance(subject, oracle, envelope, &distances);
         for (known, found) in words
             .iter_mut()
             .flatten()
@@ -57,9 +67,9 @@ fn at_distance(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
-    distance: &Rational,
+    distances: &[Rational],
 ) -> Vec<[Option<String>; 2]> {
-    let limits = limits(oracle, envelope, distance);
+    let limits = limits(oracle, envelope, distances);
     let words = |id, side, limit: &Option<Limit>| {
         let limit = limit.as_ref()?;
         subject.explainer.limit(id, side, limit)

@@ -3,10 +3,12 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use elbowroom_envelope::{Oracle, StopReason, Widening, irr, sharpen};
+use elbowroom_envelope::{Method, Oracle, StopReason, Widening, irr, sharpen};
 use elbowroom_plan::DecoupledEnvelope;
 
 use super::answer::{EnvelopeFinding, Makespans, Stop, Widened};
+use super::balance::balance;
+use super::best::best;
 use super::conditions::Conditions;
 use super::foresight::foresight;
 use super::limits::what_limits;
@@ -23,11 +25,7 @@ pub(super) fn search(
 ) -> Result<EnvelopeOutcome, RequestError> {
     let how = &subject.request.search;
     let begun = watcher.elapsed();
-    let settings = elbowroom_envelope::Settings {
-        precision: how.precision.clone(),
-        growth: how.growth,
-        most_checks: how.most_checks,
-    };
+    let settings = how.settings();
     let mut widenings = Vec::new();
     let mut history = History {
         subject,
@@ -48,7 +46,16 @@ pub(super) fn search(
         (StopReason::Undecided, None) => Stop::Undecided,
         (StopReason::Converged | StopReason::Cancelled, None) => Stop::Converged,
     };
-    let mut envelope = match search.envelope {
+    let (search_envelope, best) = match how.method {
+        Method::Best if search.envelope.is_ok() && stop == Stop::Converged => {
+            let start = search.envelope.as_ref().ok();
+            let (found, best, halt) = best(subject, &mut oracle, start, watcher)?;
+            stop = halt.map_or(stop, Stop::from);
+            (found, Some(best))
+        }
+        _ => (search.envelope, None),
+    };
+    let mut envelope = match search_envelope {
         Ok(envelope) => envelope,
         Err(objection) => {
             let point = DecoupledEnvelope::point(&subject.plan.nominal());
@@ -56,7 +63,7 @@ pub(super) fn search(
             return Ok(subject.fails(why_not));
         }
     };
-    if how.sharpen && stop == Stop::Converged {
+    if how.sharpen && best.is_none() && stop == Stop::Converged {
         let sharp = sharpen(&mut oracle, &envelope, &mut || flow(watcher));
         if let Some(sharp) = sharp.map_err(FlowError::Refused)? {
             envelope = sharp;
@@ -67,6 +74,7 @@ pub(super) fn search(
     }
     let seconds = watcher.elapsed().saturating_sub(begun).as_secs_f64();
     let checks = oracle.checks();
+    let balance = balance(subject, watcher)?;
     let conditions = Conditions::new(oracle.conditions(), subject.enforced);
     let limits = what_limits(subject, &mut oracle, &envelope, watcher);
     let foresight = match stop {
@@ -79,6 +87,8 @@ pub(super) fn search(
         checks,
         seconds,
         widenings,
+        balance,
+        best,
         conditions,
         foresight,
         timeline: Timeline::of(&subject.request.task, subject.plan, &envelope),

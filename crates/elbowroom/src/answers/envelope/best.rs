@@ -1,0 +1,73 @@
+//! The largest box, and how good it is.
+
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{Objection, Objective, Oracle};
+use elbowroom_num::Rational;
+use elbowroom_plan::DecoupledEnvelope;
+use serde::{Deserialize, Serialize};
+
+use super::Subject;
+use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
+use crate::flow::FlowError;
+
+/// What a box is the greatest of, and how much greater another could be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Best {
+    /// What it is the greatest of.
+    pub objective: Objective,
+    /// Whether both ends of an interval had to be equally far from the nominal value.
+    pub symmetric: bool,
+    /// Ends counted up to a deviation of so many times the nominal value.
+    #[serde(with = "exact")]
+    pub most: Rational,
+    /// The value of the objective: the least deviation, as a share of the nominal value, or the sum
+    /// of widths.
+    #[serde(with = "exact")]
+    pub value: Rational,
+    /// What no box exceeds.
+    #[serde(with = "exact")]
+    pub bound: Rational,
+    /// Whether it is proved that there is no better box.
+    #[serde(rename = "proved")]
+    pub is_proved: bool,
+}
+
+/// The best box, or why the plan does not even work as planned; what the box is the best of; and why
+/// the watcher wanted no more, if it did.
+pub(super) fn best(
+    subject: &Subject<'_>,
+    oracle: &mut Oracle,
+    start: Option<&DecoupledEnvelope>,
+    watcher: &mut dyn Watcher,
+) -> Result<(Result<DecoupledEnvelope, Objection>, Best, Option<Halt>), RequestError> {
+    let settings = &subject.request.search.best;
+    let mut halt = None;
+    let mut steps = 0;
+    let run = elbowroom_envelope::best(oracle, settings, start, &mut |step| {
+        steps += 1;
+        watcher.notice(&Event::Envelope(EnvelopeProgress {
+            plan: subject.plan,
+            envelope: step.envelope,
+            widenings: steps,
+            steps,
+        }));
+        match watcher.flow() {
+            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+            ControlFlow::Break(wanted) => {
+                halt = Some(wanted);
+                ControlFlow::Break(())
+            }
+        }
+    });
+    let run = run.map_err(FlowError::Refused)?;
+    let best = Best {
+        objective: settings.objective,
+        symmetric: settings.symmetric,
+        most: settings.most.clone(),
+        value: run.value,
+        bound: run.bound,
+        is_proved: run.is_proved,
+    };
+    Ok((run.envelope, best, halt))
+}

@@ -1,0 +1,76 @@
+//! By how much everything may deviate at once.
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{DecoupledEnvelope, Side};
+
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+use crate::ray::Ray;
+
+/// Deviations are looked for up to ten times the nominal value.
+const MOST: i64 = 10;
+
+/// A share of the nominal values by which all of them may deviate at once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// By so much they may.
+    pub inside: Rational,
+    /// By more than this they may not; the same as `inside` where that is known exactly. `None` if
+    /// they may by as much as was asked.
+    pub outside: Option<Rational>,
+}
+
+/// By how much all parameters may deviate from their nominal values at once, in relation to these,
+/// each within its natural range. A parameter whose nominal value is 0 does not move.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Balance {
+    /// All upwards.
+    pub more: Share,
+    /// All downwards; `None` above 1 for what cannot be negative.
+    pub less: Share,
+    /// Each in any direction.
+    pub either: Share,
+}
+
+/// By how much everything may deviate at once; `None` if the plan does not even work at its nominal
+/// values, if nothing is left open, or if `flow` ended it.
+///
+/// # Errors
+/// When there are too many cases to tell apart.
+pub fn balance(
+    oracle: &mut Oracle,
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<Balance>, Refusal> {
+    let plan = std::sync::Arc::clone(oracle.plan());
+    let nominal = DecoupledEnvelope::point(&plan.nominal());
+    let is_open = plan.parameters.iter().any(|own| !own.nominal.is_zero());
+    if !is_open || oracle.objection(&nominal)?.is_some() {
+        return Ok(None);
+    }
+    let mut cuts = Vec::new();
+    let mut share = |sides: &[Side]| -> Result<Option<Share>, Refusal> {
+        let mut ray = Ray::new(&plan);
+        for (index, parameter) in plan.parameters.iter().enumerate() {
+            for side in sides {
+                ray.step[2 * index + side.index()] = parameter.nominal.abs();
+            }
+        }
+        let most = Rational::from(MOST);
+        let zero = Rational::ZERO;
+        let reached = ray.shoot(oracle, &zero, &most, &mut cuts, &mut |_, _| flow())?;
+        Ok(flow().is_continue().then_some(Share {
+            outside: (reached.inside < most).then_some(reached.outside),
+            inside: reached.inside,
+        }))
+    };
+    let Some(more) = share(&[Side::Upper])? else {
+        return Ok(None);
+    };
+    let Some(less) = share(&[Side::Lower])? else {
+        return Ok(None);
+    };
+    let either = share(&Side::BOTH)?;
+    Ok(either.map(|either| Balance { more, less, either }))
+}

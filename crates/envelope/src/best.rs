@@ -1,0 +1,331 @@
+//! The largest box inside an envelope, with a proof that there is no larger one.
+//!
+//! The boxes inside an envelope are found from outside. What the oracle has against a box that it
+//! refuses is a [`Cut`]: one linear inequality in the ends of all boxes, or several of which one holds.
+//! The best box that satisfies all cuts known so far is at least as good as the best one inside the
+//! envelope; the first such box that the oracle accepts is the best one, and the cuts prove it.
+//!
+//! - [`Objective::LeastSlack`]: all ends move out together, in relation to their nominal values, until
+//!   one is stopped; then the others go on. No linear program is needed ([`fill`]).
+//! - [`Objective::Widths`]: a linear program over the cuts, with branch and bound where a cut has
+//!   alternatives ([`widths`]).
+
+mod fill;
+mod master;
+mod widths;
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
+use serde::{Deserialize, Serialize};
+
+use crate::cut::{Cut, Row};
+use crate::irr::scales;
+use crate::objection::Objection;
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+
+/// What a box is to be the greatest of.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Objective {
+    /// The least deviation, in relation to the nominal value, for which any end has room; of the
+    /// boxes in which that is greatest, the second least, and so on.
+    #[default]
+    LeastSlack,
+    /// The sum of the widths of all intervals, each times its parameter's weight.
+    Widths,
+}
+
+impl Objective {
+    /// Its name in documents and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LeastSlack => "least-slack",
+            Self::Widths => "widths",
+        }
+    }
+}
+
+impl fmt::Display for Objective {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Which box is wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BestSettings {
+    /// What it is the greatest of.
+    pub objective: Objective,
+    /// Whether both ends of an interval are equally far from the nominal value.
+    pub symmetric: bool,
+    /// Ends count up to a deviation of so many times the nominal value.
+    pub most: Rational,
+}
+
+impl Default for BestSettings {
+    /// Least slack, ends counted up to nine times the nominal value away from it.
+    fn default() -> Self {
+        Self {
+            objective: Objective::default(),
+            symmetric: false,
+            most: Rational::from(9),
+        }
+    }
+}
+
+/// The result of [`best`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct BestRun {
+    /// The box; `Err` if the plan does not even work at the nominal values.
+    pub envelope: Result<DecoupledEnvelope, Objection>,
+    /// The value of the objective: the least slack, or the sum of widths.
+    pub value: Rational,
+    /// What no box exceeds; the same as `value` if the box is proved to be the best.
+    pub bound: Rational,
+    /// Whether there is no better box. With [`Objective::LeastSlack`] that also says that the second
+    /// least slack is the greatest there can be, and so on.
+    pub is_proved: bool,
+    /// The number of boxes checked.
+    pub checks: usize,
+    /// Whether the caller ended the search.
+    pub is_cancelled: bool,
+    /// Why there is no better box.
+    pub proof: BestProof,
+}
+
+/// Why no box is better.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BestProof {
+    /// What is known of all boxes inside the envelope.
+    pub cuts: Vec<Cut>,
+    /// How the best value follows.
+    pub reasons: Reasons,
+}
+
+/// How the best value follows from the cuts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reasons {
+    /// For each variable, in which order they were stopped, and by what.
+    Levels(Vec<Stopped>),
+    /// A tree of cases, the first its root.
+    Tree(Vec<Case>),
+}
+
+impl Default for Reasons {
+    fn default() -> Self {
+        Self::Levels(Vec::new())
+    }
+}
+
+/// A variable that can have no more slack unless another one with no more slack gets less.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stopped {
+    /// The ends that the variable moves.
+    pub ends: Vec<BoxEnd>,
+    /// How far, in relation to the nominal value.
+    pub slack: Rational,
+    /// The cut that stops it, by position; `None` if its own range or the limit on counting does.
+    pub cut: Option<usize>,
+}
+
+/// One case of a tree: how a bound on the objective follows, or the cases of which one is true.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Case {
+    /// One row of the cut at this position holds: for each, the position of the case in the tree.
+    Either {
+        /// The cut.
+        cut: usize,
+        /// The cases, by position in the tree.
+        cases: Vec<usize>,
+    },
+    /// The objective is at most the sum of these bounds, each times its multiplier. With
+    /// `is_impossible`, the bounds contradict each other.
+    Bounded {
+        /// The bounds.
+        multipliers: Vec<(Source, Rational)>,
+        /// Whether there is no box in this case.
+        is_impossible: bool,
+    },
+}
+
+/// What bounds a variable of the master problem, or a sum of some.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Source {
+    /// A row of a cut: position of the cut, position of the row.
+    Row(usize, usize),
+    /// The most that a variable can be.
+    Most(usize),
+    /// That a variable is not negative.
+    Least(usize),
+}
+
+/// A step of the search.
+#[derive(Clone, Debug)]
+pub struct BestStep<'a> {
+    /// The best box so far.
+    pub envelope: &'a DecoupledEnvelope,
+    /// The number of boxes checked.
+    pub checks: usize,
+}
+
+/// How ends move: each variable moves one end, or, if boxes are symmetric, both of a parameter.
+#[derive(Clone, Debug)]
+pub(crate) struct Variables {
+    /// The ends that each moves.
+    pub(crate) ends: Vec<Vec<BoxEnd>>,
+    /// The size of the nominal value by which its slack is measured.
+    pub(crate) scales: Vec<Rational>,
+    /// How far it can move the ends at most.
+    pub(crate) most: Vec<Rational>,
+}
+
+impl Variables {
+    fn new(plan: &ParametrizedPlan, settings: &BestSettings) -> Self {
+        let mut variables = Self {
+            ends: Vec::new(),
+            scales: Vec::new(),
+            most: Vec::new(),
+        };
+        let scales = scales(plan);
+        for (index, parameter) in plan.parameters.iter().enumerate() {
+            let id = ParameterId::from(index);
+            let point = Interval::point(parameter.nominal.clone());
+            let ends = Side::BOTH.map(|side| BoxEnd {
+                parameter: id,
+                side,
+            });
+            let most = ends.map(|end| {
+                let counted = &scales[index] * &settings.most;
+                let natural = end.side.reach(&parameter.range);
+                let base = end.side.reach(&point).unwrap_or_default();
+                natural.map_or(counted.clone(), |most| counted.min(most - base))
+            });
+            let [low, high] = most;
+            let groups = if settings.symmetric {
+                vec![(ends.to_vec(), low.min(high))]
+            } else {
+                vec![(vec![ends[0]], low), (vec![ends[1]], high)]
+            };
+            for (ends, most) in groups {
+                variables.ends.push(ends);
+                variables.scales.push(scales[index].clone());
+                variables.most.push(most);
+            }
+        }
+        variables
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The box in which the variables have these values.
+    pub(crate) fn envelope(&self, plan: &ParametrizedPlan, values: &[Rational]) -> DecoupledEnvelope {
+        let mut envelope = DecoupledEnvelope::point(&plan.nominal());
+        for (ends, value) in self.ends.iter().zip(values) {
+            for end in ends {
+                let reach = end.reach(&envelope).map(|reach| reach + value);
+                envelope = end.with_reach(&envelope, reach);
+            }
+        }
+        envelope
+    }
+
+    /// A row as `Σ factor · variable <= bound`.
+    pub(crate) fn row(&self, plan: &ParametrizedPlan, row: &Row) -> (Vec<(usize, Rational)>, Rational) {
+        let point = DecoupledEnvelope::point(&plan.nominal());
+        let bound = &row.bound - &row.value(&point).unwrap_or_default();
+        let mut factors = Vec::new();
+        for (variable, ends) in self.ends.iter().enumerate() {
+            let own = ends.iter().filter_map(|end| row.factors.get(end));
+            let factor: Rational = own.sum();
+            if !factor.is_zero() {
+                factors.push((variable, factor));
+            }
+        }
+        (factors, bound)
+    }
+}
+
+/// The best box, as the settings say.
+///
+/// `on_step` is called at every box checked, and can end the search at any moment: then the box is
+/// the best one found by then, and `bound` says how much better another could be. `start` is a box
+/// inside the envelope to begin with, if one is known.
+///
+/// # Errors
+/// When nothing can be told of the nominal values.
+pub fn best(
+    oracle: &mut Oracle,
+    settings: &BestSettings,
+    start: Option<&DecoupledEnvelope>,
+    on_step: &mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
+) -> Result<BestRun, Refusal> {
+    let plan = Arc::clone(oracle.plan());
+    let already = oracle.checks();
+    let nominal = DecoupledEnvelope::point(&plan.nominal());
+    if let Some(objection) = oracle.objection(&nominal)? {
+        return Ok(BestRun {
+            envelope: Err(objection),
+            value: Rational::ZERO,
+            bound: Rational::ZERO,
+            is_proved: true,
+            checks: oracle.checks() - already,
+            is_cancelled: false,
+            proof: BestProof::default(),
+        });
+    }
+    let variables = Variables::new(&plan, settings);
+    let mut run = match settings.objective {
+        Objective::LeastSlack => fill::fill(oracle, &plan, &variables, on_step)?,
+        Objective::Widths => widths::widths(oracle, &plan, &variables, start, on_step)?,
+    };
+    if let Ok(envelope) = &mut run.envelope {
+        *envelope = let_go(oracle, &plan, envelope, &variables)?;
+    }
+    run.checks = oracle.checks() - already;
+    Ok(run)
+}
+
+/// The box with those ends infinite that are as far out as counts, if nothing stops them.
+fn let_go(
+    oracle: &mut Oracle,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+    variables: &Variables,
+) -> Result<DecoupledEnvelope, Refusal> {
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let mut is_started = false;
+    for (ends, most) in variables.ends.iter().zip(&variables.most) {
+        let is_far = ends.iter().all(|end| {
+            let moved = end.reach(envelope).zip(end.reach(&point));
+            let range = &plan.parameter(end.parameter).range;
+            end.side.reach(range).is_none() && moved.is_some_and(|(far, near)| far - near >= *most)
+        });
+        if !is_far {
+            continue;
+        }
+        if !is_started {
+            is_started = true;
+            if oracle.start(envelope)?.is_some() {
+                return Ok(envelope.clone());
+            }
+        }
+        if let [end] = ends[..] {
+            // What cannot be told stays as it is.
+            let _ = oracle.try_reach(end, None);
+        }
+    }
+    Ok(match (is_started, oracle.accepted()) {
+        (true, Some(accepted)) => accepted.clone(),
+        _ => envelope.clone(),
+    })
+}

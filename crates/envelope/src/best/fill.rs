@@ -1,0 +1,178 @@
+//! The fairest box: all variables grow together, in relation to their nominal values, until some are
+//! stopped; then the others go on.
+//!
+//! Boxes inside an envelope have all their sub-boxes there, too. So where all that still grow have
+//! the same slack, and those that were stopped keep theirs, a variable that cannot grow alone can
+//! have no more slack unless one with no more gets less: it is stopped for good. That is the box
+//! whose least slack is greatest, then the second least, and so on.
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
+
+use super::{BestProof, BestRun, BestStep, Reasons, Stopped, Variables};
+use crate::cut::Cut;
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+use crate::ray::{Ray, Reached, place};
+
+/// The state of the search.
+struct Fill<'a> {
+    oracle: &'a mut Oracle,
+    plan: &'a ParametrizedPlan,
+    variables: &'a Variables,
+    on_step: &'a mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
+    cuts: Vec<Cut>,
+    /// The slack of each variable that was stopped, and by which cut.
+    stopped: Vec<Option<(Rational, Option<usize>)>>,
+    order: Vec<usize>,
+    is_cancelled: bool,
+    is_proved: bool,
+}
+
+/// The fairest box.
+pub(super) fn fill(
+    oracle: &mut Oracle,
+    plan: &ParametrizedPlan,
+    variables: &Variables,
+    on_step: &mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
+) -> Result<BestRun, Refusal> {
+    let mut fill = Fill {
+        oracle,
+        plan,
+        variables,
+        on_step,
+        cuts: Vec::new(),
+        stopped: vec![None; variables.count()],
+        order: Vec::new(),
+        is_cancelled: false,
+        is_proved: true,
+    };
+    let mut level = Rational::ZERO;
+    let mut bound: Option<Rational> = None;
+    while fill.stopped.iter().any(Option::is_none) {
+        let reached = fill.grow(None, &level)?;
+        bound.get_or_insert_with(|| reached.outside.clone());
+        fill.is_proved &= reached.inside == reached.outside;
+        level = reached.inside.clone();
+        if fill.is_cancelled {
+            break;
+        }
+        if !fill.stop(&level, &reached)? {
+            fill.is_proved = false;
+            // Some grow alone, but not all of them together: the first one gives way.
+            let first = fill.stopped.iter().position(Option::is_none);
+            fill.halt(first.expect("some still grow"), &level, None);
+        }
+    }
+    let slack = |stopped: &Option<(Rational, Option<usize>)>| {
+        stopped.as_ref().map_or(&level, |(slack, _)| slack).clone()
+    };
+    let slacks: Vec<Rational> = fill.stopped.iter().map(slack).collect();
+    let values: Vec<Rational> = slacks.iter().zip(&variables.scales).map(|(s, w)| s * w).collect();
+    let value = slacks.iter().min().cloned().unwrap_or_default();
+    let levels = fill.order.iter().map(|&variable| Stopped {
+        ends: variables.ends[variable].clone(),
+        slack: slacks[variable].clone(),
+        cut: fill.stopped[variable].as_ref().and_then(|(_, cut)| *cut),
+    });
+    Ok(BestRun {
+        envelope: Ok(variables.envelope(plan, &values)),
+        bound: bound.unwrap_or_default().max(value.clone()),
+        value,
+        is_proved: fill.is_proved && !fill.is_cancelled,
+        checks: 0,
+        is_cancelled: fill.is_cancelled,
+        proof: BestProof {
+            reasons: Reasons::Levels(levels.collect()),
+            cuts: fill.cuts,
+        },
+    })
+}
+
+impl Fill<'_> {
+    /// How much slack all that still grow can have, or one alone while the others stay where they are.
+    fn grow(&mut self, alone: Option<usize>, level: &Rational) -> Result<Reached, Refusal> {
+        let mut ray = Ray::new(self.plan);
+        let mut most = level.clone();
+        for (variable, ends) in self.variables.ends.iter().enumerate() {
+            let scale = &self.variables.scales[variable];
+            let reach = &self.variables.most[variable];
+            let grows = self.stopped[variable].is_none();
+            let moves = grows && alone.is_none_or(|alone| alone == variable);
+            let stays = match &self.stopped[variable] {
+                Some((slack, _)) => slack * scale,
+                None if moves => Rational::ZERO,
+                None => (level * scale).min(reach.clone()),
+            };
+            for end in ends {
+                let place = place(*end);
+                ray.most[place] = Some(&ray.base[place] + reach);
+                ray.base[place] += &stays;
+                if moves {
+                    ray.step[place] = scale.clone();
+                }
+            }
+            if moves {
+                most = most.max(reach.checked_div(scale).unwrap_or_default());
+            }
+        }
+        let (plan, on_step, is_cancelled) = (self.plan, &mut *self.on_step, &mut self.is_cancelled);
+        ray.shoot(self.oracle, level, &most, &mut self.cuts, &mut |oracle, inside| {
+            let envelope: DecoupledEnvelope = ray.at(plan, inside);
+            let flow = on_step(&BestStep {
+                envelope: &envelope,
+                checks: oracle.checks(),
+            });
+            *is_cancelled |= flow.is_break();
+            flow
+        })
+    }
+
+    /// Stops the variables that cannot grow beyond the level; whether there are any.
+    fn stop(&mut self, level: &Rational, reached: &Reached) -> Result<bool, Refusal> {
+        let mut any = false;
+        for variable in 0..self.variables.count() {
+            let far = self.variables.most[variable].checked_div(&self.variables.scales[variable]);
+            let far = far.unwrap_or_default();
+            if self.stopped[variable].is_none() && far <= *level {
+                self.halt(variable, &far, None);
+                any = true;
+            }
+        }
+        // Every variable in the only row that stops them all is stopped by it.
+        if let Some(index) = reached.cut
+            && reached.inside == reached.outside
+            && let [row] = &self.cuts[index].rows[..]
+        {
+            let (factors, _) = self.variables.row(self.plan, row);
+            for (variable, factor) in factors {
+                if factor.is_positive() && self.stopped[variable].is_none() {
+                    self.halt(variable, level, Some(index));
+                    any = true;
+                }
+            }
+        }
+        if any {
+            return Ok(true);
+        }
+        for variable in 0..self.variables.count() {
+            if self.stopped[variable].is_some() || self.is_cancelled {
+                continue;
+            }
+            let alone = self.grow(Some(variable), level)?;
+            if alone.inside <= *level {
+                self.is_proved &= alone.inside == alone.outside;
+                self.halt(variable, level, alone.cut);
+                any = true;
+            }
+        }
+        Ok(any)
+    }
+
+    fn halt(&mut self, variable: usize, slack: &Rational, cut: Option<usize>) {
+        self.stopped[variable] = Some((slack.clone(), cut));
+        self.order.push(variable);
+    }
+}

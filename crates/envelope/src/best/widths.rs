@@ -1,0 +1,333 @@
+//! The box with the greatest sum of widths: branch and bound over the cuts with alternatives, the
+//! most promising case first, each case a linear program.
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
+
+use super::master::{Master, Solved};
+use super::{BestProof, BestRun, BestStep, Case, Reasons, Variables};
+use crate::cut::{Cut, Ground, Row};
+use crate::learn::Learnt;
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+use crate::ray::{Ray, place};
+
+/// How closely a refused box is shrunk where nothing linear is known: halvings of each end.
+const HALVINGS: usize = 16;
+/// How many boxes are shrunk so before the search settles for what it has.
+const MOST_SHRUNK: usize = 24;
+
+/// A case that has not been split.
+struct Leaf {
+    /// Its place in the tree.
+    case: usize,
+    /// The rows that hold in it.
+    chosen: Vec<(usize, usize)>,
+    /// What nothing in it exceeds.
+    bound: Rational,
+    /// Whether the bound was worked out from all cuts that are known.
+    is_fresh: bool,
+    values: Vec<Rational>,
+}
+
+struct Search<'a> {
+    oracle: &'a mut Oracle,
+    plan: &'a ParametrizedPlan,
+    variables: &'a Variables,
+    worths: Vec<Rational>,
+    master: Master,
+    cuts: Vec<Cut>,
+    tree: Vec<Case>,
+    leaves: Vec<Leaf>,
+    best: (Rational, Vec<Rational>),
+    shrunk: usize,
+}
+
+/// The box with the greatest weighted sum of widths.
+pub(super) fn widths(
+    oracle: &mut Oracle,
+    plan: &ParametrizedPlan,
+    variables: &Variables,
+    start: Option<&DecoupledEnvelope>,
+    on_step: &mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
+) -> Result<BestRun, Refusal> {
+    let weight = |end: &BoxEnd| &plan.parameter(end.parameter).weight;
+    let worths: Vec<Rational> = variables
+        .ends
+        .iter()
+        .map(|ends| ends.iter().map(weight).sum())
+        .collect();
+    let mut search = Search {
+        master: Master::new(variables, &worths),
+        oracle,
+        plan,
+        variables,
+        best: (Rational::ZERO, vec![Rational::ZERO; variables.count()]),
+        worths,
+        cuts: Vec::new(),
+        tree: Vec::new(),
+        leaves: Vec::new(),
+        shrunk: 0,
+    };
+    if let Some(start) = start {
+        search.take(search.values_in(start));
+    }
+    search.open(Vec::new(), Rational::ZERO);
+    let mut is_cancelled = false;
+    let mut steps = 0_u64;
+    // What is left of cases in which nothing more could be told.
+    let mut left: Option<Rational> = None;
+    while let Some(at) = search.most_promising() {
+        if search.leaves[at].bound <= search.best.0 {
+            break;
+        }
+        if !search.leaves[at].is_fresh {
+            search.work_out(at);
+            continue;
+        }
+        if search.split(at) {
+            continue;
+        }
+        let envelope = variables.envelope(plan, &search.best.1);
+        let step = BestStep {
+            envelope: &envelope,
+            checks: search.oracle.checks(),
+        };
+        if on_step(&step).is_break() {
+            is_cancelled = true;
+            break;
+        }
+        steps += 1;
+        let values = search.leaves[at].values.clone();
+        let candidate = variables.envelope(plan, &values);
+        match search.oracle.learn(&candidate)? {
+            Learnt::Nothing => {
+                search.take(values);
+                continue;
+            }
+            Learnt::Cut(cut) if !search.is_known(&cut, &values) => search.learn(cut),
+            _ => match search.shrink(&candidate)? {
+                Some(cut) => search.learn(cut),
+                None => {
+                    let leaf = search.leaves.remove(at);
+                    left = left.max(Some(leaf.bound));
+                }
+            },
+        }
+        if steps.is_power_of_two() {
+            search.improve(&values)?;
+        }
+    }
+    let open = search.leaves.iter().map(|leaf| leaf.bound.clone());
+    let bound = open.chain(left).max().unwrap_or_default();
+    let bound = bound.max(search.best.0.clone());
+    Ok(BestRun {
+        envelope: Ok(variables.envelope(plan, &search.best.1)),
+        is_proved: bound == search.best.0,
+        value: search.best.0,
+        bound,
+        checks: 0,
+        is_cancelled,
+        proof: BestProof {
+            cuts: search.cuts,
+            reasons: Reasons::Tree(search.tree),
+        },
+    })
+}
+
+impl Search<'_> {
+    fn worth(&self, values: &[Rational]) -> Rational {
+        let terms = self.worths.iter().zip(values).map(|(w, v)| w * v);
+        terms.sum()
+    }
+
+    /// Takes the box with these values, which is inside the envelope, if it is better.
+    fn take(&mut self, values: Vec<Rational>) {
+        let worth = self.worth(&values);
+        if worth > self.best.0 {
+            self.best = (worth, values);
+        }
+    }
+
+    /// The values of the variables with which the box lies in another one.
+    fn values_in(&self, envelope: &DecoupledEnvelope) -> Vec<Rational> {
+        let point = DecoupledEnvelope::point(&self.plan.nominal());
+        let variables = self.variables.ends.iter().zip(&self.variables.most);
+        let values = variables.map(|(ends, most)| {
+            let moved = ends.iter().map(|end| {
+                let far = end.reach(envelope);
+                let near = end.reach(&point).unwrap_or_default();
+                far.map_or(most.clone(), |far| (far - near).min(most.clone()))
+            });
+            moved.min().unwrap_or_default()
+        });
+        values.collect()
+    }
+
+    /// A new case; its bound is that of the one it comes from until it is worked out.
+    fn open(&mut self, chosen: Vec<(usize, usize)>, bound: Rational) -> usize {
+        let case = self.tree.len();
+        self.tree.push(Case::Bounded {
+            multipliers: Vec::new(),
+            is_impossible: false,
+        });
+        self.leaves.push(Leaf {
+            case,
+            chosen,
+            bound,
+            is_fresh: false,
+            values: Vec::new(),
+        });
+        let last = self.leaves.len() - 1;
+        self.work_out(last);
+        case
+    }
+
+    fn most_promising(&self) -> Option<usize> {
+        let leaves = self.leaves.iter().enumerate();
+        // Of several the first, whatever the order of the list.
+        let best = leaves.max_by(|(_, one), (_, other)| {
+            one.bound
+                .cmp(&other.bound)
+                .then_with(|| other.case.cmp(&one.case))
+        });
+        best.map(|(index, _)| index)
+    }
+
+    /// Solves a case with all that is known.
+    fn work_out(&mut self, at: usize) {
+        let leaf = &mut self.leaves[at];
+        match self.master.solve(&leaf.chosen) {
+            Solved::Best {
+                values,
+                worth,
+                proof,
+            } => {
+                leaf.bound = worth;
+                leaf.values = values;
+                leaf.is_fresh = true;
+                self.tree[leaf.case] = Case::Bounded {
+                    multipliers: proof,
+                    is_impossible: false,
+                };
+            }
+            Solved::Impossible(proof) => {
+                self.tree[leaf.case] = Case::Bounded {
+                    multipliers: proof,
+                    is_impossible: true,
+                };
+                self.leaves.remove(at);
+            }
+        }
+    }
+
+    /// Splits a case by a cut none of whose rows holds in its best box; whether there is one.
+    fn split(&mut self, at: usize) -> bool {
+        let leaf = &self.leaves[at];
+        let candidate = self.variables.envelope(self.plan, &leaf.values);
+        let is_broken = |cut: &Cut| cut.rows.len() > 1 && cut.rows.iter().all(|row| {
+            row.value(&candidate).is_none_or(|value| value > row.bound)
+        });
+        let Some(cut) = self.cuts.iter().position(is_broken) else {
+            return false;
+        };
+        let leaf = self.leaves.remove(at);
+        let mut cases = Vec::new();
+        for row in 0..self.cuts[cut].rows.len() {
+            let mut chosen = leaf.chosen.clone();
+            chosen.push((cut, row));
+            cases.push(self.open(chosen, leaf.bound.clone()));
+        }
+        self.tree[leaf.case] = Case::Either { cut, cases };
+        true
+    }
+
+    fn learn(&mut self, cut: Cut) {
+        let index = self.cuts.len();
+        self.master.add(self.plan, self.variables, &cut, index);
+        self.cuts.push(cut);
+        for leaf in &mut self.leaves {
+            leaf.is_fresh = false;
+        }
+    }
+
+    /// Whether the master has taken the cut into account: it holds but for being strict.
+    fn is_known(&self, cut: &Cut, values: &[Rational]) -> bool {
+        let candidate = self.variables.envelope(self.plan, values);
+        let holds = |row: &Row| row.value(&candidate).is_some_and(|value| value <= row.bound);
+        cut.rows.iter().any(holds)
+    }
+
+    /// Looks for a better box between the nominal values and one that was refused.
+    fn improve(&mut self, values: &[Rational]) -> Result<(), Refusal> {
+        let mut ray = Ray::new(self.plan);
+        for (ends, value) in self.variables.ends.iter().zip(values) {
+            for end in ends {
+                ray.step[place(*end)] = value.clone();
+            }
+        }
+        let mut cuts = self.cuts.clone();
+        let known = cuts.len();
+        let (zero, one) = (Rational::ZERO, Rational::ONE);
+        let reached = ray.shoot(self.oracle, &zero, &one, &mut cuts, &mut |_, _| {
+            ControlFlow::Continue(())
+        })?;
+        self.take(values.iter().map(|value| value * &reached.inside).collect());
+        for cut in cuts.into_iter().skip(known) {
+            self.learn(cut);
+        }
+        Ok(())
+    }
+
+    /// That one end of a box that is refused, and as small as it could be made, has to be nearer: a
+    /// cut where nothing linear is known. `None` after too many of them.
+    fn shrink(&mut self, refused: &DecoupledEnvelope) -> Result<Option<Cut>, Refusal> {
+        self.shrunk += 1;
+        if self.shrunk > MOST_SHRUNK {
+            return Ok(None);
+        }
+        let point = DecoupledEnvelope::point(&self.plan.nominal());
+        let half = Rational::new(1, 2);
+        let mut smallest = refused.clone();
+        let mut ends = Vec::new();
+        for end in BoxEnd::all(self.plan.parameters.len()) {
+            let near = end.reach(&point).unwrap_or_default();
+            if end.reach(&smallest).as_ref() == Some(&near) {
+                continue;
+            }
+            let without = end.with_reach(&smallest, Some(near.clone()));
+            if self.oracle.objection(&without)?.is_some() {
+                smallest = without;
+                continue;
+            }
+            let (mut inside, mut outside) = (near, end.reach(&smallest).unwrap_or_default());
+            for _ in 0..HALVINGS {
+                let middle = (&inside + &outside) * &half;
+                let nearer = end.with_reach(&smallest, Some(middle.clone()));
+                if self.oracle.objection(&nearer)?.is_some() {
+                    outside = middle;
+                } else {
+                    inside = middle;
+                }
+            }
+            smallest = end.with_reach(&smallest, Some(outside.clone()));
+            ends.push((end, outside));
+        }
+        let rows = ends.into_iter().map(|(end, bound)| Row {
+            factors: [(end, Rational::ONE)].into(),
+            bound,
+            is_strict: true,
+        });
+        let cut = Cut {
+            rows: rows.collect(),
+            ground: Ground::Box(smallest),
+        };
+        let makes_progress = cut
+            .rows
+            .iter()
+            .all(|row| row.value(refused).is_some_and(|value| value > row.bound));
+        Ok(makes_progress.then_some(cut))
+    }
+}

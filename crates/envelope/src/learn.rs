@@ -1,0 +1,315 @@
+//! From a box without a schedule, or without a strategy, to a [`Cut`].
+//!
+//! A conflict is a cycle of bounds whose length depends linearly on the ends of the box. Every box
+//! in which it is negative is refused for the same reason, so that all boxes inside the envelope
+//! satisfy "it is not negative". A semi-reducible cycle depends on more: what follows a duration
+//! taken at its lower end must be negative, and a wait counts for no less than the duration takes at
+//! least. So it is a disjunction: the cycle is not negative, or what follows one of these is not.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::uncertain::PlanNetwork;
+use elbowroom_plan::{
+    Bound, BoxEnd, Constraint, DecoupledEnvelope, Origin, ParameterId, ParametrizedPlan, Side,
+    Valuation, network_node,
+};
+use elbowroom_stn::ConstraintId;
+use elbowroom_stn::uncertain::{Ground as StepGround, LinkId, Part, Refuted, StrongConflict, Way};
+
+use crate::cut::{Cut, Ends, Ground, ProofPart, ProofWay};
+
+/// The limit on the rows of a cut.
+const MOST_ROWS: usize = 64;
+
+/// What is known of a box.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Learnt {
+    /// Nothing is against it.
+    Nothing,
+    /// It is refused, and others with it.
+    Cut(Cut),
+    /// It is refused, but nothing linear can be said about others.
+    Unknown,
+}
+
+/// That these values have no schedule.
+pub(crate) fn without_schedule(
+    plan: &ParametrizedPlan,
+    values: &Valuation,
+    envelope: &DecoupledEnvelope,
+) -> Learnt {
+    let (network, origins) = plan.plan.network_with_origins(values);
+    let Err(cycle) = network.consistency() else {
+        return Learnt::Unknown;
+    };
+    let cycle: Vec<Origin> = cycle
+        .constraints
+        .iter()
+        .map(|id| origins[id.index()])
+        .collect();
+    // How often each parameter counts: its sign says which of its ends is the worse one.
+    let mut constant = Rational::ZERO;
+    let mut counts = vec![Rational::ZERO; plan.parameters.len()];
+    for origin in &cycle {
+        let (bound, sign) = match *origin {
+            Origin::Beginning => continue,
+            Origin::AtLeast(index) => (&plan.plan.constraints[index].lower, -1),
+            Origin::AtMost(index) => (&plan.plan.constraints[index].upper, 1),
+        };
+        let sign = Rational::from(sign);
+        match bound {
+            Bound::Infinite => return Learnt::Unknown,
+            Bound::Finite(value) => constant += value * &sign,
+            Bound::Parameter(id) => counts[id.index()] += &sign,
+        }
+    }
+    let mut ends = Ends::constant(constant);
+    for (index, count) in counts.iter().enumerate() {
+        if !count.is_zero() {
+            let side = if count.is_positive() {
+                Side::Lower
+            } else {
+                Side::Upper
+            };
+            let parameter = ParameterId::from(index);
+            ends.add_end(BoxEnd { parameter, side }, count);
+        }
+    }
+    learnt(vec![ends], Ground::Cycle(cycle), envelope)
+}
+
+/// What keeps the plan from being dynamically controllable in the box.
+pub(crate) fn without_strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
+    let Ok(network) = plan.uncertain_network(envelope) else {
+        return Learnt::Unknown;
+    };
+    let refuted = match network.network.whole() {
+        Some(whole) => whole.network.refutation(),
+        None => network.network.refutation(),
+    };
+    let refutation = match refuted {
+        Refuted::No => return Learnt::Nothing,
+        Refuted::TooLong => return Learnt::Unknown,
+        Refuted::Because(refutation) => refutation,
+    };
+    let reader = Reader {
+        plan,
+        network: &network,
+    };
+    let Some(whole) = reader.flat(&refutation.cycle) else {
+        return Learnt::Unknown;
+    };
+    let ways = refutation.cycle.iter().map(|way| reader.way(way));
+    let Some(ways) = ways.collect::<Option<Vec<ProofWay>>>() else {
+        return Learnt::Unknown;
+    };
+    if !whole.tears() {
+        // At these ends, one for each parameter, there is no schedule at all.
+        return learnt(vec![whole], Ground::Semireducible(ways), envelope);
+    }
+    let mut rows = Vec::new();
+    let mut total = vec![Ends::default()];
+    for way in &refutation.cycle {
+        let Some(lengths) = reader.lengths(way, &mut rows) else {
+            return Learnt::Unknown;
+        };
+        total = sums(&total, &lengths);
+        if total.len() + rows.len() > MOST_ROWS {
+            return Learnt::Unknown;
+        }
+    }
+    rows.extend(total);
+    learnt(rows, Ground::Semireducible(ways), envelope)
+}
+
+/// What keeps a schedule fixed in advance from working in the box.
+pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
+    let Ok(network) = plan.uncertain_network(envelope) else {
+        return Learnt::Unknown;
+    };
+    let Err(StrongConflict { grounds, .. }) = network.network.strong() else {
+        return Learnt::Nothing;
+    };
+    let reader = Reader {
+        plan,
+        network: &network,
+    };
+    let mut total = Ends::default();
+    let mut parts = Vec::new();
+    for ground in grounds {
+        let (ends, part) = match ground {
+            StepGround::Requirement(id) => {
+                let Some((ends, origin)) = reader.requirement(id) else {
+                    return Learnt::Unknown;
+                };
+                (ends, ProofPart::Bound(origin))
+            }
+            StepGround::Early(link) => {
+                (reader.link(link, Side::Lower), ProofPart::Early(network.links[link.index()]))
+            }
+            StepGround::Late(link) => {
+                (reader.link(link, Side::Upper), ProofPart::Late(network.links[link.index()]))
+            }
+        };
+        total = total.plus(&ends);
+        parts.push(part);
+    }
+    learnt(vec![total], Ground::Fixed(parts), envelope)
+}
+
+/// One of these is not negative; in the box all are.
+fn learnt(alternatives: Vec<Ends>, ground: Ground, envelope: &DecoupledEnvelope) -> Learnt {
+    let mut rows = Vec::new();
+    for ends in alternatives {
+        let row = ends.not_negative();
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+    }
+    let cut = Cut { rows, ground };
+    if cut.holds_in(envelope) {
+        Learnt::Unknown
+    } else {
+        Learnt::Cut(cut)
+    }
+}
+
+/// All sums of one of these and one of those.
+fn sums(some: &[Ends], others: &[Ends]) -> Vec<Ends> {
+    let sums = some
+        .iter()
+        .flat_map(|one| others.iter().map(move |other| one.plus(other)));
+    sums.collect()
+}
+
+/// Reads the bounds of a network in terms of the ends of a box.
+struct Reader<'a> {
+    plan: &'a ParametrizedPlan,
+    network: &'a PlanNetwork,
+}
+
+impl Reader<'_> {
+    /// The constraint that leaves a link's duration open.
+    fn constraint(&self, link: LinkId) -> &Constraint {
+        &self.plan.plan.constraints[self.network.links[link.index()]]
+    }
+
+    /// The lower bound of a link, or minus its upper one.
+    fn link(&self, link: LinkId, side: Side) -> Ends {
+        let constraint = self.constraint(link);
+        let (bound, sign) = match side {
+            Side::Lower => (&constraint.lower, 1),
+            Side::Upper => (&constraint.upper, -1),
+        };
+        let mut ends = Ends::default();
+        match bound {
+            Bound::Parameter(parameter) => {
+                let end = BoxEnd {
+                    parameter: *parameter,
+                    side,
+                };
+                ends.add_end(end, &Rational::from(sign));
+            }
+            Bound::Finite(value) => ends.constant = value * &Rational::from(sign),
+            Bound::Infinite => {}
+        }
+        ends
+    }
+
+    /// The bound of a requirement, and where it comes from.
+    fn requirement(&self, id: ConstraintId) -> Option<(Ends, Origin)> {
+        let requirement = self.network.network.requirements().constraint(id);
+        let constant = Ends::constant(requirement.bound.clone());
+        let Some(index) = self.network.constraint_of(id) else {
+            return Some((constant, Origin::Beginning));
+        };
+        let constraint = &self.plan.plan.constraints[index];
+        if constraint.from == constraint.to {
+            return None;
+        }
+        let is_upper = requirement.from == network_node(constraint.from);
+        let (own, origin) = if is_upper {
+            (&constraint.upper, Origin::AtMost(index))
+        } else {
+            (&constraint.lower, Origin::AtLeast(index))
+        };
+        let is_told = self.plan.told_by(constraint).is_some();
+        let (Bound::Parameter(parameter), false) = (own, is_told) else {
+            return Some((constant, origin));
+        };
+        if constraint.lower == constraint.upper && self.plan.plan.is_up_to_the_world(constraint) {
+            // A second duration that ends at the same node.
+            return None;
+        }
+        // Whatever the value, the bound has to hold: an upper bound at the parameter's lower end.
+        let (side, sign) = if is_upper {
+            (Side::Lower, 1)
+        } else {
+            (Side::Upper, -1)
+        };
+        let mut ends = Ends::default();
+        let end = BoxEnd {
+            parameter: *parameter,
+            side,
+        };
+        ends.add_end(end, &Rational::from(sign));
+        Some((ends, origin))
+    }
+
+    /// What a cycle of ways adds up to if no wait is cut short.
+    fn flat(&self, cycle: &[Way]) -> Option<Ends> {
+        let mut total = Ends::default();
+        for part in cycle.iter().flat_map(|way| &way.parts) {
+            let ends = match part {
+                Part::Requirement(id) => self.requirement(*id)?.0,
+                Part::Early(link) => self.link(*link, Side::Lower),
+                Part::Late(link) => self.link(*link, Side::Upper),
+                Part::Way(way) => self.flat(std::slice::from_ref(way))?,
+            };
+            total = total.plus(&ends);
+        }
+        Some(total)
+    }
+
+    /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
+    /// for the way to be one.
+    fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Option<Vec<Ends>> {
+        let mut lengths = vec![Ends::default()];
+        for part in way.parts.iter().rev() {
+            let own = match part {
+                Part::Requirement(id) => vec![self.requirement(*id)?.0],
+                Part::Early(link) => {
+                    legal.extend(lengths.iter().cloned());
+                    vec![self.link(*link, Side::Lower)]
+                }
+                Part::Late(link) => vec![self.link(*link, Side::Upper)],
+                Part::Way(way) => self.lengths(way, legal)?,
+            };
+            lengths = sums(&lengths, &own);
+            if lengths.len() + legal.len() > MOST_ROWS {
+                return None;
+            }
+        }
+        if let Some(link) = way.unlabelled {
+            let least = self.link(link, Side::Lower);
+            lengths.push(least.negated());
+        }
+        Some(lengths)
+    }
+
+    /// The way in terms of the plan.
+    fn way(&self, way: &Way) -> Option<ProofWay> {
+        let constraint = |link: LinkId| self.network.links[link.index()];
+        let parts = way.parts.iter().map(|part| {
+            Some(match part {
+                Part::Requirement(id) => ProofPart::Bound(self.requirement(*id)?.1),
+                Part::Early(link) => ProofPart::Early(constraint(*link)),
+                Part::Late(link) => ProofPart::Late(constraint(*link)),
+                Part::Way(way) => ProofPart::Way(self.way(way)?),
+            })
+        });
+        Some(ProofWay {
+            parts: parts.collect::<Option<_>>()?,
+            unlabelled: way.unlabelled.map(constraint),
+        })
+    }
+}

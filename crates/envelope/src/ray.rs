@@ -1,0 +1,205 @@
+//! How far a box can grow in one direction.
+
+use std::ops::ControlFlow;
+
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
+
+use crate::cut::{Cut, Row};
+use crate::learn::Learnt;
+use crate::obligations::Refusal;
+use crate::oracle::Oracle;
+
+/// How often an interval is halved where nothing linear is known.
+const HALVINGS: usize = 40;
+
+/// Boxes that grow with a number: each end lies at `min(most, base + number · step)`.
+#[derive(Clone, Debug)]
+pub(crate) struct Ray {
+    /// By [`place`]: how far out the end lies at 0.
+    pub(crate) base: Vec<Rational>,
+    /// By how much the end moves out for each 1; not negative.
+    pub(crate) step: Vec<Rational>,
+    /// How far out it may lie; `None` without limit.
+    pub(crate) most: Vec<Option<Rational>>,
+}
+
+/// How far a box can grow along a [`Ray`].
+#[derive(Clone, Debug)]
+pub(crate) struct Reached {
+    /// The box with this number is inside the envelope.
+    pub(crate) inside: Rational,
+    /// No box with a greater number than this one is; the same as `inside` where that is exact.
+    pub(crate) outside: Rational,
+    /// What stands against greater numbers, by position among the cuts; `None` if only the limit of
+    /// the question does, or if it is nothing linear.
+    pub(crate) cut: Option<usize>,
+}
+
+/// The place of an end in a list: lower and upper, parameter by parameter.
+pub(crate) fn place(end: BoxEnd) -> usize {
+    2 * end.parameter.index() + end.side.index()
+}
+
+impl Ray {
+    /// The nominal values, and no direction yet. Ends may lie as far out as the ranges of the
+    /// parameters; those of uncertain durations at 0 or later.
+    pub(crate) fn new(plan: &ParametrizedPlan) -> Self {
+        let count = plan.parameters.len();
+        let mut ray = Self {
+            base: Vec::with_capacity(2 * count),
+            step: vec![Rational::ZERO; 2 * count],
+            most: Vec::with_capacity(2 * count),
+        };
+        for parameter in &plan.parameters {
+            for side in Side::BOTH {
+                let point = Interval::point(parameter.nominal.clone());
+                ray.base.push(side.reach(&point).unwrap_or_default());
+                ray.most.push(side.reach(&parameter.range));
+            }
+        }
+        ray
+    }
+
+    /// How far out the end at a place lies.
+    pub(crate) fn reach(&self, place: usize, number: &Rational) -> Rational {
+        let reach = &self.base[place] + &self.step[place] * number;
+        match &self.most[place] {
+            // An end that does not move stays where it is.
+            Some(most) if !self.step[place].is_zero() => reach.min(most.clone()),
+            _ => reach,
+        }
+    }
+
+    /// The box of a number.
+    pub(crate) fn at(&self, plan: &ParametrizedPlan, number: &Rational) -> DecoupledEnvelope {
+        let mut envelope = DecoupledEnvelope::point(&plan.nominal());
+        for index in 0..plan.parameters.len() {
+            let lower = -self.reach(2 * index, number);
+            let upper = self.reach(2 * index + 1, number);
+            envelope =
+                envelope.with_interval(ParameterId::from(index), Interval::closed(lower, upper));
+        }
+        envelope
+    }
+
+    /// The greatest number from `least` to `most` for which the box is inside the envelope. The box of
+    /// `least` is.
+    ///
+    /// A box that is refused says which others are; the greatest number that this leaves is the next
+    /// to be asked about, so that the first that is accepted is the answer. Where nothing linear is
+    /// known, the interval is halved. What is learnt is added to `cuts`; `on_step` is told the
+    /// greatest number so far before each box that is checked, and can end the search.
+    ///
+    /// # Errors
+    /// When there are too many cases to tell apart.
+    pub(crate) fn shoot(
+        &self,
+        oracle: &mut Oracle,
+        least: &Rational,
+        most: &Rational,
+        cuts: &mut Vec<Cut>,
+        on_step: &mut dyn FnMut(&Oracle, &Rational) -> ControlFlow<()>,
+    ) -> Result<Reached, Refusal> {
+        let plan = std::sync::Arc::clone(oracle.plan());
+        let mut reached = Reached {
+            inside: least.clone(),
+            outside: most.clone(),
+            cut: None,
+        };
+        for index in 0..cuts.len() {
+            self.lower(&mut reached, &cuts[index], index);
+        }
+        let half = Rational::new(1, 2);
+        let mut halvings = 0;
+        let mut next = reached.outside.clone();
+        while reached.inside < reached.outside && halvings < HALVINGS {
+            if on_step(oracle, &reached.inside).is_break() {
+                break;
+            }
+            let halve = match oracle.learn(&self.at(&plan, &next))? {
+                Learnt::Nothing => {
+                    reached.inside = next;
+                    true
+                }
+                Learnt::Cut(cut) => {
+                    let before = reached.outside.clone();
+                    self.lower(&mut reached, &cut, cuts.len());
+                    cuts.push(cut);
+                    // A bound that is not reached itself, or one that was known before.
+                    let is_stuck = reached.outside == before && next == before;
+                    if reached.outside > next {
+                        reached.outside = next;
+                    }
+                    is_stuck
+                }
+                Learnt::Unknown => {
+                    reached.outside = next;
+                    reached.cut = None;
+                    true
+                }
+            };
+            next = if halve {
+                halvings += 1;
+                (&reached.inside + &reached.outside) * &half
+            } else {
+                reached.outside.clone()
+            };
+        }
+        Ok(reached)
+    }
+
+    /// Lowers the greatest number possible to what a cut leaves.
+    fn lower(&self, reached: &mut Reached, cut: &Cut, index: usize) {
+        let left = self.left_by(cut, &reached.outside);
+        let left = left.unwrap_or_default().max(reached.inside.clone());
+        if left < reached.outside {
+            reached.outside = left;
+            reached.cut = Some(index);
+        }
+    }
+
+    /// The greatest number up to `most` that a cut leaves.
+    fn left_by(&self, cut: &Cut, most: &Rational) -> Option<Rational> {
+        let left = cut.rows.iter().filter_map(|row| self.left_by_row(row, most));
+        left.max()
+    }
+
+    /// The greatest number up to `most` for which a row holds, strict or not.
+    fn left_by_row(&self, row: &Row, most: &Rational) -> Option<Rational> {
+        let value = |number: &Rational| {
+            let sum = row.factors.iter().map(|(end, factor)| {
+                let reach = self.reach(place(*end), number);
+                &reach * factor
+            });
+            sum.fold(Rational::ZERO, |sum, term| sum + term) - &row.bound
+        };
+        // Between the numbers at which an end comes to its limit, the value is linear.
+        let mut corners = vec![Rational::ZERO, most.clone()];
+        for end in row.factors.keys() {
+            let place = place(*end);
+            if let Some(limit) = &self.most[place]
+                && let Some(number) = (limit - &self.base[place]).checked_div(&self.step[place])
+                && number.is_positive()
+                && number < *most
+            {
+                corners.push(number);
+            }
+        }
+        corners.sort_unstable();
+        let mut above: Option<(Rational, Rational)> = None;
+        for number in corners.into_iter().rev() {
+            let here = value(&number);
+            if !here.is_positive() {
+                let Some((far, there)) = above else {
+                    return Some(number);
+                };
+                // From `here <= 0` at `number` to `there > 0` at `far`.
+                let share = (-&here).checked_div(&(&there - &here))?;
+                return Some(&number + &(&(&far - &number) * &share));
+            }
+            above = Some((number, here));
+        }
+        None
+    }
+}

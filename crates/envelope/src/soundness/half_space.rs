@@ -1,0 +1,247 @@
+//! What a broken obligation says about other boxes: a [`Row`].
+//!
+//! Where the bad case is one inequality in differences of times that are parameters, what it says
+//! is a linear function of the parameters: some schedule exists for every value in a box inside the
+//! envelope, and whichever it is, these differences are what the values say. So the worst corner of
+//! the box decides, and every box inside the envelope satisfies one linear inequality in its ends.
+//!
+//! An over-all condition is read at a moment that lies anywhere inside its action. It is taken as
+//! close to one of the events around it as one likes, if that is a possible place for the moment.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use elbowroom_num::{Delta, Interval, Rational};
+use elbowroom_plan::{
+    BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side,
+};
+use elbowroom_stn::ConsistentNetwork;
+
+use super::bad_case::spread;
+use super::{Broken, Soundness};
+use crate::cut::Row;
+use crate::linear::Linear;
+use crate::obligations::{BadCase, Difference};
+use crate::reduction::Reduction;
+
+/// A time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
+#[derive(Clone, Debug)]
+struct Place {
+    root: usize,
+    factors: BTreeMap<ParameterId, Rational>,
+    offset: Rational,
+}
+
+impl Soundness {
+    /// What every box inside the envelope satisfies because of what is broken in this one; `None` if
+    /// that is nothing linear.
+    pub(crate) fn row(
+        &self,
+        plan: &ParametrizedPlan,
+        broken: &Broken,
+        envelope: &DecoupledEnvelope,
+    ) -> Option<Row> {
+        let case = &broken.case;
+        let places = places(&self.reduction);
+        let row = |expression: &Linear, is_strict: bool| {
+            let row = half_space(&self.reduction, &places, expression, is_strict)?;
+            (!row.holds_in(envelope)).then_some(row)
+        };
+        match (&case.differences[..], &case.inequalities[..]) {
+            ([], [inequality]) => row(&inequality.expression, inequality.is_strict),
+            ([difference], []) => {
+                let mut expression = Linear::difference(difference.from, difference.to);
+                expression.constant = -&difference.bound;
+                row(&expression, difference.is_strict)
+            }
+            (differences, [inequality]) => {
+                let moment = NodeId::from(plan.plan.nodes.len());
+                let mut events: Vec<NodeId> = differences
+                    .iter()
+                    .flat_map(|difference| [difference.from, difference.to])
+                    .filter(|node| *node != moment)
+                    .collect();
+                events.sort_unstable();
+                events.dedup();
+                events.into_iter().find_map(|event| {
+                    let expression = at(&inequality.expression, moment, event)?;
+                    // Only near the event, so that the bound itself need not be reached.
+                    let row = row(&expression, true)?;
+                    self.is_possible(plan, case, &row, moment, event)
+                        .then_some(row)
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the moment can be as close to the event as one likes, for the values at which a box
+    /// with the nominal values in it breaks the row.
+    fn is_possible(
+        &self,
+        plan: &ParametrizedPlan,
+        case: &BadCase,
+        row: &Row,
+        moment: NodeId,
+        event: NodeId,
+    ) -> bool {
+        let mut corner = DecoupledEnvelope::point(&plan.nominal());
+        for end in row.factors.keys() {
+            let own = plan.parameter(end.parameter);
+            let mut interval = Interval::point(own.nominal.clone());
+            match end.side {
+                Side::Lower => interval.lower = own.range.lower.clone(),
+                Side::Upper => interval.upper = own.range.upper.clone(),
+            }
+            corner = corner.with_interval(end.parameter, interval);
+        }
+        let Ok(network) = ConsistentNetwork::try_from(self.reduction.network(&corner).network)
+        else {
+            return false;
+        };
+        // Just before the event all that comes before it has happened, just after it the same.
+        [true, false].into_iter().any(|is_before| {
+            case.differences
+                .iter()
+                .all(|difference| entails(&self.reduction, &network, difference, moment, event, is_before))
+        })
+    }
+}
+
+/// Whether a difference holds in all schedules of the network, the moment being just before or just
+/// after the event.
+fn entails(
+    reduction: &Reduction,
+    network: &ConsistentNetwork<Delta>,
+    difference: &Difference,
+    moment: NodeId,
+    event: NodeId,
+    is_before: bool,
+) -> bool {
+    let place = |node: NodeId| if node == moment { event } else { node };
+    let (from, to) = (place(difference.from), place(difference.to));
+    // `to - from <= bound`, where moving the moment may help or cost a little.
+    let helps = (difference.to == moment && is_before) || (difference.from == moment && !is_before);
+    let costs = (difference.to == moment && !is_before) || (difference.from == moment && is_before);
+    let bound = Delta::from(difference.bound.clone());
+    let greatest = if from == to {
+        Delta::ZERO
+    } else {
+        let (from_class, from_offset) = reduction.place(from);
+        let (to_class, to_offset) = reduction.place(to);
+        let between = if from_class == to_class {
+            Some(Delta::ZERO)
+        } else {
+            network.distance(from_class, to_class)
+        };
+        let Some(between) = between else { return false };
+        &between + &Delta::from(&to_offset - &from_offset)
+    };
+    if helps {
+        greatest <= bound
+    } else if costs || difference.is_strict {
+        greatest < bound
+    } else {
+        greatest <= bound
+    }
+}
+
+/// The expression with one node's time in place of another's; `None` if products are in it.
+fn at(expression: &Linear, moment: NodeId, event: NodeId) -> Option<Linear> {
+    if !expression.products.is_empty() {
+        return None;
+    }
+    let mut placed = expression.clone();
+    if let Some(factor) = placed.times.remove(&moment) {
+        placed.add_time(event, &factor);
+    }
+    Some(placed)
+}
+
+/// That `expression <= 0`, or `< 0` when strict, is not so at the worst corner.
+fn half_space(
+    reduction: &Reduction,
+    places: &[Place],
+    expression: &Linear,
+    is_strict: bool,
+) -> Option<Row> {
+    if !expression.products.is_empty() {
+        return None;
+    }
+    let mut roots: BTreeMap<usize, Rational> = BTreeMap::new();
+    let mut factors = expression.parameters.clone();
+    let mut offset = Rational::ZERO;
+    let mut is_placed = true;
+    let constant = spread(reduction, expression, |class, coefficient| {
+        let Some(place) = places.get(class.index()) else {
+            is_placed = false;
+            return;
+        };
+        *roots.entry(place.root).or_default() += coefficient;
+        offset += &place.offset * coefficient;
+        for (id, factor) in &place.factors {
+            *factors.entry(*id).or_default() += factor * coefficient;
+        }
+    });
+    let zero = places.first()?.root;
+    let is_function = roots.iter().all(|(&root, sum)| root == zero || sum.is_zero());
+    if !is_placed || !is_function {
+        return None;
+    }
+    let factors = factors.into_iter().filter(|(_, factor)| !factor.is_zero());
+    let factors = factors.map(|(parameter, factor)| {
+        // What lowers the expression makes it bad.
+        let side = if factor.is_positive() {
+            Side::Lower
+        } else {
+            Side::Upper
+        };
+        (BoxEnd { parameter, side }, factor.abs())
+    });
+    Some(Row {
+        factors: factors.collect(),
+        bound: constant + offset,
+        is_strict: !is_strict,
+    })
+}
+
+/// Each class's time as a function of the parameters, as far as differences that are parameters
+/// lead; the first class has time zero.
+fn places(reduction: &Reduction) -> Vec<Place> {
+    let count = reduction.class_count();
+    let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> = vec![Vec::new(); count];
+    for (&parameter, &(from, to)) in &reduction.substitution {
+        let (from, from_offset) = reduction.place(from);
+        let (to, to_offset) = reduction.place(to);
+        // class of `to` + its offset - class of `from` - its offset = parameter
+        let offset = &from_offset - &to_offset;
+        let sign = Rational::ONE;
+        neighbours[from.index()].push((to.index(), parameter, sign.clone(), offset.clone()));
+        neighbours[to.index()].push((from.index(), parameter, -&sign, -&offset));
+    }
+    let mut places: Vec<Option<Place>> = vec![None; count];
+    for root in 0..count {
+        if places[root].is_some() {
+            continue;
+        }
+        places[root] = Some(Place {
+            root,
+            factors: BTreeMap::new(),
+            offset: Rational::ZERO,
+        });
+        let mut queue = VecDeque::from([root]);
+        while let Some(class) = queue.pop_front() {
+            let Some(here) = places[class].clone() else { continue };
+            for (next, parameter, sign, offset) in &neighbours[class] {
+                if places[*next].is_none() {
+                    let mut place = here.clone();
+                    *place.factors.entry(*parameter).or_default() += sign;
+                    place.offset += offset;
+                    places[*next] = Some(place);
+                    queue.push_back(*next);
+                }
+            }
+        }
+    }
+    places.into_iter().flatten().collect()
+}
+

@@ -1,0 +1,182 @@
+//! The best box against all boxes on a grid.
+
+mod given;
+
+use std::ops::ControlFlow;
+
+use elbowroom_envelope::{BestRun, BestSettings, Guarantee, Objective, Oracle, best};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
+
+use given::Given;
+
+/// The nominal value of all durations, and the greatest one on the grid.
+const NOMINAL: i64 = 2;
+const MOST: i64 = 6;
+
+/// Three actions, the first two of which use up something, with bounds between their starts and ends.
+fn problem(bounds: &str) -> String {
+    format!(
+        "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};
+         parameter c default {NOMINAL} lb 0 ub {MOST};
+         durative-action instance one : (burn); durative-action instance two : (burn);
+         durative-action instance three : (run);
+         c: one.end - one.start in [a, a]; c: two.end - two.start in [b, b];
+         c: three.end - three.start in [c, c]; c: two.start - one.end in [1/2, inf]; {bounds}"
+    )
+}
+
+const DOMAIN: &str = "
+    (:durative-action run :parameters () :duration (>= ?duration 0) :condition () :effect (and))
+    (:durative-action burn :parameters () :duration (>= ?duration 0)
+      :condition (at end (>= (x) ?duration)) :effect (at end (decrease (x) ?duration)))";
+
+/// A sequence of numbers that look like chance.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (self.0 >> 33) % bound
+    }
+
+    /// A few bounds between starts and ends, most of them satisfied at the nominal values.
+    fn bounds(&mut self) -> String {
+        let points = ["one.start", "one.end", "two.start", "two.end", "three.start", "three.end"];
+        let mut bounds = String::new();
+        for _ in 0..1 + self.below(4) {
+            let from = points[usize::try_from(self.below(6)).unwrap()];
+            let to = points[usize::try_from(self.below(6)).unwrap()];
+            if from == to {
+                continue;
+            }
+            let bound = match self.below(3) {
+                0 => format!("[{}, inf]", self.below(3)),
+                1 => format!("[-inf, {}]", self.below(7)),
+                _ => {
+                    let least = self.below(3);
+                    format!("[{least}, {}]", least + self.below(6))
+                }
+            };
+            bounds.push_str(&format!("c: {to} - {from} in {bound}; "));
+        }
+        bounds
+    }
+}
+
+/// All boxes with whole ends around the nominal values.
+fn boxes(plan: &ParametrizedPlan) -> Vec<DecoupledEnvelope> {
+    let mut boxes = vec![DecoupledEnvelope::point(&plan.nominal())];
+    for index in 0..plan.parameters.len() {
+        boxes = boxes
+            .iter()
+            .flat_map(|envelope| {
+                (0..=NOMINAL).flat_map(move |lower| {
+                    (NOMINAL..=MOST).map(move |upper| {
+                        let interval = Interval::closed(lower.into(), upper.into());
+                        let id = ParameterId::from(index);
+                        envelope.clone().with_interval(id, interval)
+                    })
+                })
+            })
+            .collect();
+    }
+    boxes
+}
+
+/// The sum of widths.
+fn widths(envelope: &DecoupledEnvelope) -> Rational {
+    let widths = envelope.intervals().iter();
+    widths.filter_map(Interval::width).sum()
+}
+
+/// How far each end lies from the nominal value, the least first.
+fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
+    let nominal = Rational::from(NOMINAL);
+    let ends = envelope.intervals().iter().flat_map(|interval| {
+        [&interval.lower, &interval.upper].map(|end| (end.value().unwrap() - &nominal).abs())
+    });
+    let mut slacks: Vec<Rational> = ends.collect();
+    slacks.sort_unstable();
+    slacks
+}
+
+fn is_symmetric(envelope: &DecoupledEnvelope) -> bool {
+    let twice = Rational::from(2 * NOMINAL);
+    envelope
+        .intervals()
+        .iter()
+        .all(|own| own.lower.value().unwrap() + own.upper.value().unwrap() == twice)
+}
+
+fn found(oracle: &mut Oracle, objective: Objective, symmetric: bool) -> Option<(BestRun, DecoupledEnvelope)> {
+    let settings = BestSettings {
+        objective,
+        symmetric,
+        ..BestSettings::default()
+    };
+    let run = best(oracle, &settings, None, &mut |_| ControlFlow::Continue(())).unwrap();
+    let envelope = run.envelope.clone().ok()?;
+    Some((run, envelope))
+}
+
+#[test]
+fn no_box_on_a_grid_is_better_than_the_best_one() {
+    let mut dice = Dice(11);
+    let (mut proved, mut unproved, mut torn) = (0, 0, 0);
+    for _ in 0..60 {
+        let bounds = dice.bounds();
+        let given = Given {
+            domain: DOMAIN,
+            plan: &problem(&bounds),
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        for guarantee in Guarantee::ALL {
+            let Ok(mut oracle) = Oracle::new(&task, &plan, guarantee) else {
+                continue;
+            };
+            for symmetric in [false, true] {
+                let Some((wide, widest)) = found(&mut oracle, Objective::Widths, symmetric) else {
+                    continue;
+                };
+                let (fair, fairest) = found(&mut oracle, Objective::LeastSlack, symmetric).unwrap();
+                for (run, envelope) in [(&wide, &widest), (&fair, &fairest)] {
+                    assert_eq!(oracle.objection(envelope), Ok(None), "{guarantee} {bounds}");
+                    assert!(run.bound >= run.value, "{guarantee} {bounds}");
+                    if run.is_proved {
+                        proved += 1;
+                    } else {
+                        unproved += 1;
+                    }
+                    torn += usize::from(run.proof.cuts.iter().any(|cut| cut.rows.len() > 1));
+                }
+                assert_eq!(widths(&widest), wide.value);
+                let least = slacks(&fairest);
+                for other in boxes(&plan) {
+                    if symmetric && !is_symmetric(&other) {
+                        continue;
+                    }
+                    let is_wider = widths(&other) > wide.value;
+                    let is_fairer = slacks(&other) > least;
+                    if !is_wider && !is_fairer {
+                        continue;
+                    }
+                    let is_inside = oracle.objection(&other).unwrap().is_none();
+                    assert!(
+                        !is_inside || !is_wider || widths(&other) <= wide.bound,
+                        "{guarantee} {bounds} {other:?} {wide:?}"
+                    );
+                    if wide.is_proved {
+                        assert!(!is_inside || !is_wider, "{guarantee} {bounds} {other:?} {wide:?}");
+                    }
+                    if fair.is_proved {
+                        assert!(!is_inside || !is_fairer, "{guarantee} {bounds} {other:?} {fair:?}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(proved > 200 && torn > 10, "{proved} {unproved} {torn}");
+    assert!(unproved * 10 < proved, "{proved} {unproved}");
+}
