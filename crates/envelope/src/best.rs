@@ -22,11 +22,12 @@ use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 use serde::{Deserialize, Serialize};
 
-use crate::cut::{Cut, Row};
+use crate::cut::Cut;
 use crate::irr::scales;
 use crate::objection::Objection;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
+use crate::row::Row;
 
 /// What a box is to be the greatest of.
 #[derive(

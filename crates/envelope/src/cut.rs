@@ -5,19 +5,8 @@ use std::collections::BTreeMap;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, Origin, Side};
 
+use crate::row::Row;
 use crate::soundness::Broken;
-
-/// `Σ factor · reach(end) <= bound`, or `<` when strict: a half-space of boxes, each of which is
-/// given by how far out its ends lie ([`BoxEnd::reach`]).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Row {
-    /// What each end counts; none is zero.
-    pub factors: BTreeMap<BoxEnd, Rational>,
-    /// What the sum does not exceed.
-    pub bound: Rational,
-    /// Whether the bound itself is excluded.
-    pub is_strict: bool,
-}
 
 /// At least one of these rows holds in every box inside the envelope, and none of them in the box
 /// that was refused.
@@ -67,24 +56,6 @@ pub enum ProofPart {
     Late(usize),
     /// A way that counts as one bound.
     Way(ProofWay),
-}
-
-impl Row {
-    /// The left-hand side in a box; `None` if an infinite end counts.
-    pub fn value(&self, envelope: &DecoupledEnvelope) -> Option<Rational> {
-        let mut value = Rational::ZERO;
-        for (end, factor) in &self.factors {
-            value += &end.reach(envelope)? * factor;
-        }
-        Some(value)
-    }
-
-    /// Whether the row holds in a box.
-    pub fn holds_in(&self, envelope: &DecoupledEnvelope) -> bool {
-        self.value(envelope).is_some_and(|value| {
-            value < self.bound || (value == self.bound && !self.is_strict)
-        })
-    }
 }
 
 impl Cut {

@@ -8,6 +8,8 @@
 //! - [`Guarantee`]: the controllability that is required in a box: weak, dynamic or strong.
 //! - [`Oracle`]: the exact box check (Algorithm 1's CHECKINENVELOPE), both together.
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
+//! - [`best()`]: the largest box by some objective, from outside, with a proof.
+//! - [`balance()`]: by how much everything may deviate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
 //! Linear programs and minimum cost flows are solved here. `elbowroom-execution` does not depend on
@@ -71,6 +73,7 @@ pub mod obligations;
 mod oracle;
 mod ray;
 pub mod reduction;
+mod row;
 mod sharpen;
 pub mod soundness;
 
@@ -79,7 +82,7 @@ pub use best::{
     BestProof, BestRun, BestSettings, BestStep, Case, Objective, Reasons, Source, Stopped, best,
 };
 pub use control::{ControlConflict, ControlGround};
-pub use cut::{Cut, Ground, ProofPart, ProofWay, Row};
+pub use cut::{Cut, Ground, ProofPart, ProofWay};
 pub use enforce::enforced;
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
@@ -87,4 +90,5 @@ pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
+pub use row::Row;
 pub use sharpen::sharpen;

@@ -5,10 +5,11 @@ use std::ops::ControlFlow;
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, ParametrizedPlan, Side};
 
-use crate::cut::{Cut, Row};
+use crate::cut::Cut;
 use crate::learn::Learnt;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
+use crate::row::Row;
 
 /// How often an interval is halved where nothing linear is known.
 const HALVINGS: usize = 40;

@@ -4,7 +4,9 @@ mod given;
 
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{BestRun, BestSettings, Guarantee, Objective, Oracle, best};
+use elbowroom_envelope::{
+    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, balance, best, irr,
+};
 use elbowroom_num::{Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan};
 
@@ -179,4 +181,71 @@ fn no_box_on_a_grid_is_better_than_the_best_one() {
     }
     assert!(proved > 200 && torn > 10, "{proved} {unproved} {torn}");
     assert!(unproved * 10 < proved, "{proved} {unproved}");
+}
+
+/// Two actions one after the other, done within ten units; the unit is a parameter of the test.
+fn relay(unit: &Rational) -> String {
+    let limit = &Rational::from(10) * unit;
+    format!(
+        "parameter a default {unit} lb 0; parameter b default {unit} lb 0;
+         durative-action instance first : (run); durative-action instance second : (run);
+         c: first.end - first.start in [a, a]; c: second.end - second.start in [b, b];
+         c: second.start - first.end in [0, 0]; c: second.end - .zero in [0, {limit}];"
+    )
+}
+
+#[test]
+fn everything_may_deviate_by_exactly_what_fits() {
+    for unit in [Rational::ONE, Rational::new(1, 3600)] {
+        let given = Given {
+            domain: DOMAIN,
+            plan: &relay(&unit),
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        for guarantee in Guarantee::ALL {
+            let mut oracle = Oracle::new(&task, &plan, guarantee).unwrap();
+            let shares = balance(&mut oracle, &mut || ControlFlow::Continue(()));
+            let shares = shares.unwrap().unwrap();
+            if guarantee == Guarantee::Strong {
+                // The second start follows the first end at once, which takes an observer.
+                for share in [shares.more, shares.less, shares.either] {
+                    assert_eq!(share.inside, Rational::ZERO);
+                    assert_eq!(share.outside, Some(Rational::ZERO));
+                }
+                continue;
+            }
+            // Both of them five times as long come to ten units.
+            let four = Rational::from(4);
+            for share in [&shares.more, &shares.either] {
+                assert_eq!(share.inside, four, "{guarantee}");
+                assert_eq!(share.outside.as_ref(), Some(&four), "{guarantee}");
+            }
+            assert!(shares.less.inside >= Rational::ONE, "{guarantee}");
+        }
+    }
+}
+
+#[test]
+fn a_search_in_relative_steps_finds_the_same_in_any_unit() {
+    let settings = Settings {
+        relative: Some(Rational::new(1, 100)),
+        ..Settings::default()
+    };
+    let found = [Rational::ONE, Rational::new(1, 3600)].map(|unit| {
+        let given = Given {
+            domain: DOMAIN,
+            plan: &relay(&unit),
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        let mut oracle = Oracle::new(&task, &plan, Guarantee::Dynamic).unwrap();
+        let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+        let envelope = run.envelope.unwrap();
+        let ends = envelope.intervals().iter().flat_map(|interval| {
+            [&interval.lower, &interval.upper].map(|end| end.value().unwrap() / &unit)
+        });
+        ends.collect::<Vec<Rational>>()
+    });
+    assert_eq!(found[0], found[1]);
 }

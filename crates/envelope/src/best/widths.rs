@@ -8,10 +8,11 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
 use super::master::{Master, Solved};
 use super::{BestProof, BestRun, BestStep, Case, Reasons, Variables};
-use crate::cut::{Cut, Ground, Row};
+use crate::cut::{Cut, Ground};
 use crate::learn::Learnt;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
+use crate::row::Row;
 use crate::ray::{Ray, place};
 
 /// How closely a refused box is shrunk where nothing linear is known: halvings of each end.

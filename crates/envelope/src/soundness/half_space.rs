@@ -18,10 +18,10 @@ use elbowroom_stn::ConsistentNetwork;
 
 use super::bad_case::spread;
 use super::{Broken, Soundness};
-use crate::cut::Row;
 use crate::linear::Linear;
 use crate::obligations::{BadCase, Difference};
 use crate::reduction::Reduction;
+use crate::row::Row;
 
 /// A time as a function of the parameters: `time of a root + offset + Σ factor · parameter`.
 #[derive(Clone, Debug)]

@@ -212,6 +212,27 @@ fn inequalities(count: Range<usize>) -> impl Strategy<Value = Vec<Inequality>> {
     prop::collection::vec(inequality, count)
 }
 
+#[test]
+fn the_proof_of_an_optimum_adds_up_to_it() {
+    let mut simplex = Simplex::new();
+    let (x, y) = (simplex.add_variable(), simplex.add_variable());
+    let sum = simplex.define(&[(x, Rational::ONE), (y, Rational::ONE)]);
+    for (variable, bound, tag) in [(x, 3, 1), (y, 4, 2), (sum, 5, 3)] {
+        simplex.assert_upper(variable, Delta::from(Rational::from(bound)), tag);
+    }
+    simplex.assert_lower(y, Delta::ZERO, 4);
+    // 2x + y = (x <= 3) + (x + y <= 5)
+    let objective = [(x, Rational::from(2)), (y, Rational::ONE)];
+    let (optimum, proof) = simplex.maximize_with_proof(&objective).unwrap();
+    assert_eq!(optimum, Optimum::Value(Delta::from(Rational::from(8))));
+    assert_eq!(proof, [(1, Rational::ONE), (3, Rational::ONE)]);
+    // x - 2y = (x <= 3) + 2 (-y <= 0)
+    let objective = [(x, Rational::ONE), (y, Rational::from(-2))];
+    let (optimum, proof) = simplex.maximize_with_proof(&objective).unwrap();
+    assert_eq!(optimum, Optimum::Value(Delta::from(Rational::from(3))));
+    assert_eq!(proof, [(1, Rational::ONE), (4, Rational::from(2))]);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(600))]
 

@@ -242,7 +242,7 @@ class Problem:
                 default.
             controllable: actions whose durations the executor chooses.
             guarantee: ``"weak"``, ``"dynamic"`` or ``"strong"``.
-            method: ``"irr"``.
+            method: ``"irr"``, or ``"best"``: the box whose least deviation is greatest.
             precision: how close each end comes to its limit, in the quantity's own unit.
             growth: ``"doubling"`` or ``"constant"`` steps.
             sharpen: whether each end is moved onto its limit when the search has ended.
