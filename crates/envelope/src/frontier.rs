@@ -48,10 +48,10 @@ impl Frontier {
     pub(crate) fn new(
         plan: &ParametrizedPlan,
         precisions: Vec<Rational>,
-        scales: Option<Vec<Rational>>,
+        scales: Option<&[Rational]>,
         growth: Growth,
     ) -> Self {
-        let scale = |index: usize, parameter: &Parameter| match &scales {
+        let scale = |index: usize, parameter: &Parameter| match scales {
             Some(scales) => scales[index].clone(),
             None => parameter.nominal.abs().max(Rational::ONE),
         };

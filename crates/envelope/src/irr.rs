@@ -56,11 +56,10 @@ pub(crate) fn scales(plan: &ParametrizedPlan) -> Vec<Rational> {
     let sizes: Vec<Rational> = sizes.collect();
     let other = sizes.iter().filter(|size| !size.is_zero()).min();
     let other = other.cloned().unwrap_or(Rational::ONE);
-    let scales = sizes.iter().map(|size| match size.is_zero() {
-        true => other.clone(),
-        false => size.clone(),
-    });
-    scales.collect()
+    let scales = sizes.into_iter();
+    scales
+        .map(|size| if size.is_zero() { other.clone() } else { size })
+        .collect()
 }
 
 /// A larger box was found.
@@ -151,7 +150,7 @@ pub fn irr(
     let mut frontier = Frontier::new(
         &plan,
         settings.precisions(&plan),
-        settings.relative.is_some().then(|| scales(&plan)),
+        settings.relative.is_some().then(|| scales(&plan)).as_deref(),
         settings.growth,
     );
     let mut widenings = 0;

@@ -19,10 +19,9 @@ impl Oracle {
         self.checks += 1;
         self.remembers_accepted = false;
         self.proofs_hold_in_last = false;
-        if self.soundness.is_none() || !envelope.contains(&self.around) {
-            if self.move_to(envelope)?.is_some() {
-                return Ok(Learnt::Unknown);
-            }
+        let is_there = self.soundness.is_some() && envelope.contains(&self.around);
+        if !is_there && self.move_to(envelope)?.is_some() {
+            return Ok(Learnt::Unknown);
         }
         // What a condition says about other boxes counts where all values have a schedule.
         let learnt = self.controllability.learn(&self.plan, envelope)?;

@@ -315,9 +315,10 @@ fn ended(
                 }
                 None => number::nearest(&request.search.precision),
             };
-            let untold = match parameters.iter().any(is_untold) {
-                true => " Where no reason is given, an end could still move.",
-                false => "",
+            let untold = if parameters.iter().any(is_untold) {
+                " Where no reason is given, an end could still move."
+            } else {
+                ""
             };
             format!(
                 "The search ended at steps of {steps} (--precision); --sharpen moves each end to its \
