@@ -229,7 +229,11 @@ impl Variables {
     }
 
     /// The box in which the variables have these values.
-    pub(crate) fn envelope(&self, plan: &ParametrizedPlan, values: &[Rational]) -> DecoupledEnvelope {
+    pub(crate) fn envelope(
+        &self,
+        plan: &ParametrizedPlan,
+        values: &[Rational],
+    ) -> DecoupledEnvelope {
         let mut envelope = DecoupledEnvelope::point(&plan.nominal());
         for (ends, value) in self.ends.iter().zip(values) {
             for end in ends {
@@ -241,7 +245,11 @@ impl Variables {
     }
 
     /// A row as `Σ factor · variable <= bound`.
-    pub(crate) fn row(&self, plan: &ParametrizedPlan, row: &Row) -> (Vec<(usize, Rational)>, Rational) {
+    pub(crate) fn row(
+        &self,
+        plan: &ParametrizedPlan,
+        row: &Row,
+    ) -> (Vec<(usize, Rational)>, Rational) {
         let point = DecoupledEnvelope::point(&plan.nominal());
         let bound = &row.bound - &row.value(&point).unwrap_or_default();
         let mut factors = Vec::new();

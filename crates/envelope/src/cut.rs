@@ -114,10 +114,13 @@ impl Ends {
 
     /// That it is not negative.
     pub(crate) fn not_negative(self) -> Row {
-        let factors = self.factors.into_iter().map(|(end, factor)| match end.side {
-            Side::Lower => (end, factor),
-            Side::Upper => (end, -factor),
-        });
+        let factors = self
+            .factors
+            .into_iter()
+            .map(|(end, factor)| match end.side {
+                Side::Lower => (end, factor),
+                Side::Upper => (end, -factor),
+            });
         Row {
             factors: factors.collect(),
             bound: self.constant,

@@ -60,14 +60,12 @@ impl Frontier {
             .iter()
             .zip(precisions)
             .enumerate()
-            .map(|(index, (parameter, precision))| {
-                Progress {
-                    step: (&scale(index, parameter) * &parameter.weight).max(precision.clone()),
-                    precision,
-                    is_open: [true; 2],
-                    is_done: [false; 2],
-                    has_halved: false,
-                }
+            .map(|(index, (parameter, precision))| Progress {
+                step: (&scale(index, parameter) * &parameter.weight).max(precision.clone()),
+                precision,
+                is_open: [true; 2],
+                is_done: [false; 2],
+                has_halved: false,
             })
             .collect();
         Self {

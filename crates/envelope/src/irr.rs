@@ -150,7 +150,11 @@ pub fn irr(
     let mut frontier = Frontier::new(
         &plan,
         settings.precisions(&plan),
-        settings.relative.is_some().then(|| scales(&plan)).as_deref(),
+        settings
+            .relative
+            .is_some()
+            .then(|| scales(&plan))
+            .as_deref(),
         settings.growth,
     );
     let mut widenings = 0;

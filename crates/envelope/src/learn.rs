@@ -143,12 +143,14 @@ pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledE
                 };
                 (ends, ProofPart::Bound(origin))
             }
-            StepGround::Early(link) => {
-                (reader.link(link, Side::Lower), ProofPart::Early(network.links[link.index()]))
-            }
-            StepGround::Late(link) => {
-                (reader.link(link, Side::Upper), ProofPart::Late(network.links[link.index()]))
-            }
+            StepGround::Early(link) => (
+                reader.link(link, Side::Lower),
+                ProofPart::Early(network.links[link.index()]),
+            ),
+            StepGround::Late(link) => (
+                reader.link(link, Side::Upper),
+                ProofPart::Late(network.links[link.index()]),
+            ),
         };
         total = total.plus(&ends);
         parts.push(part);

@@ -162,7 +162,10 @@ impl Ray {
 
     /// The greatest number up to `most` that a cut leaves.
     fn left_by(&self, cut: &Cut, most: &Rational) -> Option<Rational> {
-        let left = cut.rows.iter().filter_map(|row| self.left_by_row(row, most));
+        let left = cut
+            .rows
+            .iter()
+            .filter_map(|row| self.left_by_row(row, most));
         left.max()
     }
 

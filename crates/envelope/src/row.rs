@@ -29,8 +29,7 @@ impl Row {
 
     /// Whether the row holds in a box.
     pub fn holds_in(&self, envelope: &DecoupledEnvelope) -> bool {
-        self.value(envelope).is_some_and(|value| {
-            value < self.bound || (value == self.bound && !self.is_strict)
-        })
+        self.value(envelope)
+            .is_some_and(|value| value < self.bound || (value == self.bound && !self.is_strict))
     }
 }

@@ -38,13 +38,23 @@ struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
         (self.0 >> 33) % bound
     }
 
     /// A few bounds between starts and ends, most of them satisfied at the nominal values.
     fn bounds(&mut self) -> String {
-        let points = ["one.start", "one.end", "two.start", "two.end", "three.start", "three.end"];
+        let points = [
+            "one.start",
+            "one.end",
+            "two.start",
+            "two.end",
+            "three.start",
+            "three.end",
+        ];
         let mut bounds = String::new();
         for _ in 0..1 + self.below(4) {
             let from = points[usize::try_from(self.below(6)).unwrap()];
@@ -111,7 +121,11 @@ fn is_symmetric(envelope: &DecoupledEnvelope) -> bool {
         .all(|own| own.lower.value().unwrap() + own.upper.value().unwrap() == twice)
 }
 
-fn found(oracle: &mut Oracle, objective: Objective, symmetric: bool) -> Option<(BestRun, DecoupledEnvelope)> {
+fn found(
+    oracle: &mut Oracle,
+    objective: Objective,
+    symmetric: bool,
+) -> Option<(BestRun, DecoupledEnvelope)> {
     let settings = BestSettings {
         objective,
         symmetric,
@@ -170,10 +184,16 @@ fn no_box_on_a_grid_is_better_than_the_best_one() {
                         "{guarantee} {bounds} {other:?} {wide:?}"
                     );
                     if wide.is_proved {
-                        assert!(!is_inside || !is_wider, "{guarantee} {bounds} {other:?} {wide:?}");
+                        assert!(
+                            !is_inside || !is_wider,
+                            "{guarantee} {bounds} {other:?} {wide:?}"
+                        );
                     }
                     if fair.is_proved {
-                        assert!(!is_inside || !is_fairer, "{guarantee} {bounds} {other:?} {fair:?}");
+                        assert!(
+                            !is_inside || !is_fairer,
+                            "{guarantee} {bounds} {other:?} {fair:?}"
+                        );
                     }
                 }
             }

@@ -77,7 +77,12 @@ fn a_network_that_a_refutation_still_fits_is_not_controllable() {
         assert!(refutes(&refutation, &network), "{network:?} {refutation:?}");
         refuted += 1;
         let is_wait = |part: &Part| matches!(part, Part::Way(way) if way.unlabelled.is_some());
-        waits += usize::from(refutation.cycle.iter().any(|way| way.parts.iter().any(is_wait)));
+        waits += usize::from(
+            refutation
+                .cycle
+                .iter()
+                .any(|way| way.parts.iter().any(is_wait)),
+        );
         for _ in 0..10 {
             let other = changed(&network, &mut random);
             if refutes(&refutation, &other) {

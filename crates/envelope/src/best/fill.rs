@@ -70,7 +70,11 @@ pub(super) fn fill(
         stopped.as_ref().map_or(&level, |(slack, _)| slack).clone()
     };
     let slacks: Vec<Rational> = fill.stopped.iter().map(slack).collect();
-    let values: Vec<Rational> = slacks.iter().zip(&variables.scales).map(|(s, w)| s * w).collect();
+    let values: Vec<Rational> = slacks
+        .iter()
+        .zip(&variables.scales)
+        .map(|(s, w)| s * w)
+        .collect();
     let value = slacks.iter().min().cloned().unwrap_or_default();
     let levels = fill.order.iter().map(|&variable| Stopped {
         ends: variables.ends[variable].clone(),
@@ -119,15 +123,21 @@ impl Fill<'_> {
             }
         }
         let (plan, on_step, is_cancelled) = (self.plan, &mut *self.on_step, &mut self.is_cancelled);
-        ray.shoot(self.oracle, level, &most, &mut self.cuts, &mut |oracle, inside| {
-            let envelope: DecoupledEnvelope = ray.at(plan, inside);
-            let flow = on_step(&BestStep {
-                envelope: &envelope,
-                checks: oracle.checks(),
-            });
-            *is_cancelled |= flow.is_break();
-            flow
-        })
+        ray.shoot(
+            self.oracle,
+            level,
+            &most,
+            &mut self.cuts,
+            &mut |oracle, inside| {
+                let envelope: DecoupledEnvelope = ray.at(plan, inside);
+                let flow = on_step(&BestStep {
+                    envelope: &envelope,
+                    checks: oracle.checks(),
+                });
+                *is_cancelled |= flow.is_break();
+                flow
+            },
+        )
     }
 
     /// Stops the variables that cannot grow beyond the level; whether there are any.

@@ -116,7 +116,9 @@ impl Master {
 
     fn optimum(&mut self) -> Solved {
         let named = |sources: &[Source], proof: Vec<(usize, Rational)>| {
-            let named = proof.into_iter().map(|(tag, factor)| (sources[tag], factor));
+            let named = proof
+                .into_iter()
+                .map(|(tag, factor)| (sources[tag], factor));
             named.collect()
         };
         match self.simplex.maximize_with_proof(&self.objective) {

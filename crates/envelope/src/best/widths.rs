@@ -12,8 +12,8 @@ use crate::cut::{Cut, Ground};
 use crate::learn::Learnt;
 use crate::obligations::Refusal;
 use crate::oracle::Oracle;
-use crate::row::Row;
 use crate::ray::{Ray, place};
+use crate::row::Row;
 
 /// How closely a refused box is shrunk where nothing linear is known: halvings of each end.
 const HALVINGS: usize = 16;
@@ -228,9 +228,13 @@ impl Search<'_> {
     fn split(&mut self, at: usize) -> bool {
         let leaf = &self.leaves[at];
         let candidate = self.variables.envelope(self.plan, &leaf.values);
-        let is_broken = |cut: &Cut| cut.rows.len() > 1 && cut.rows.iter().all(|row| {
-            row.value(&candidate).is_none_or(|value| value > row.bound)
-        });
+        let is_broken = |cut: &Cut| {
+            cut.rows.len() > 1
+                && cut
+                    .rows
+                    .iter()
+                    .all(|row| row.value(&candidate).is_none_or(|value| value > row.bound))
+        };
         let Some(cut) = self.cuts.iter().position(is_broken) else {
             return false;
         };
@@ -257,7 +261,10 @@ impl Search<'_> {
     /// Whether the master has taken the cut into account: it holds but for being strict.
     fn is_known(&self, cut: &Cut, values: &[Rational]) -> bool {
         let candidate = self.variables.envelope(self.plan, values);
-        let holds = |row: &Row| row.value(&candidate).is_some_and(|value| value <= row.bound);
+        let holds = |row: &Row| {
+            row.value(&candidate)
+                .is_some_and(|value| value <= row.bound)
+        };
         cut.rows.iter().any(holds)
     }
 

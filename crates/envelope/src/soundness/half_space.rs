@@ -11,9 +11,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use elbowroom_num::{Delta, Interval, Rational};
-use elbowroom_plan::{
-    BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side,
-};
+use elbowroom_plan::{BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side};
 use elbowroom_stn::ConsistentNetwork;
 
 use super::bad_case::spread;
@@ -100,9 +98,16 @@ impl Soundness {
         };
         // Just before the event all that comes before it has happened, just after it the same.
         [true, false].into_iter().any(|is_before| {
-            case.differences
-                .iter()
-                .all(|difference| entails(&self.reduction, &network, difference, moment, event, is_before))
+            case.differences.iter().all(|difference| {
+                entails(
+                    &self.reduction,
+                    &network,
+                    difference,
+                    moment,
+                    event,
+                    is_before,
+                )
+            })
         })
     }
 }
@@ -183,7 +188,9 @@ fn half_space(
         }
     });
     let zero = places.first()?.root;
-    let is_function = roots.iter().all(|(&root, sum)| root == zero || sum.is_zero());
+    let is_function = roots
+        .iter()
+        .all(|(&root, sum)| root == zero || sum.is_zero());
     if !is_placed || !is_function {
         return None;
     }
@@ -208,7 +215,8 @@ fn half_space(
 /// lead; the first class has time zero.
 fn places(reduction: &Reduction) -> Vec<Place> {
     let count = reduction.class_count();
-    let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> = vec![Vec::new(); count];
+    let mut neighbours: Vec<Vec<(usize, ParameterId, Rational, Rational)>> =
+        vec![Vec::new(); count];
     for (&parameter, &(from, to)) in &reduction.substitution {
         let (from, from_offset) = reduction.place(from);
         let (to, to_offset) = reduction.place(to);
@@ -230,7 +238,9 @@ fn places(reduction: &Reduction) -> Vec<Place> {
         });
         let mut queue = VecDeque::from([root]);
         while let Some(class) = queue.pop_front() {
-            let Some(here) = places[class].clone() else { continue };
+            let Some(here) = places[class].clone() else {
+                continue;
+            };
             for (next, parameter, sign, offset) in &neighbours[class] {
                 if places[*next].is_none() {
                     let mut place = here.clone();
@@ -244,4 +254,3 @@ fn places(reduction: &Reduction) -> Vec<Place> {
     }
     places.into_iter().flatten().collect()
 }
-

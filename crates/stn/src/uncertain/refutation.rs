@@ -130,4 +130,3 @@ fn label<W: Weight>(graph: &Graph<W>, way: WayId) -> Option<LinkId> {
         Kind::Plain | Kind::Lower(_) => None,
     }
 }
-

@@ -5,16 +5,16 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    Balance, Best, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Failing, Foresight, Makespans,
-    QuantityKind, Range, Room, Stop,
+    Balance, Best, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
+    Failing, Foresight, Makespans, QuantityKind, Range, Room, Stop,
 };
 
 use elbowroom::envelope::Objective;
 use elbowroom::num::Rational;
 
+use crate::args::Order;
 use crate::limits::{self, push_paragraph, push_wrapped};
 use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
-use crate::args::Order;
 use crate::number::{self, Rounding};
 use crate::table::{self, Row};
 use crate::words::counted;
@@ -176,7 +176,11 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
     } else {
         ("be", "more", "less")
     };
-    let all = if parameters.len() == 1 { "It" } else { "All of it" };
+    let all = if parameters.len() == 1 {
+        "It"
+    } else {
+        "All of it"
+    };
     let way = |deviation: &Deviation, which: &str| {
         let share = &deviation.share * &Rational::from(100);
         let digits = u32::from(share < Rational::from(10));
@@ -189,7 +193,11 @@ fn headline(balance: &Balance, parameters: &[Room]) -> String {
             None => format!("more than {percent} % {which}"),
         }
     };
-    let at_once = if parameters.len() == 1 { "" } else { " at once" };
+    let at_once = if parameters.len() == 1 {
+        ""
+    } else {
+        " at once"
+    };
     let mut line = format!(
         "{all} may {subject} {}{at_once}, or {}",
         way(&balance.more, more),
@@ -367,9 +375,9 @@ fn goodness(best: &Best) -> String {
             "The {what} is {value}, {counted}. No box has more than {}",
             number(&best.bound)
         ),
-        (false, _) => format!(
-            "The {what} is {value}, {counted}. No box has more, but other ends could have"
-        ),
+        (false, _) => {
+            format!("The {what} is {value}, {counted}. No box has more, but other ends could have")
+        }
     }
 }
 

@@ -56,7 +56,11 @@ pub struct EnvelopeSettings {
     #[serde(with = "exact")]
     pub precision: Rational,
     /// If there is one, the precision of each parameter was this share of its nominal value instead.
-    #[serde(with = "exact::option", default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        with = "exact::option",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
     pub relative_precision: Option<Rational>,
     /// The least separation of interfering happenings (ε).
     #[serde(with = "exact")]
