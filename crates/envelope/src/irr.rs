@@ -90,6 +90,12 @@ pub enum StopReason {
 /// The number of boxes that may be undecided before a search ends: each took long.
 const MOST_UNDECIDED: usize = 4;
 
+/// How far out an end is moved at most that could go on for ever without being infinite: a thousand
+/// million times the nominal value, or 1.
+pub(crate) fn farthest(parameter: &Parameter) -> Rational {
+    &Rational::from(1_000_000_000) * &parameter.nominal.abs().max(Rational::ONE)
+}
+
 /// The reason why one end of the final box cannot move.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Limit {
@@ -180,7 +186,12 @@ pub fn irr(
         };
         let flow = if told(widen(oracle, &envelope, range, end, &step)) {
             frontier.accept(end);
-            if matches!(end.side.of(range), End::Infinite) && told(oracle.try_reach(end, None)) {
+            let is_endless =
+                matches!(end.side.of(range), End::Infinite) && told(oracle.try_reach(end, None));
+            // Of a fixed schedule, any limit on a duration may be asked, but not none.
+            let reach = oracle.accepted().and_then(|accepted| end.reach(accepted));
+            let farthest = farthest(plan.parameter(end.parameter));
+            if is_endless || reach.is_some_and(|reach| reach > farthest) {
                 frontier.finish(end);
             }
             if let Some(accepted) = oracle.accepted() {

@@ -6,6 +6,7 @@ use crate::obligations::Refusal;
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 
+use crate::irr::farthest;
 use crate::oracle::Oracle;
 
 /// What may be left between an end and its limit where the limit is not found exactly: 10⁻¹².
@@ -58,6 +59,7 @@ fn push(
     if border.as_ref() == Some(&inside) {
         return ControlFlow::Continue(());
     }
+    let farthest = farthest(oracle.plan().parameter(end.parameter));
     // Of where nothing can be told, the end stays away.
     let mut accepts = |reach| oracle.try_reach(end, reach).unwrap_or(false);
     if accepts(border.clone()) {
@@ -69,6 +71,9 @@ fn push(
         // Something stops it: go out until there.
         let mut step = Rational::ONE;
         loop {
+            if inside > farthest {
+                return ControlFlow::Continue(());
+            }
             let farther = &inside + &step;
             if !accepts(Some(farther.clone())) {
                 break farther;
