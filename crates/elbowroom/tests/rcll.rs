@@ -71,7 +71,11 @@ fn deadline(task: &Task) -> Rational {
 fn upper_limit(case: &Case, parameter: usize) -> String {
     let [_, sharp] = case.found("1");
     let mut oracle = case.oracle();
-    let all = limits(&mut oracle, &sharp, &vec![Rational::ONE; sharp.intervals().len()]);
+    let all = limits(
+        &mut oracle,
+        &sharp,
+        &vec![Rational::ONE; sharp.intervals().len()],
+    );
     let limit: &Limit = all[parameter][1].as_ref().expect("something limits it");
     Explainer::new(&case.task, &case.plan)
         .limit(ParameterId::from(parameter), Side::Upper, limit)
