@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,21 @@ def test_a_job_of_the_script_makes_its_part(
             elbowroom.compare(TABLE, trials=4, shards=2, engine="slurm", folder=folder)
         done = elbowroom.compare(TABLE, trials=4, shards=2, engine="slurm", folder=folder)
     assert done.results == whole.results
+
+
+def _has_idle_node() -> bool:
+    if shutil.which("sbatch") is None or shutil.which("sinfo") is None:
+        return False
+    found = subprocess.run(
+        ["sinfo", "--noheader", "--states=idle"], capture_output=True, text=True, check=False
+    )
+    return found.returncode == 0 and bool(found.stdout.strip())
+
+
+@pytest.mark.skipif(not _has_idle_node(), reason="there is no Slurm here with an idle node")
+def test_slurm_itself_makes_the_parts(whole: elbowroom.Comparison, tmp_path: Path) -> None:
+    made = elbowroom.compare(TABLE, trials=4, shards=3, engine="slurm", folder=tmp_path)
+    assert made.results == whole.results
 
 
 def test_results_are_tables(whole: elbowroom.Comparison, tmp_path: Path) -> None:
