@@ -1,4 +1,4 @@
-"""Measures what docs/python.md claims: measure.py [up|world|ray]."""
+"""Measures what docs/python.md claims: measure.py [up|world]."""
 
 from __future__ import annotations
 
@@ -107,29 +107,5 @@ def world(events: int = 100_000) -> None:
     print(f"{run.verdict} at {run.time}: {events} events in {took:.1f} s, {memory:.0f} MB at most")
 
 
-def with_ray(trials: int = 500, file: str = "experiments/table1.toml") -> None:
-    """An experiment on a Ray cluster of three nodes, one of which is removed on the way."""
-    import threading
-
-    import ray
-    from ray.cluster_utils import Cluster
-
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-    nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
-    ray.init(address=cluster.address, log_to_driver=False)
-    whole = elbowroom.compare(file, trials=trials)
-    runs = sum(row.runs for row in whole.rows())
-    heard: list[Any] = []
-
-    def progress(told: Any) -> None:
-        heard.append(told)
-        if len(heard) == 2:
-            threading.Thread(target=cluster.remove_node, args=(nodes[0], False)).start()
-
-    parts = elbowroom.compare(file, trials=trials, engine="ray", shards=8, progress=progress)
-    same = parts.results == whole.results
-    print(f"{runs} runs, 8 parts, one of 3 nodes killed: byte-identical: {same}")
-
-
 if __name__ == "__main__":
-    {"up": compare_with_unified_planning, "world": world, "ray": with_ray}[sys.argv[1]]()
+    {"up": compare_with_unified_planning, "world": world}[sys.argv[1]]()
