@@ -5,6 +5,7 @@ mod envelope;
 mod learn;
 mod network;
 mod number;
+mod odds;
 mod plan;
 mod run;
 
@@ -20,6 +21,7 @@ pub(crate) use envelope::{EnvelopeArgs, Growth, Method, Order, controllable};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
+pub(crate) use odds::OddsArgs;
 pub(crate) use plan::{EMBEDDED, PlanArgs};
 pub(crate) use run::{RunArgs, RunningChoice};
 
@@ -99,6 +101,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Learn from logs how long actions take and how often they fail
     Learn(LearnArgs),
+    /// Say how likely a plan is to succeed, where that is lost, and what would help
+    Odds(Box<OddsArgs>),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
     /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
@@ -122,6 +126,7 @@ impl Command {
             Self::Run(arguments) => arguments.json,
             Self::Compare(arguments) => arguments.json,
             Self::Learn(arguments) => arguments.json,
+            Self::Odds(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
             Self::Val(_) | Self::Report(_) | Self::Completions(_) | Self::Man(_) => false,
         }

@@ -5,6 +5,7 @@ pub(crate) mod compare;
 pub(crate) mod envelope;
 pub(crate) mod learn;
 pub(crate) mod network;
+pub(crate) mod odds;
 pub(crate) mod plan;
 pub(crate) mod report;
 pub(crate) mod run;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use elbowroom::PlanKind;
 use elbowroom::model::validate::Violation;
-use elbowroom::model::{Problem, Task};
+use elbowroom::model::{Problem, Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::pddl::{self, Diagnostic, Diagnostics, Source};
 use elbowroom::plan::format;
@@ -58,6 +58,21 @@ pub(crate) fn any_plan(task: &Task, path: &Path, output: &mut Output) -> Result<
     }
     let plan = with_warnings(pddl::read_plan(&text, task), output)?;
     Ok(AnyPlan::TimeTriggered(plan))
+}
+
+/// Reads a plan with fixed times.
+pub(crate) fn time_triggered(
+    task: &Task,
+    path: &Path,
+    output: &mut Output,
+) -> Result<TimeTriggeredPlan, Failure> {
+    match any_plan(task, path, output)? {
+        AnyPlan::TimeTriggered(plan) => Ok(plan),
+        AnyPlan::Stn(_) => Err(Failure::new(
+            format!("{} is an STN plan file", path.display()),
+            "give a plan with fixed times; its network is made from it",
+        )),
+    }
 }
 
 /// Says on standard error that not the plan's own times are taken, but valid ones close to them.

@@ -42,6 +42,7 @@ fn main() -> ExitCode {
         Command::Envelope(arguments) => commands::envelope::run(&arguments, &mut output),
         Command::Compare(arguments) => commands::compare::run(&arguments, &mut output),
         Command::Learn(arguments) => commands::learn::run(&arguments, &mut output),
+        Command::Odds(arguments) => commands::odds::run(&arguments, &mut output),
         Command::Network(arguments) => commands::network::run(&arguments, &mut output),
         Command::Val(arguments) => commands::val::run(&arguments, &mut output),
         Command::Report(arguments) => commands::report::run(&arguments),

@@ -15,11 +15,13 @@
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
 //! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
 //! | what do logs say about the world? | [`LearnRequest`] | [`LearnAnswer`] |
+//! | how likely is a plan to succeed? | [`OddsRequest`] | [`OddsAnswer`] |
 
 pub mod check;
 pub mod envelope;
 mod format;
 pub mod learn;
+pub mod odds;
 pub mod plan;
 pub mod run;
 pub mod stn;
@@ -31,6 +33,7 @@ pub use elbowroom_report::exact::{self, Exact};
 pub use envelope::{EnvelopeAnswer, EnvelopeOutcome, EnvelopeRequest};
 pub use format::Version;
 pub use learn::{LearnAnswer, LearnRequest};
+pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};

@@ -18,6 +18,8 @@ mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
 pub use execution::{Execution, execute};
+pub(crate) use facts_only::as_timed;
+pub(crate) use spec::listed;
 pub use external::External;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};

@@ -8,6 +8,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, NodeId};
 
 use crate::belief::Belief;
+use crate::likelihoods::Likelihoods;
 
 /// The state from which an order is searched for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +40,15 @@ impl Circumstances {
     /// The beginning: time 0, nothing running, everything known.
     pub fn initial(task: &Task) -> Self {
         Self::observed(Rational::ZERO, task.initial())
+    }
+
+    /// The beginning, where initial facts are as likely as the likelihoods say.
+    pub fn believed(task: &Task, likelihoods: &Likelihoods) -> Self {
+        let mut initial = Self::initial(task);
+        for (fact, probability) in likelihoods.believed(task) {
+            initial.belief.set(fact, probability);
+        }
+        initial
     }
 
     /// Everything is known, and nothing is running.

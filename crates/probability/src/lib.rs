@@ -9,7 +9,9 @@
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
-//! 6. [`optimum`]: the best that any executor can reach in a small world, and its [`optimum::Table`].
+//! 6. [`account`]: where an order's probability is lost, and what certainty and retrying would gain;
+//!    [`search::Lattice`]: all orders of a short plan at once.
+//! 7. [`optimum`]: the best that any executor can reach in a small world, and its [`optimum::Table`].
 //!
 //! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws
 //! random numbers or looks at a clock: time limits come in as callbacks, and the same input gives
@@ -59,6 +61,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod account;
 mod actions;
 mod belief;
 mod circumstances;
@@ -76,6 +79,6 @@ pub use circumstances::{Circumstances, Running};
 pub use dispatch::{Choice, LayerDispatch, NextHappening, Reconsider};
 pub use likelihoods::{Flip, Likelihoods};
 pub use model::{Model, Semantics};
-pub use network::{PrunedNetwork, TooCoupled};
+pub use network::{Loss, LossCause, PrunedNetwork, Reading, TooCoupled};
 pub use search::{Candidates, Found, OrderSearch, SearchSettings, SearchStop};
 pub use total_order::{Layer, Slot, TotalOrderPlan};

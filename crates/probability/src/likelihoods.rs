@@ -116,6 +116,17 @@ impl Likelihoods {
         }
     }
 
+    /// The facts of which it is said how likely they hold at the beginning, and how likely.
+    ///
+    /// A fact that neither an action nor the goal mentions has no number in the task, and does not
+    /// matter.
+    pub fn believed(&self, task: &Task) -> Vec<(FactId, f64)> {
+        let known = self.beliefs.iter().filter_map(|((predicate, arguments), p)| {
+            Some((task.find_fact(*predicate, arguments)?, *p))
+        });
+        known.collect()
+    }
+
     /// The probabilities of a spontaneous change of a fact.
     ///
     /// # Errors

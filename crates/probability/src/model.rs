@@ -9,7 +9,7 @@ mod requirement;
 
 use std::sync::Arc;
 
-use elbowroom_model::Task;
+use elbowroom_model::{Step, Task};
 use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -125,6 +125,13 @@ impl Model {
         self.facts.iter().copied().take_while(|&fact| is_fact(fact))
     }
 
+    /// Whether a happening has an effect on a fact.
+    pub fn has_effect_on(&self, node: NodeId, fact: FactId) -> bool {
+        let effects = &self.event(node).effects;
+        let position = self.position(fact);
+        effects.iter().any(|effect| Some(effect.fact) == position)
+    }
+
     pub(crate) fn event(&self, node: NodeId) -> &Event {
         &self.events[node.index()]
     }
@@ -151,6 +158,26 @@ impl Model {
     fn node_where(&self, is_it: impl Fn(Node) -> bool) -> NodeId {
         let index = self.plan.nodes.iter().position(|&node| is_it(node));
         NodeId::from(index.expect("every instance has its nodes"))
+    }
+
+    /// The plan's happenings as they are timed; ends before what begins at the same time. `steps` are
+    /// in the order of the plan's instances.
+    pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+        let timed = self.task.timed();
+        let nodes = self.plan.nodes.iter().enumerate();
+        let mut happenings: Vec<_> = nodes
+            .filter_map(|(index, node)| {
+                let (time, rank) = match *node {
+                    Node::Zero => return None,
+                    Node::End(id) => (steps[id.index()].end(), 0),
+                    Node::Timed(index) => (timed[index].time.clone(), 1),
+                    Node::Start(id) | Node::Instant(id) => (steps[id.index()].start.clone(), 2),
+                };
+                Some((time, rank, NodeId::from(index)))
+            })
+            .collect();
+        happenings.sort();
+        happenings.into_iter().map(|(.., node)| node).collect()
     }
 
     /// The happening in words.

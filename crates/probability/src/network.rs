@@ -2,6 +2,7 @@
 
 mod cluster;
 mod facts;
+mod ledger;
 mod numbers;
 mod outcome;
 
@@ -13,6 +14,8 @@ use crate::circumstances::Circumstances;
 use crate::model::{Event, Model, Requirement};
 use facts::Facts;
 pub(crate) use facts::Snapshot;
+use ledger::Ledger;
+pub use ledger::{Loss, LossCause, Reading};
 pub(crate) use numbers::Number;
 use numbers::Numbers;
 use outcome::{Outcome, Pending};
@@ -53,6 +56,7 @@ pub struct PrunedNetwork<'m> {
     sequence: Vec<NodeId>,
     marks: Vec<Mark>,
     undo: Vec<Undo>,
+    ledger: Ledger,
 }
 
 /// The state that [`PrunedNetwork::pop`] restores.
@@ -77,6 +81,14 @@ impl<'m> PrunedNetwork<'m> {
     /// # Errors
     /// When what is required of actions under way couples too many facts.
     pub fn new(model: &'m Model, circumstances: &Circumstances) -> Result<Self, TooCoupled> {
+        Self::with(model, circumstances, Ledger::default())
+    }
+
+    fn with(
+        model: &'m Model,
+        circumstances: &Circumstances,
+        ledger: Ledger,
+    ) -> Result<Self, TooCoupled> {
         let mut network = Self {
             model,
             facts: Facts::new(model, &circumstances.belief),
@@ -88,6 +100,7 @@ impl<'m> PrunedNetwork<'m> {
             sequence: Vec::new(),
             marks: Vec::new(),
             undo: Vec::new(),
+            ledger,
         };
         for running in &circumstances.running {
             let event = model.event(model.start(running.instance));
@@ -144,10 +157,28 @@ impl<'m> PrunedNetwork<'m> {
     pub fn success_probability(&mut self) -> Result<f64, TooCoupled> {
         let before = self.mark();
         let model = self.model;
-        let required = self.require(&model.goal, NodeId::ZERO);
+        let required = self.require(&model.goal, NodeId::ZERO, Reading::Goal);
         let probability = self.probability;
         self.go_back_to(before);
         required.map(|()| probability)
+    }
+
+    /// Where an order's probability is lost, in the order of its happenings, and with respect to the
+    /// goal at last. The masses and P(A ∩ G) add up to 1.
+    ///
+    /// # Errors
+    /// When a condition couples too many facts.
+    pub fn losses(
+        model: &'m Model,
+        circumstances: &Circumstances,
+        sequence: &[NodeId],
+    ) -> Result<Vec<Loss>, TooCoupled> {
+        let mut network = Self::with(model, circumstances, Ledger::kept())?;
+        for &node in sequence {
+            network.push(node)?;
+        }
+        network.require(&model.goal, NodeId::ZERO, Reading::Goal)?;
+        Ok(network.ledger.close())
     }
 
     /// The number of numeric conditions that were taken for granted, because they read numbers that
@@ -192,6 +223,22 @@ impl<'m> PrunedNetwork<'m> {
         Ok(self.probability)
     }
 
+    /// Adds an attempt to start an action that fails, though it could succeed: facts change by
+    /// themselves, and the attempt can be made again. Returns how likely all that is.
+    ///
+    /// It cannot be taken back.
+    ///
+    /// # Errors
+    /// When its condition couples too many facts.
+    pub(crate) fn fail(&mut self, node: NodeId) -> Result<f64, TooCoupled> {
+        let event = self.model.event(node);
+        self.require(&event.condition, node, Reading::OnArrival)?;
+        self.probability *= 1.0 - event.success;
+        self.facts.apply(self.model, &[], true);
+        self.require_throughout(node)?;
+        Ok(self.probability)
+    }
+
     /// Takes the last happening back.
     pub fn pop(&mut self) {
         if let Some(mark) = self.marks.pop() {
@@ -203,8 +250,8 @@ impl<'m> PrunedNetwork<'m> {
     fn try_push(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         let event = model.event(node);
-        self.require(&event.condition, node)?;
-        self.probability *= event.success;
+        self.require(&event.condition, node, Reading::OnArrival)?;
+        self.multiply(event.success, (node, Reading::OnArrival), || LossCause::Start);
         let updates = self.updates(node, event);
         self.facts_change(node, event)?;
         for (fluent, number) in updates {
@@ -226,12 +273,30 @@ impl<'m> PrunedNetwork<'m> {
         self.require_throughout(node)
     }
 
+    /// So much is left of the probability.
+    fn multiply(
+        &mut self,
+        mass: f64,
+        (node, reading): (NodeId, Reading),
+        cause: impl FnOnce() -> LossCause,
+    ) {
+        let before = self.probability;
+        self.probability *= mass;
+        let position = match reading {
+            Reading::Goal => self.sequence.len().checked_sub(1),
+            _ => (node != NodeId::ZERO).then_some(self.sequence.len()),
+        };
+        let masses = (before, self.probability);
+        self.ledger.note(position, reading, masses, cause);
+    }
+
     /// What is required throughout the actions under way, in the present layer.
     fn require_throughout(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         for place in 0..self.running.len() {
-            let start = model.event(model.start(self.running[place]));
-            self.require(&start.over_all, node)?;
+            let id = self.running[place];
+            let start = model.event(model.start(id));
+            self.require(&start.over_all, node, Reading::Throughout(id))?;
             for (memory, condition) in &start.watches {
                 let forget = Outcome {
                     fact: *memory,
@@ -254,15 +319,24 @@ impl<'m> PrunedNetwork<'m> {
     }
 
     /// Conditions on a requirement in the present layer.
-    fn require(&mut self, requirement: &Requirement, node: NodeId) -> Result<(), TooCoupled> {
+    fn require(
+        &mut self,
+        requirement: &Requirement,
+        node: NodeId,
+        reading: Reading,
+    ) -> Result<(), TooCoupled> {
         let model = self.model;
         for &(fact, truth) in &requirement.literals {
-            self.probability *= self.facts.require(model, fact, truth);
+            let mass = self.facts.require(model, fact, truth);
+            let fact = model.facts[fact];
+            self.multiply(mass, (node, reading), || LossCause::Fact { fact, truth });
         }
         for condition in &requirement.numeric {
             match self.truth(condition) {
                 Some(true) => {}
-                Some(false) => self.probability = 0.0,
+                Some(false) => {
+                    self.multiply(0.0, (node, reading), || LossCause::Condition(condition.clone()));
+                }
                 None => self.assumed += 1,
             }
         }
@@ -274,7 +348,9 @@ impl<'m> PrunedNetwork<'m> {
                     .require_coupled(model, &coupled.condition, &coupled.facts, &value);
             match required {
                 Ok((mass, rests_on_time)) => {
-                    self.probability *= mass;
+                    self.multiply(mass, (node, reading), || {
+                        LossCause::Condition(coupled.condition.clone())
+                    });
                     self.assumed += usize::from(rests_on_time);
                 }
                 Err(count) => return Err(self.too_coupled(node, count)),

@@ -36,7 +36,7 @@ use crate::dispatch::{Choice, NextHappening, goal_holds};
 use crate::total_order::Slot;
 
 pub use process::Perturbed;
-pub use small_world::Table;
+pub use small_world::{Table, best_value};
 
 /// The number of steps of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -18,6 +18,7 @@ mod assignment;
 mod bound;
 mod cache;
 mod chain;
+mod lattice;
 mod memo;
 mod nominal;
 mod room;
@@ -29,6 +30,7 @@ mod timing;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use elbowroom_model::Step;
 use elbowroom_plan::{Node, NodeId};
 
 use crate::circumstances::Circumstances;
@@ -37,6 +39,7 @@ use crate::network::{PrunedNetwork, TooCoupled};
 use crate::total_order::{Slot, TotalOrderPlan};
 use bound::Bounds;
 use cache::Cache;
+pub use lattice::{Lattice, LatticeEdge, LatticeLimits, LatticeNode, TooLarge};
 use nominal::Nominal;
 use room::Rooms;
 use run::Run;
@@ -152,6 +155,18 @@ impl OrderSearch {
     /// Its settings.
     pub fn settings(&self) -> &SearchSettings {
         &self.settings
+    }
+
+    /// A plan's happenings as they are timed, as an order: without the timed initials that do not
+    /// matter, or come after all actions. `steps` are in the order of the plan's instances.
+    pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
+        let is_timed = |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
+        let matters = |node: NodeId| self.separations.timed.iter().any(|(own, _)| *own == node);
+        let mut order = self.model.as_timed(steps);
+        order.retain(|&node| !is_timed(node) || matters(node));
+        let last = order.iter().rposition(|&node| !is_timed(node));
+        order.truncate(last.map_or(0, |last| last + 1));
+        order
     }
 
     /// The order most likely to succeed from here.

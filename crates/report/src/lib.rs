@@ -9,6 +9,7 @@
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
 //! - `plot`: plots as SVG, with the feature `plots`.
 //! - [`short`]: exact numbers as short decimals.
+//! - [`lattice`]: a picture of the orders of a plan, as SVG.
 //!
 //! ```
 //! use elbowroom_report::table::Table;
@@ -24,6 +25,7 @@
 //! ```
 
 pub mod exact;
+pub mod lattice;
 pub mod line;
 #[cfg(feature = "plots")]
 pub mod plot;

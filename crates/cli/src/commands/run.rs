@@ -22,7 +22,7 @@ use elbowroom::sim::WorldModel;
 use crate::args::RunArgs;
 use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
-use crate::input::{self, AnyPlan};
+use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let (spec, world) = spec::of(arguments, domain, problem)?;
     let task = task(&spec, output)?;
     let first = match arguments.plan() {
-        Some(path) => Some(time_triggered(&task, path, output)?),
+        Some(path) => Some(input::time_triggered(&task, path, output)?),
         None => None,
     };
     // What is wrong with a file is told before anything is done.
@@ -155,20 +155,6 @@ impl Job<'_> {
             })
             .recorded_by(recorder);
         execute(request, &mut world, &mut Stopwatch::start(self.interrupt))
-    }
-}
-
-fn time_triggered(
-    task: &Task,
-    path: &std::path::Path,
-    output: &mut Output,
-) -> Result<TimeTriggeredPlan, Failure> {
-    match input::any_plan(task, path, output)? {
-        AnyPlan::TimeTriggered(plan) => Ok(plan),
-        AnyPlan::Stn(_) => Err(Failure::new(
-            format!("{} is an STN plan file", path.display()),
-            "give a plan with fixed times; its network is made from it",
-        )),
     }
 }
 

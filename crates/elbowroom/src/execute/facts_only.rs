@@ -50,7 +50,7 @@ fn taken_as(condition: &Condition, truth: bool) -> Condition {
 
 /// The plan with each planned duration in place of `?duration`: numbers that depend on how long
 /// something takes are followed as if all went as planned.
-pub(super) fn as_timed(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
+pub(crate) fn as_timed(plan: &TimeTriggeredPlan) -> TimeTriggeredPlan {
     TimeTriggeredPlan {
         steps: plan.steps.iter().map(timed).collect(),
     }

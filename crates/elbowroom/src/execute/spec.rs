@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Embedded;
 use crate::flow;
-use text_form::{as_text, listed, positive, required};
+pub(crate) use text_form::listed;
+use text_form::{as_text, positive, required};
 
 pub use wiring::{SpecError, SpoilerError};
 

@@ -8,7 +8,7 @@ use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Instance, PartialOrderPlan};
 
-use super::{Optimum, Perturbed, Settings};
+use super::{NotSmall, Optimum, Perturbed, Settings};
 use crate::actions::all_actions;
 use crate::circumstances::Circumstances;
 use crate::dispatch::Choice;
@@ -95,6 +95,37 @@ impl Table {
             })
         })
     }
+}
+
+/// How likely the best of all agents is to reach the goal that has these actions, may try them as
+/// often as it likes, and sees the state as it is; where no way leads to the goal even if nothing goes
+/// wrong, it has lost. At most three actions are under way at once, and what runs without what it needs
+/// throughout breaks off.
+///
+/// # Errors
+/// When the world is not small, or has more in it than facts.
+pub fn best_value(
+    task: &Task,
+    actions: Vec<Action>,
+    likelihoods: &Likelihoods,
+    circumstances: &Circumstances,
+) -> Result<f64, NotSmall> {
+    let plan = PartialOrderPlan::unordered(task, actions);
+    let model = Model::new(task.clone(), plan, likelihoods, Semantics::World);
+    let model = model.map_err(|missing| NotSmall::Unsupported {
+        what: missing.to_string(),
+    })?;
+    let (facts, actions) = (model.facts().count(), model.plan().instances.len());
+    if facts > MOST_FACTS || actions > 20 || sets(actions) << facts > MOST_STATES {
+        return Err(NotSmall::TooManyStates { facts, actions });
+    }
+    let settings = Settings {
+        most_running: MOST_RUNNING,
+        enforces_over_all: true,
+        ..Settings::default()
+    };
+    let process = Perturbed::new(model, settings)?;
+    Ok(process.optimum().value(&process, circumstances))
 }
 
 /// Nothing comes about by itself. A table takes whatever is done for a chance of that, and where

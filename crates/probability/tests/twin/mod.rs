@@ -141,6 +141,25 @@ impl<'a> Worlds<'a> {
         self.look_throughout();
     }
 
+    /// A start that could succeed, and does not; it is not pushed.
+    pub(crate) fn fail(&mut self, node: NodeId) {
+        let (Node::Instant(id) | Node::Start(id)) = self.plan.nodes[node.index()] else {
+            panic!("only starts fail");
+        };
+        let action = &self.plan.instance(id).action;
+        let failure = 1.0 - self.likelihoods.start(action).unwrap();
+        let snap = match &action.body {
+            Body::Instantaneous(snap) => snap.clone(),
+            Body::Durative(body) => body.start.clone(),
+        };
+        let nothing = SnapAction {
+            condition: snap.condition,
+            effects: Vec::new(),
+        };
+        self.do_snap(id, &nothing, failure, &[]);
+        self.look_throughout();
+    }
+
     fn do_snap(&mut self, id: InstanceId, snap: &SnapAction, success: f64, to_come: &[Effect]) {
         let arrived = std::mem::take(&mut self.possible);
         let mut after = BTreeMap::new();

@@ -6,6 +6,26 @@ use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
 use super::Worlds;
 use super::random::Case;
 
+/// All orders, with their P(A ∩ G), as [`best`] counts them.
+pub(crate) fn all(
+    case: &Case,
+    semantics: Semantics,
+    search: &OrderSearch,
+) -> Vec<(Vec<NodeId>, f64)> {
+    let certain = Likelihoods::certain();
+    let worlds = |likelihoods, semantics| {
+        let (task, plan) = (&case.task, &case.plan);
+        Worlds::new(task, plan, likelihoods, semantics, &case.circumstances)
+    };
+    let both = (
+        worlds(&case.likelihoods, semantics),
+        worlds(&certain, Semantics::Paper),
+    );
+    let mut orders = Vec::new();
+    extend(case, search, both, &mut Vec::new(), &mut orders);
+    orders
+}
+
 /// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as likely
 /// has. Only those count for which there is time, which is asked of the network as a whole, and
 /// those that work nominally if the settings ask for it.
@@ -14,28 +34,10 @@ pub(crate) fn best(
     semantics: Semantics,
     search: &OrderSearch,
 ) -> Option<(f64, usize)> {
-    let worlds = Worlds::new(
-        &case.task,
-        &case.plan,
-        &case.likelihoods,
-        semantics,
-        &case.circumstances,
-    );
-    let mut orders = Vec::new();
-    let mut sequence = Vec::new();
-    let certain = Likelihoods::certain();
-    // What happens if nothing goes wrong; every world of it counts where all orders do.
-    let nominal = Worlds::new(
-        &case.task,
-        &case.plan,
-        &certain,
-        Semantics::Paper,
-        &case.circumstances,
-    );
-    extend(case, search, (worlds, nominal), &mut sequence, &mut orders);
-    let best = orders.iter().map(|(p, _)| *p).reduce(f64::max)?;
-    let likeliest = orders.iter().filter(|(p, _)| *p >= best * (1.0 - 1e-10));
-    Some((best, likeliest.map(|(_, length)| *length).min()?))
+    let orders = all(case, semantics, search);
+    let best = orders.iter().map(|(_, p)| *p).reduce(f64::max)?;
+    let likeliest = orders.iter().filter(|(_, p)| *p >= best * (1.0 - 1e-10));
+    Some((best, likeliest.map(|(order, _)| order.len()).min()?))
 }
 
 fn extend(
@@ -43,7 +45,7 @@ fn extend(
     search: &OrderSearch,
     (worlds, nominal): (Worlds<'_>, Worlds<'_>),
     sequence: &mut Vec<NodeId>,
-    orders: &mut Vec<(f64, usize)>,
+    orders: &mut Vec<(Vec<NodeId>, f64)>,
 ) {
     if search.windows(&case.circumstances, sequence).is_none() {
         return;
@@ -54,7 +56,7 @@ fn extend(
         let p = worlds.success_probability();
         let counts = !must_work || nominal.success_probability() > 0.0;
         if counts && p > 0.0 {
-            orders.push((p, sequence.len()));
+            orders.push((sequence.clone(), p));
         }
     }
     let is_dead = must_work && nominal.actions_probability() == 0.0;

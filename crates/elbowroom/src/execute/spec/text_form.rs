@@ -39,21 +39,21 @@ pub(super) mod as_text {
 }
 
 /// As a list of texts.
-pub(super) mod listed {
+pub(crate) mod listed {
     use std::fmt::Display;
     use std::str::FromStr;
 
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serializer};
 
-    pub(in crate::execute::spec) fn serialize<T: Display, S: Serializer>(
+    pub(crate) fn serialize<T: Display, S: Serializer>(
         values: &[T],
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(values.iter().map(ToString::to_string))
     }
 
-    pub(in crate::execute::spec) fn deserialize<'de, T, D>(
+    pub(crate) fn deserialize<'de, T, D>(
         deserializer: D,
     ) -> Result<Vec<T>, D::Error>
     where

@@ -1,0 +1,75 @@
+//! What can be said to `elbowroom odds`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use elbowroom::answers::odds::OddsSemantics;
+use elbowroom::num::Rational;
+
+use super::ProblemArgs;
+use super::number::{count, positive, whole};
+
+#[derive(Args, Debug)]
+pub(crate) struct OddsArgs {
+    #[command(flatten)]
+    pub(crate) problem: ProblemArgs,
+    /// The plan; without it, the embedded planner makes one, and the best order of it is taken
+    #[arg(value_name = "PLAN")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Probabilities of success and of spontaneous change (docs/formats/likelihoods.md)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) likelihoods: PathBuf,
+    /// Take the order of the plan's actions that is most likely to succeed, not that of its times
+    #[arg(long)]
+    pub(crate) best: bool,
+    /// What an effect that fails leaves behind
+    #[arg(long, value_enum, default_value_t = SemanticsChoice::Paper)]
+    pub(crate) semantics: SemanticsChoice,
+    /// Also list what must hold before each happening for the rest to work
+    #[arg(long)]
+    pub(crate) layers: bool,
+    /// A world on a clock (docs/formats/world.md): execute the plan in samples of it
+    #[arg(long, value_name = "WORLD.toml")]
+    pub(crate) world: Option<PathBuf>,
+    /// Who executes it, without and with new plans; `live` and `adaptable` by default
+    #[arg(long, value_name = "NAME", requires = "world")]
+    pub(crate) executor: Vec<String>,
+    /// How many samples
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(requires = "world")]
+    pub(crate) samples: u64,
+    /// The seed of the first sample; the others follow
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(requires = "world")]
+    pub(crate) seed: u64,
+    /// Write a picture of all orders of the plan's actions; of short plans only
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) lattice: Option<PathBuf>,
+    /// Number of beginnings of orders that the search for the best order may look at
+    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = count, allow_negative_numbers = true)]
+    pub(crate) most_sequences: usize,
+    /// Minimum time between interfering happenings (epsilon)
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) epsilon: Rational,
+    /// Print the answer as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What an effect that fails leaves behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SemanticsChoice {
+    /// The opposite of what it should, as in paper 2
+    Paper,
+    /// The fact as it was
+    World,
+}
+
+impl From<SemanticsChoice> for OddsSemantics {
+    fn from(choice: SemanticsChoice) -> Self {
+        match choice {
+            SemanticsChoice::Paper => Self::Paper,
+            SemanticsChoice::World => Self::World,
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! `elbowroom odds`: how likely a plan is to succeed.
+
+mod text;
+
+use std::sync::Arc;
+
+use elbowroom::answers::odds::{
+    LatticeFinding, OddsFinding, OddsRequest, OddsSettings, odds,
+};
+use elbowroom::probability::likelihoods;
+use elbowroom::sim::WorldModel;
+
+use crate::args::OddsArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::look::Look;
+use crate::output::{self, Output};
+use crate::stopwatch::Stopwatch;
+
+/// Says how likely a plan is to succeed.
+pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
+    let settings = settings(arguments)?;
+    let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
+    let plan = match &arguments.plan {
+        Some(path) => Some(input::time_triggered(&task, path, output)?),
+        None => None,
+    };
+    let text = input::source(&arguments.likelihoods, "likelihoods")?;
+    let likelihoods = read_likelihoods(&text, &task)?;
+    let world = match &arguments.world {
+        Some(path) => {
+            let text = input::source(path, "world")?;
+            let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
+                Failure::from(wrong).advised("docs/formats/world.md describes world files")
+            })?;
+            Some(world)
+        }
+        None => None,
+    };
+    let request = OddsRequest {
+        task: &task,
+        plan,
+        likelihoods: &likelihoods,
+        world: world.as_ref(),
+        settings,
+    };
+    let mut watch = Stopwatch::start(&Interrupt::listen());
+    let answer = odds(&request, &mut watch).map_err(|error| {
+        Failure::new(error, "docs/probability.md says what is calculated, and for which plans")
+    })?;
+    let title = format!("{}: the orders of its plan", answer.problem);
+    let mut refusal = None;
+    let mut written = Ok(());
+    if let (Some(path), OddsFinding::Odds(odds)) = (&arguments.lattice, &answer.finding) {
+        match &odds.lattice {
+            Some(LatticeFinding::Lattice(lattice)) => {
+                written = output::write_file(path, &lattice.picture(&title).svg());
+            }
+            Some(LatticeFinding::Refused(why)) => refusal = Some(why.clone()),
+            None => {}
+        }
+    }
+    // What was computed is shown, whatever becomes of the picture.
+    if arguments.json {
+        output.document(&answer)?;
+    } else {
+        let text = text::of(&answer, arguments.layers, Look::of_stdout());
+        output::print(&text)?;
+    }
+    written?;
+    if let Some(why) = refusal {
+        return Err(Failure::new(
+            format!("no picture was written: {why}"),
+            "leave out --lattice, or give a shorter plan",
+        ));
+    }
+    Ok(match &answer.finding {
+        OddsFinding::Odds(odds) if odds.order.probability > 0.0 => Exit::Yes,
+        OddsFinding::None { .. } => Exit::Limit,
+        _ => Exit::No,
+    })
+}
+
+fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
+    let mut settings = OddsSettings {
+        semantics: arguments.semantics.into(),
+        takes_best_order: arguments.best,
+        most_sequences: arguments.most_sequences,
+        with_lattice: arguments.lattice.is_some(),
+        samples: arguments.samples,
+        seed: arguments.seed,
+        ..OddsSettings::default()
+    };
+    if !arguments.executor.is_empty() {
+        let read = arguments.executor.iter().map(|name| name.parse());
+        settings.executors = read
+            .collect::<Result<_, _>>()
+            .map_err(|error: elbowroom::execution::executors::UnknownExecutor| {
+                Failure::new(error, "`elbowroom run --help` describes them all")
+            })?;
+        if let Some(odd) = settings.executors.iter().find(|spec| spec.asks_odds()) {
+            return Err(Failure::new(
+                format!("`{odd}` compares plans while it executes one, which is not sampled here"),
+                "leave out the number, or use `elbowroom compare`",
+            ));
+        }
+    }
+    Ok(settings)
+}
+
+/// The likelihoods, in either format.
+fn read_likelihoods(
+    text: &elbowroom::text::Source,
+    task: &elbowroom::model::Task,
+) -> Result<Arc<elbowroom::probability::Likelihoods>, Failure> {
+    let read = likelihoods::read(text.clone(), task).map_err(|wrong| {
+        Failure::from(wrong).advised("docs/formats/likelihoods.md describes likelihood files")
+    })?;
+    Ok(Arc::new(read))
+}

@@ -1,0 +1,256 @@
+//! The odds of a plan as text.
+
+use std::fmt::Write as _;
+
+use elbowroom::answers::odds::{
+    BestOrderAnswer, ExecutedAnswer, LossAnswer, LossReason, Odds, OddsAnswer, OddsFinding,
+    OrderAnswer, ValueAnswer,
+};
+use elbowroom::report::table::Table;
+
+use crate::limits::push_paragraph;
+use crate::look::{BAD, HINT, Look, STRONG, styled};
+use crate::words::counted;
+
+/// More losses, or ways to gain, are not listed.
+const MOST_ROWS: usize = 12;
+
+/// Shares below this are not listed.
+const NEGLIGIBLE: f64 = 0.000_05;
+
+pub(super) fn of(answer: &OddsAnswer, with_layers: bool, look: Look) -> String {
+    match &answer.finding {
+        OddsFinding::Odds(odds) => found(odds, with_layers, look),
+        OddsFinding::NoOrder => {
+            let label = styled(BAD, "no order");
+            format!("{label}: no order of the plan's actions can succeed\n")
+        }
+        OddsFinding::NoPlan => format!("{}: the problem has no plan\n", styled(BAD, "no plan")),
+        OddsFinding::None { reason } => format!("{reason}\n"),
+        OddsFinding::Invalid { violation } => {
+            let mut text = String::new();
+            let words = format!(
+                "{}: {}; `elbowroom check` says more.",
+                styled(BAD, "not valid"),
+                violation.message
+            );
+            push_paragraph(&mut text, &words, look.width);
+            text
+        }
+    }
+}
+
+fn found(odds: &Odds, with_layers: bool, look: Look) -> String {
+    let order = &odds.order;
+    let mut text = summary(order, look);
+    steps(&mut text, order, with_layers, look);
+    losses(&mut text, order, look);
+    gains(&mut text, odds, look);
+    if !odds.executed.is_empty() {
+        executed(&mut text, &odds.executed, look);
+    }
+    text
+}
+
+fn summary(order: &OrderAnswer, look: Look) -> String {
+    let mut text = String::new();
+    let title = format!("Succeeds with probability {}", number(order.probability));
+    let _ = writeln!(text, "{}\n", styled(STRONG, &title));
+    let which = match (order.is_best, order.is_proven) {
+        (false, _) => "The order is that of the plan's times.",
+        (true, Some(true)) => "The order is the best of all of the plan's actions.",
+        (true, _) => {
+            "The order is the best that was found within the limit of the search; there may be a better one."
+        }
+    };
+    let mut words = format!(
+        "All happenings succeed with probability {}, P(A); and the goal holds after them with \
+         {}, P(A and G). {which}",
+        number(order.actions_probability),
+        number(order.probability)
+    );
+    if !order.has_time {
+        words.push_str(" Durations and timed initials leave no time for it.");
+    }
+    if order.assumed_conditions > 0 {
+        let count = counted(order.assumed_conditions, "condition");
+        let _ = write!(
+            words,
+            " {count} on numbers that depend on when things happen were taken for granted."
+        );
+    }
+    push_paragraph(&mut text, &words, look.width);
+    text
+}
+
+fn steps(text: &mut String, order: &OrderAnswer, with_layers: bool, look: Look) {
+    let mut headings = vec!["step", "happening", "earliest", "so far"];
+    if with_layers {
+        headings.push("needs");
+    }
+    let layer = |conditions: &[String]| conditions.join(" ");
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for (at, happening) in order.happenings.iter().enumerate() {
+        let earliest = happening.earliest.as_ref();
+        let mut row = vec![
+            (at + 1).to_string(),
+            happening.what.clone(),
+            earliest.map_or_else(|| "-".to_owned(), |time| time.to_decimal(3)),
+            number(happening.probability_so_far),
+        ];
+        if with_layers {
+            row.push(layer(&happening.layer.conditions));
+        }
+        rows.push(row);
+    }
+    let mut goal = vec![
+        String::new(),
+        "goal".to_owned(),
+        String::new(),
+        number(order.probability),
+    ];
+    if with_layers {
+        goal.push(layer(&order.goal.conditions));
+    }
+    rows.push(goal);
+    table(text, &headings, rows, look);
+}
+
+fn losses(text: &mut String, order: &OrderAnswer, look: Look) {
+    let mut losses: Vec<&LossAnswer> = order.losses.iter().collect();
+    losses.sort_by(|a, b| b.mass.total_cmp(&a.mass));
+    losses.retain(|loss| loss.mass >= NEGLIGIBLE);
+    if losses.is_empty() {
+        return;
+    }
+    heading(text, "Where it is lost");
+    let others: f64 = losses.iter().skip(MOST_ROWS).map(|loss| loss.mass).sum();
+    let mut rows: Vec<Vec<String>> = losses
+        .iter()
+        .take(MOST_ROWS)
+        .map(|loss| vec![number(loss.mass), loss.at.clone(), reason(&loss.reason)])
+        .collect();
+    if losses.len() > MOST_ROWS {
+        let elsewhere = format!("{} more", losses.len() - MOST_ROWS);
+        rows.push(vec![number(others), elsewhere, String::new()]);
+    }
+    table(text, &["lost", "at", "because"], rows, look);
+}
+
+fn reason(reason: &LossReason) -> String {
+    let since = |condition: &str, since: &Option<String>| match since {
+        Some(since) => format!("{condition} does not hold, since {since}"),
+        None => format!("{condition} does not hold any more"),
+    };
+    match reason {
+        LossReason::Start => "it does not start".to_owned(),
+        LossReason::Condition { condition, since: by } => since(condition, by),
+        LossReason::Throughout { action, condition, since: by } => {
+            format!("{} during {action}", since(condition, by))
+        }
+        LossReason::Goal { condition, since: by } => format!("goal: {}", since(condition, by)),
+    }
+}
+
+fn gains(text: &mut String, odds: &Odds, look: Look) {
+    let order = &odds.order;
+    let mut ways: Vec<(f64, String)> = Vec::new();
+    for action in &order.actions {
+        let name = &action.action;
+        ways.push((action.if_certain, format!("{name} never failed")));
+        let retried = action.if_retried.filter(|p| *p < action.if_certain);
+        ways.extend(retried.map(|p| (p, format!("{name} were tried until it starts"))));
+    }
+    for fact in &order.facts {
+        ways.push((fact.if_steady, format!("{} never changed by itself", fact.fact)));
+    }
+    ways.retain(|(p, _)| *p - order.probability >= NEGLIGIBLE);
+    ways.sort_by(|a, b| b.0.total_cmp(&a.0));
+    ways.truncate(MOST_ROWS);
+    heading(text, "What would help");
+    let row = |p: f64, what: String| vec![number(p), what];
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    let mut unknown: Vec<String> = Vec::new();
+    let mut value = |value: &ValueAnswer, what: &str| match value {
+        ValueAnswer::Probability(p) => rows.push(row(*p, what.to_owned())),
+        ValueAnswer::Unknown(why) => {
+            if !unknown.contains(why) {
+                unknown.push(why.clone());
+            }
+        }
+    };
+    let gains = &odds.gains;
+    value(&gains.any_action, "any action, chosen as the state asks");
+    value(
+        &gains.as_the_state_asks,
+        "the plan's actions, repeated and skipped as the state asks",
+    );
+    let best = |best: &BestOrderAnswer, what: &str| {
+        let perhaps = if best.is_proven { "" } else { " found" };
+        row(best.probability, format!("{what}{perhaps}"))
+    };
+    if let Some(other) = &gains.planners_plan {
+        rows.push(best(other, "another plan, in its best order"));
+    }
+    if let Some(other) = gains.best_order.as_ref().filter(|_| !order.is_best) {
+        rows.push(best(other, "the best order of this plan"));
+    }
+    rows.extend(ways.into_iter().map(|(p, what)| row(p, format!("if {what}"))));
+    table(text, &["then", "with"], rows, look);
+    for why in unknown {
+        let words = format!(
+            "{}: what choosing as the state asks would gain is not calculated: {why}",
+            styled(HINT, "note")
+        );
+        text.push('\n');
+        push_paragraph(text, &words, look.width);
+    }
+}
+
+fn executed(text: &mut String, all: &[ExecutedAnswer], look: Look) {
+    let samples = all.first().map_or(0, |one| one.samples);
+    heading(text, &format!("Executed in {samples} samples of the world"));
+    let rows = all.iter().map(|one| {
+        let interval = one.interval.map_or_else(String::new, |(low, high)| {
+            format!("{} to {}", number(low), number(high))
+        });
+        #[allow(clippy::cast_precision_loss, reason = "counts of samples")]
+        let share = one.reached as f64 / one.samples.max(1) as f64;
+        let end = one.ends.first().map(|end| {
+            let cause = end.cause.as_deref().unwrap_or(&end.verdict);
+            let action = end.action.as_deref().unwrap_or_default();
+            format!("{}x {cause} {action}", end.samples).trim_end().to_owned()
+        });
+        let replans = if one.replans { "yes" } else { "no" };
+        vec![
+            one.executor.clone(),
+            replans.to_owned(),
+            number(share),
+            interval,
+            end.unwrap_or_default(),
+        ]
+    });
+    let headings = ["executor", "new plans", "reached", "95 % interval", "mostly lost to"];
+    table(text, &headings, rows.collect(), look);
+}
+
+fn heading(text: &mut String, words: &str) {
+    let _ = writeln!(text, "\n{}", styled(STRONG, words));
+}
+
+fn table(text: &mut String, headings: &[&str], rows: Vec<Vec<String>>, look: Look) {
+    let table = Table {
+        caption: String::new(),
+        headings: headings.iter().map(|it| (*it).to_owned()).collect(),
+        keys: 1,
+        rows,
+        notes: Vec::new(),
+    };
+    text.push('\n');
+    text.push_str(table.within(look.width).trim_start_matches('\n'));
+}
+
+/// A probability with four digits.
+fn number(p: f64) -> String {
+    format!("{p:.4}")
+}

@@ -1,0 +1,306 @@
+//! How likely is a plan to succeed, where is its probability lost, and what would gain some?
+
+mod executed;
+mod gains;
+mod lattice;
+mod order;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use elbowroom_execution::executors::ExecutorSpec;
+use elbowroom_execution::{PlanAnswer, Planner};
+use elbowroom_model::validate::{self, Verdict};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
+use elbowroom_plan::NodeId;
+use elbowroom_plan::partial_order::partial_order;
+use elbowroom_probability::{
+    Circumstances, Likelihoods, Model, OrderSearch, SearchSettings, SearchStop, Semantics,
+    TotalOrderPlan,
+};
+use elbowroom_sim::WorldModel;
+use serde::{Deserialize, Serialize};
+
+use super::{RequestError, Version, ViolationAnswer, Watcher};
+use crate::execute::Embedded;
+use crate::execute::as_timed;
+
+pub use executed::{EndAnswer, ExecutedAnswer};
+pub use gains::{BestOrderAnswer, GainsAnswer, ValueAnswer};
+pub use lattice::{EdgeAnswer, LatticeAnswer, LatticeFinding, SetAnswer};
+pub use order::{
+    ActionAnswer, FactAnswer, HappeningAnswer, LayerAnswer, LossAnswer, LossReason, OrderAnswer,
+};
+
+/// Asks how likely a plan is to succeed.
+#[derive(Clone, Debug)]
+pub struct OddsRequest<'a> {
+    /// The problem.
+    pub task: &'a Arc<Task>,
+    /// The plan; without one, the embedded planner makes one, and the best order of it is taken.
+    pub plan: Option<TimeTriggeredPlan>,
+    /// How likely everything is.
+    pub likelihoods: &'a Arc<Likelihoods>,
+    /// A world on a clock, for executing the plan in samples of it.
+    pub world: Option<&'a WorldModel>,
+    /// How to answer.
+    pub settings: OddsSettings,
+}
+
+/// How to answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OddsSettings {
+    /// What a failed effect leaves behind.
+    pub semantics: OddsSemantics,
+    /// Whether the answer is about the best order, not about that of the plan's times.
+    pub takes_best_order: bool,
+    /// So many beginnings of orders are looked at for the best order.
+    pub most_sequences: usize,
+    /// Whether to list all orders.
+    pub with_lattice: bool,
+    /// The executors that execute the plan in samples of the world.
+    #[serde(with = "crate::execute::listed")]
+    pub executors: Vec<ExecutorSpec>,
+    /// How many samples.
+    pub samples: u64,
+    /// The seed of the first sample; the others follow.
+    pub seed: u64,
+}
+
+impl Default for OddsSettings {
+    /// As in paper 2; 1000 samples with `live` and `adaptable`.
+    fn default() -> Self {
+        let executors = ["live", "adaptable"].iter().map(|name| name.parse());
+        Self {
+            semantics: OddsSemantics::default(),
+            takes_best_order: false,
+            most_sequences: 50_000,
+            with_lattice: false,
+            executors: executors.filter_map(Result::ok).collect(),
+            samples: 1000,
+            seed: 0,
+        }
+    }
+}
+
+/// What a failed effect leaves behind: [`Semantics`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OddsSemantics {
+    /// The opposite of what it should.
+    #[default]
+    Paper,
+    /// The fact as it was.
+    World,
+}
+
+impl From<OddsSemantics> for Semantics {
+    fn from(semantics: OddsSemantics) -> Self {
+        match semantics {
+            OddsSemantics::Paper => Self::Paper,
+            OddsSemantics::World => Self::World,
+        }
+    }
+}
+
+/// How likely a plan is to succeed: `docs/formats/odds-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OddsAnswer {
+    /// Always the same.
+    pub format: OddsFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// What a failed effect leaves behind.
+    pub semantics: OddsSemantics,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: OddsFinding,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OddsFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-odds")]
+    Odds,
+}
+
+/// The odds, or why there are none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer")]
+pub enum OddsFinding {
+    /// The odds.
+    #[serde(rename = "odds")]
+    Odds(Box<Odds>),
+    /// No order of the plan can succeed.
+    #[serde(rename = "no order")]
+    NoOrder,
+    /// There is no plan.
+    #[serde(rename = "no plan")]
+    NoPlan,
+    /// A limit was reached before there was anything.
+    #[serde(rename = "none")]
+    None {
+        /// Which limit.
+        reason: String,
+    },
+    /// The judge rejects the plan.
+    #[serde(rename = "invalid")]
+    Invalid {
+        /// The reason.
+        violation: ViolationAnswer,
+    },
+}
+
+/// The odds of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Odds {
+    /// The order that they are about.
+    pub order: OrderAnswer,
+    /// What another order, retrying, or another plan would gain.
+    pub gains: GainsAnswer,
+    /// What came of executing the plan in samples of the world, if there is one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub executed: Vec<ExecutedAnswer>,
+    /// All orders, if they were asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lattice: Option<LatticeFinding>,
+}
+
+/// A plan, and all that its orders are looked for with.
+pub(super) struct Subject<'a> {
+    request: &'a OddsRequest<'a>,
+    plan: &'a TimeTriggeredPlan,
+    search: OrderSearch,
+    initial: Circumstances,
+    /// The happenings as the plan has them.
+    as_planned: Vec<NodeId>,
+}
+
+/// Says how likely a plan is to succeed.
+///
+/// # Errors
+/// When the likelihoods say nothing of something in the plan, too many facts are coupled, the judge
+/// cannot tell whether the plan is valid, or the planner does not support the problem.
+pub fn odds(
+    request: &OddsRequest<'_>,
+    watcher: &mut dyn Watcher,
+) -> Result<OddsAnswer, RequestError> {
+    let problem = request.task.problem();
+    Ok(OddsAnswer {
+        format: OddsFormat::Odds,
+        version: Version,
+        domain: problem.domain.clone(),
+        problem: problem.name.clone(),
+        semantics: request.settings.semantics,
+        finding: finding(request, watcher)?,
+    })
+}
+
+fn finding(
+    request: &OddsRequest<'_>,
+    watcher: &mut dyn Watcher,
+) -> Result<OddsFinding, RequestError> {
+    let made;
+    let plan = if let Some(plan) = &request.plan {
+        match validate::validate(request.task, plan, &validate::Settings::default()) {
+            Verdict::Valid(_) => plan,
+            Verdict::Invalid(violation) => {
+                let violation = (&violation).into();
+                return Ok(OddsFinding::Invalid { violation });
+            }
+            Verdict::Undecided(why) => return Err(RequestError::Undecided(why.to_string())),
+        }
+    } else {
+        match planned(request.task) {
+            PlanAnswer::Plan(plan) => made = plan,
+            PlanAnswer::Unsolvable => return Ok(OddsFinding::NoPlan),
+            PlanAnswer::NotFound { why } => return Ok(OddsFinding::None { reason: why }),
+        }
+        &made
+    };
+    let mut subject = Subject::new(request, plan)?;
+    let order = if request.settings.takes_best_order || request.plan.is_none() {
+        let (best, stop) = subject.best_order(watcher)?;
+        match (best, stop) {
+            (Some(order), stop) => OrderAnswer::of(&subject, &order, Some(stop))?,
+            (None, SearchStop::Complete) => return Ok(OddsFinding::NoOrder),
+            (None, SearchStop::Interrupted) => {
+                let reason = "no order was found within the limit of the search".to_owned();
+                return Ok(OddsFinding::None { reason });
+            }
+        }
+    } else {
+        let order = subject.search.order_of(&subject.initial, &subject.as_planned);
+        OrderAnswer::of(&subject, &order.map_err(coupled)?, None)?
+    };
+    let gains = GainsAnswer::of(&mut subject, &order, watcher)?;
+    let executed = match request.world {
+        Some(world) => executed::all(&subject, world, watcher),
+        None => Vec::new(),
+    };
+    let lattice = request.settings.with_lattice;
+    let lattice = lattice.then(|| LatticeFinding::of(&subject, &order));
+    Ok(OddsFinding::Odds(Box::new(Odds {
+        order,
+        gains,
+        executed,
+        lattice,
+    })))
+}
+
+/// A plan of the embedded planner.
+fn planned(task: &Task) -> PlanAnswer {
+    Embedded::default().plan(task, &Situation::initial(task)).answer
+}
+
+fn coupled(error: elbowroom_probability::TooCoupled) -> RequestError {
+    RequestError::Unsupported(error.to_string())
+}
+
+impl<'a> Subject<'a> {
+    fn new(
+        request: &'a OddsRequest<'a>,
+        plan: &'a TimeTriggeredPlan,
+    ) -> Result<Self, RequestError> {
+        let ordered = partial_order(request.task, &as_timed(plan));
+        let by_step = ordered.instance_of_step.iter().zip(&plan.steps);
+        let mut steps: Vec<(_, &Step)> = by_step.map(|(&id, step)| (id, step)).collect();
+        steps.sort_by_key(|(id, _)| *id);
+        let steps: Vec<Step> = steps.into_iter().map(|(_, step)| step.clone()).collect();
+        let semantics = request.settings.semantics.into();
+        let task = Arc::clone(request.task);
+        let model = Model::new(task, ordered, request.likelihoods, semantics);
+        let model = model.map_err(|missing| RequestError::Unsupported(missing.to_string()))?;
+        let search = OrderSearch::new(model, SearchSettings::default());
+        let as_planned = search.as_timed(&steps);
+        Ok(Self {
+            request,
+            plan,
+            search: search.beginning_with(as_planned.clone()),
+            initial: Circumstances::believed(request.task, request.likelihoods),
+            as_planned,
+        })
+    }
+
+    fn best_order(
+        &mut self,
+        watcher: &mut dyn Watcher,
+    ) -> Result<(Option<TotalOrderPlan>, SearchStop), RequestError> {
+        let most = self.request.settings.most_sequences;
+        let found = self.search.best_order(&self.initial, &mut |progress| {
+            if progress.sequences >= most || watcher.flow().is_break() {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+        let found = found.map_err(coupled)?;
+        Ok((found.order, found.stop))
+    }
+}

@@ -1,0 +1,298 @@
+//! An order: its happenings, its layers, and where its probability is lost.
+
+use elbowroom_model::ground::FactId;
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_probability::account::Account;
+use elbowroom_probability::{
+    Layer, Loss, LossCause, Model, Reading, SearchStop, TotalOrderPlan,
+};
+use elbowroom_report::exact;
+use serde::{Deserialize, Serialize};
+
+use super::{Subject, coupled};
+use crate::answers::RequestError;
+
+/// An order and its probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OrderAnswer {
+    /// Whether it is the best that was found, not that of the plan's times.
+    pub is_best: bool,
+    /// Whether it is proven that no order of the plan is better; `None` if that was not asked.
+    pub is_proven: Option<bool>,
+    /// P(A): that all happenings succeed.
+    pub actions_probability: f64,
+    /// P(A ∩ G): that all happenings succeed and the goal holds after them.
+    pub probability: f64,
+    /// How many conditions on numbers were taken for granted, because the numbers depend on when
+    /// things happen.
+    pub assumed_conditions: usize,
+    /// Whether durations and timed initials leave time for it.
+    pub has_time: bool,
+    /// The happenings.
+    pub happenings: Vec<HappeningAnswer>,
+    /// What must hold after them: the goal.
+    pub goal: LayerAnswer,
+    /// Where the probability is lost. All masses and the probability add up to 1.
+    pub losses: Vec<LossAnswer>,
+    /// The part of each action, in the order in which they begin.
+    pub actions: Vec<ActionAnswer>,
+    /// The facts that may change by themselves to the order's harm, the worst first.
+    pub facts: Vec<FactAnswer>,
+    /// The happenings as nodes.
+    #[serde(skip)]
+    pub(super) sequence: Vec<NodeId>,
+}
+
+/// A happening of an order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HappeningAnswer {
+    /// `start`, `end`, `instant` or `timed`.
+    pub kind: String,
+    /// The action; `None` for timed initials.
+    pub action: Option<String>,
+    /// In words.
+    pub what: String,
+    /// The earliest time; `None` where there is no time for the order.
+    #[serde(with = "exact::option")]
+    pub earliest: Option<Rational>,
+    /// The latest time; `None` where there is no bound, or no time for the order.
+    #[serde(with = "exact::option")]
+    pub latest: Option<Rational>,
+    /// That everything up to here succeeds, and what is under way then can go on.
+    pub probability_so_far: f64,
+    /// What must hold before it for the rest to work if nothing more goes wrong.
+    pub layer: LayerAnswer,
+}
+
+/// What must hold between two happenings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayerAnswer {
+    /// Facts that must be true, facts that must be false as `(not …)`, other conditions as PDDL
+    /// writes them.
+    pub conditions: Vec<String>,
+    /// The actions under way.
+    pub running: Vec<String>,
+}
+
+/// A share of all worlds that is lost at one place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LossAnswer {
+    /// The position of the happening in the order, from 0; `None` before the first.
+    pub happening: Option<usize>,
+    /// The happening in words.
+    pub at: String,
+    /// What was asked there.
+    #[serde(flatten)]
+    pub reason: LossReason,
+    /// The share.
+    pub mass: f64,
+}
+
+/// Why worlds are lost.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
+pub enum LossReason {
+    /// The attempt to start fails.
+    Start,
+    /// Something that the happening needs does not hold.
+    Condition {
+        /// The condition.
+        condition: String,
+        /// The happening that should have seen to it, or last had an effect on it; `None`: the
+        /// initial state.
+        since: Option<String>,
+    },
+    /// Something that an action under way needs does not hold.
+    Throughout {
+        /// The action.
+        action: String,
+        /// The condition.
+        condition: String,
+        /// As above.
+        since: Option<String>,
+    },
+    /// Something that the goal asks for does not hold.
+    Goal {
+        /// The condition.
+        condition: String,
+        /// As above.
+        since: Option<String>,
+    },
+}
+
+/// The part of an action.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ActionAnswer {
+    /// Its name.
+    pub action: String,
+    /// The position of its start in the order.
+    pub happening: usize,
+    /// P(A ∩ G) if its start and effects never failed.
+    pub if_certain: f64,
+    /// P(A ∩ G) if failed attempts to start it were repeated; `None`: the order is too long.
+    pub if_retried: Option<f64>,
+}
+
+/// The part of a fact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FactAnswer {
+    /// Its name.
+    pub fact: String,
+    /// P(A ∩ G) if it never changed by itself.
+    pub if_steady: f64,
+}
+
+impl OrderAnswer {
+    pub(super) fn of(
+        subject: &Subject<'_>,
+        order: &TotalOrderPlan,
+        best: Option<SearchStop>,
+    ) -> Result<Self, RequestError> {
+        let model = &**subject.search.model();
+        let account = Account::of(model, &subject.initial, &order.sequence).map_err(coupled)?;
+        let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
+            matches!(model.plan().nodes[node.index()], Node::Start(_) | Node::Instant(_))
+        });
+        let action = |id: InstanceId| model.plan().instance(id).action.name.clone();
+        let mut left = 1.0 - lost(&account.losses, None);
+        let happenings = order.sequence.iter().enumerate().map(|(at, &node)| {
+            let slot = order.slots.get(at);
+            let (kind, action) = match model.plan().nodes[node.index()] {
+                Node::Start(id) => ("start", Some(action(id))),
+                Node::End(id) => ("end", Some(action(id))),
+                Node::Instant(id) => ("instant", Some(action(id))),
+                Node::Timed(_) | Node::Zero => ("timed", None),
+            };
+            left -= lost(&account.losses, Some(at));
+            HappeningAnswer {
+                kind: kind.to_owned(),
+                action,
+                what: model.node_words(node),
+                earliest: slot.map(|slot| slot.earliest.clone()),
+                latest: slot.and_then(|slot| slot.latest.clone()),
+                probability_so_far: left.clamp(0.0, 1.0),
+                layer: LayerAnswer::of(model, &order.layers[at]),
+            }
+        });
+        Ok(Self {
+            is_best: best.is_some(),
+            is_proven: best.map(|stop| stop == SearchStop::Complete),
+            actions_probability: account.actions_probability,
+            probability: account.probability,
+            assumed_conditions: order.assumed_conditions,
+            has_time: order.slots.len() == order.sequence.len(),
+            happenings: happenings.collect(),
+            goal: order.layers.last().map_or_else(LayerAnswer::nothing, |layer| {
+                LayerAnswer::of(model, layer)
+            }),
+            losses: account
+                .losses
+                .iter()
+                .map(|loss| LossAnswer::of(model, &order.sequence, loss))
+                .collect(),
+            actions: starts
+                .zip(&account.actions)
+                .map(|((happening, _), share)| ActionAnswer {
+                    action: action(share.instance),
+                    happening,
+                    if_certain: share.if_certain,
+                    if_retried: share.if_retried,
+                })
+                .collect(),
+            facts: account
+                .facts
+                .iter()
+                .map(|share| FactAnswer {
+                    fact: model.task().fact_name(share.fact),
+                    if_steady: share.if_steady,
+                })
+                .collect(),
+            sequence: order.sequence.clone(),
+        })
+    }
+}
+
+/// What is lost at a happening, but for the goal.
+fn lost(losses: &[Loss], position: Option<usize>) -> f64 {
+    let here = losses
+        .iter()
+        .filter(|loss| loss.position == position && loss.reading != Reading::Goal);
+    here.map(|loss| loss.mass).sum()
+}
+
+impl LayerAnswer {
+    fn nothing() -> Self {
+        Self {
+            conditions: Vec::new(),
+            running: Vec::new(),
+        }
+    }
+
+    fn of(model: &Model, layer: &Layer) -> Self {
+        let task = model.task();
+        let literals = layer.literals.iter();
+        let literals = literals.map(|&(fact, truth)| literal(model, fact, truth));
+        let conditions = layer.conditions.iter();
+        let running = layer.running.iter();
+        Self {
+            conditions: literals
+                .chain(conditions.map(|condition| task.describe_condition(condition)))
+                .collect(),
+            running: running
+                .map(|&id| model.plan().instance(id).action.name.clone())
+                .collect(),
+        }
+    }
+}
+
+fn literal(model: &Model, fact: FactId, truth: bool) -> String {
+    let name = model.task().fact_name(fact);
+    if truth { name } else { format!("(not {name})") }
+}
+
+impl LossAnswer {
+    fn of(model: &Model, sequence: &[NodeId], loss: &Loss) -> Self {
+        let (condition, since) = match &loss.cause {
+            LossCause::Start => (None, None),
+            LossCause::Fact { fact, truth } => {
+                let since = since(model, sequence, loss, *fact);
+                (Some(literal(model, *fact, *truth)), since)
+            }
+            LossCause::Condition(condition) => {
+                (Some(model.task().describe_condition(condition)), None)
+            }
+        };
+        let reason = match (condition, loss.reading) {
+            (None, _) => LossReason::Start,
+            (Some(condition), Reading::OnArrival) => LossReason::Condition { condition, since },
+            (Some(condition), Reading::Throughout(id)) => LossReason::Throughout {
+                action: model.plan().instance(id).action.name.clone(),
+                condition,
+                since,
+            },
+            (Some(condition), Reading::Goal) => LossReason::Goal { condition, since },
+        };
+        Self {
+            happening: loss.position,
+            at: match loss.position {
+                Some(position) => model.node_words(sequence[position]),
+                None => "the beginning".to_owned(),
+            },
+            reason,
+            mass: loss.mass,
+        }
+    }
+}
+
+/// The last happening before a loss that has an effect on the fact.
+fn since(model: &Model, sequence: &[NodeId], loss: &Loss, fact: FactId) -> Option<String> {
+    let before = match (loss.position, loss.reading) {
+        (None, _) => 0,
+        (Some(position), Reading::OnArrival) => position,
+        (Some(position), Reading::Throughout(_) | Reading::Goal) => position + 1,
+    };
+    let mut before = sequence[..before].iter().rev();
+    let last = before.find(|&&node| model.has_effect_on(node, fact))?;
+    Some(model.node_words(*last))
+}

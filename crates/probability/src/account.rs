@@ -1,0 +1,216 @@
+//! What an order owes its probability to: [`Account`].
+//!
+//! Three questions about an order whose P(A ∩ G) is known:
+//!
+//! - *Where is it lost?* [`Loss`]es, each with its place, its reason and its share of all worlds;
+//!   they and P(A ∩ G) add up to 1.
+//! - *What would certainty gain?* P(A ∩ G) of the same order if one action never failed, or one fact
+//!   never changed by itself. These do not add up: where two things must both go well, making
+//!   either certain leaves the other.
+//! - *What would retrying gain?* P(A ∩ G) if failed attempts to start one action did not end the
+//!   order, but were repeated. Each attempt is a step after which facts may change by themselves. The
+//!   sum over the number of failed attempts is exact but for what is left of it in the end.
+
+use elbowroom_model::ground::FactId;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use crate::circumstances::Circumstances;
+use crate::likelihoods::Flip;
+use crate::model::{Model, is_fact};
+use crate::network::{Loss, PrunedNetwork, TooCoupled};
+
+/// So many failed attempts are counted at most.
+const MOST_ATTEMPTS: usize = 1000;
+
+/// What is still to come of a sum is not looked at below this.
+const NEGLIGIBLE: f64 = 1e-13;
+
+/// So many happenings are looked at for one order; what retrying gains is not said of longer ones.
+const MOST_HAPPENINGS: usize = 4_000_000;
+
+/// What an order owes its probability to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Account {
+    /// P(A).
+    pub actions_probability: f64,
+    /// P(A ∩ G).
+    pub probability: f64,
+    /// In the order of the happenings.
+    pub losses: Vec<Loss>,
+    /// The actions that begin in the order, in the order in which they begin.
+    pub actions: Vec<ActionShare>,
+    /// The facts that may change by themselves and whose changes cost something, the costliest
+    /// first.
+    pub facts: Vec<FactShare>,
+}
+
+/// The part of an action in an order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActionShare {
+    /// Which action.
+    pub instance: InstanceId,
+    /// P(A ∩ G) if its start and its effects were certain.
+    pub if_certain: f64,
+    /// P(A ∩ G) if failed attempts to start it were repeated; `None` where that would take too
+    /// long to calculate.
+    pub if_retried: Option<f64>,
+}
+
+/// The part of a fact in an order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FactShare {
+    /// Which fact.
+    pub fact: FactId,
+    /// P(A ∩ G) if it never changed by itself.
+    pub if_steady: f64,
+}
+
+impl Account {
+    /// The account of an order.
+    ///
+    /// # Errors
+    /// When a condition couples too many uncertain facts.
+    pub fn of(
+        model: &Model,
+        circumstances: &Circumstances,
+        sequence: &[NodeId],
+    ) -> Result<Self, TooCoupled> {
+        let (actions_probability, probability) = probabilities(model, circumstances, sequence)?;
+        let losses = PrunedNetwork::losses(model, circumstances, sequence)?;
+        let retries = Retries::of(model, circumstances, sequence);
+        let mut actions = Vec::new();
+        for (at, &node) in sequence.iter().enumerate() {
+            let (Node::Start(instance) | Node::Instant(instance)) = model.plan().nodes[node.index()]
+            else {
+                continue;
+            };
+            let certain = model.with_certain(instance);
+            actions.push(ActionShare {
+                instance,
+                if_certain: probabilities(&certain, circumstances, sequence)?.1,
+                if_retried: match &retries {
+                    Some(retries) => Some(retries.at(at)?),
+                    None => None,
+                },
+            });
+        }
+        let mut facts = Vec::new();
+        for fact in model.facts() {
+            let Some(steady) = model.with_steady(fact) else {
+                continue;
+            };
+            let if_steady = probabilities(&steady, circumstances, sequence)?.1;
+            if if_steady > probability {
+                facts.push(FactShare { fact, if_steady });
+            }
+        }
+        facts.sort_by(|a, b| b.if_steady.total_cmp(&a.if_steady));
+        Ok(Self {
+            actions_probability,
+            probability,
+            losses,
+            actions,
+            facts,
+        })
+    }
+}
+
+/// P(A) and P(A ∩ G).
+fn probabilities(
+    model: &Model,
+    circumstances: &Circumstances,
+    sequence: &[NodeId],
+) -> Result<(f64, f64), TooCoupled> {
+    let mut network = PrunedNetwork::new(model, circumstances)?;
+    for &node in sequence {
+        network.push(node)?;
+    }
+    let probability = network.success_probability()?;
+    Ok((network.actions_probability(), probability))
+}
+
+/// An order in which attempts are repeated.
+struct Retries<'a> {
+    model: &'a Model,
+    circumstances: &'a Circumstances,
+    sequence: &'a [NodeId],
+}
+
+impl<'a> Retries<'a> {
+    /// `None` where the order is too long.
+    fn of(
+        model: &'a Model,
+        circumstances: &'a Circumstances,
+        sequence: &'a [NodeId],
+    ) -> Option<Self> {
+        let length = sequence.len();
+        let attempts = |node: &NodeId| {
+            let success = model.event(*node).success;
+            if success >= 1.0 || success <= 0.0 {
+                return 1;
+            }
+            // After so many the rest is negligible.
+            let enough = NEGLIGIBLE.ln() / (1.0 - success).ln();
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a positive number, and casts saturate"
+            )]
+            let enough = enough.ceil() as usize;
+            enough.min(MOST_ATTEMPTS)
+        };
+        let all: usize = sequence.iter().map(attempts).sum();
+        (all.saturating_mul(length) <= MOST_HAPPENINGS).then_some(Self {
+            model,
+            circumstances,
+            sequence,
+        })
+    }
+
+    /// P(A ∩ G) if the attempt at this position is repeated until it succeeds.
+    fn at(&self, position: usize) -> Result<f64, TooCoupled> {
+        let mut before = PrunedNetwork::new(self.model, self.circumstances)?;
+        for &node in &self.sequence[..position] {
+            before.push(node)?;
+        }
+        let mut whole = 0.0;
+        for _ in 0..=MOST_ATTEMPTS {
+            let mut rest = before.clone();
+            for &node in &self.sequence[position..] {
+                rest.push(node)?;
+            }
+            whole += rest.success_probability()?;
+            if before.fail(self.sequence[position])? <= NEGLIGIBLE {
+                break;
+            }
+        }
+        Ok(whole)
+    }
+}
+
+impl Model {
+    /// The same plan in a world in which an action and its effects never fail.
+    fn with_certain(&self, instance: InstanceId) -> Self {
+        let mut model = self.clone();
+        for node in [self.start(instance), self.end(instance)] {
+            let event = &mut model.events[node.index()];
+            event.success = 1.0;
+            for effect in &mut event.effects {
+                effect.probability = 1.0;
+            }
+        }
+        model
+    }
+
+    /// The same plan in a world in which a fact does not change by itself; `None` if it does not
+    /// in any case.
+    fn with_steady(&self, fact: FactId) -> Option<Self> {
+        let position = self.position(fact).filter(|_| is_fact(fact))?;
+        if self.flips[position] == Flip::NEVER {
+            return None;
+        }
+        let mut model = self.clone();
+        model.flips[position] = Flip::NEVER;
+        Some(model)
+    }
+}

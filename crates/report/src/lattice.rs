@@ -1,0 +1,283 @@
+//! A picture of all orders of a plan's happenings, as SVG.
+//!
+//! A [`LatticePicture`] shows the sets of happenings that an order can have behind it, from nothing on
+//! the left to everything on the right, with a line for each happening that can be next. How dark a
+//! set is says how likely the best of the orders through it is to succeed; one order is drawn through
+//! it all. No fonts are read, and the same picture gives the same bytes.
+
+use std::fmt::Write as _;
+
+/// What is drawn.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LatticePicture {
+    /// What it shows.
+    pub title: String,
+    /// Below the title.
+    pub subtitle: String,
+    /// The sets; a line leads from an earlier to a later one.
+    pub nodes: Vec<PictureNode>,
+    /// The lines.
+    pub edges: Vec<PictureEdge>,
+    /// One order: the positions of the sets that it leads through.
+    pub shown: Vec<usize>,
+}
+
+/// A set.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PictureNode {
+    /// How many happenings are in it: how far to the right it is.
+    pub level: usize,
+    /// What is in it.
+    pub words: String,
+    /// A probability.
+    pub value: f64,
+    /// Whether an order may end there.
+    pub is_end: bool,
+}
+
+/// A line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PictureEdge {
+    /// The position of a set.
+    pub from: usize,
+    /// The position of a set.
+    pub to: usize,
+    /// The happening.
+    pub words: String,
+    /// A probability.
+    pub value: f64,
+}
+
+/// Pixels from one level to the next.
+const COLUMN: f64 = 118.0;
+/// Pixels from one set of a level to the next.
+const ROW: f64 = 34.0;
+const MARGIN: f64 = 40.0;
+/// Pixels from one line of words to the next.
+const LINE: f64 = 16.0;
+/// Room above the sets, for the titles.
+const HEAD: f64 = 84.0;
+/// Where a level has more sets than this, their probabilities are told only by hovering.
+const MOST_LABELLED: usize = 14;
+
+impl LatticePicture {
+    /// The picture as an SVG document.
+    pub fn svg(&self) -> String {
+        let places = self.places();
+        let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
+        let tallest = self.tallest();
+        let width = (2.0 * MARGIN + COLUMN * float(levels)).max(640.0);
+        let steps = float(self.steps().count());
+        let height = HEAD + 1.5 * MARGIN + ROW * float(tallest.max(3)) + LINE * steps;
+        let mut svg = String::new();
+        let _ = writeln!(
+            svg,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\">"
+        );
+        let _ = writeln!(svg, "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>");
+        text(&mut svg, (MARGIN / 2.0, 26.0), 16, "start", &self.title);
+        text(&mut svg, (MARGIN / 2.0, 46.0), 12, "start", &self.subtitle);
+        for edge in self.edges.iter().filter(|edge| !self.is_shown(edge)) {
+            self.line(&mut svg, edge, &places);
+        }
+        for edge in self.edges.iter().filter(|edge| self.is_shown(edge)) {
+            self.line(&mut svg, edge, &places);
+        }
+        let best = self.nodes.iter().map(|node| node.value).fold(0.0, f64::max);
+        for (position, node) in self.nodes.iter().enumerate() {
+            self.set(&mut svg, (position, node), places[position], best, tallest);
+        }
+        // Words would stand upon lines and sets: along the order are numbers, and the words below.
+        for (step, edge) in self.steps().enumerate() {
+            let (from, to) = (places[edge.from], places[edge.to]);
+            let middle = f64::midpoint(from.0, to.0);
+            let number = (step + 1).to_string();
+            let above = f64::midpoint(from.1, to.1) - 7.0;
+            text(&mut svg, (middle, above), 11, "middle", &number);
+            let line = format!("{number}  {}", edge.words);
+            let below = HEAD + ROW * float(tallest.max(3)) + MARGIN + LINE * float(step);
+            text(&mut svg, (MARGIN / 2.0, below), 11, "start", &line);
+        }
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    /// The lines along the order that is shown.
+    fn steps(&self) -> impl Iterator<Item = &PictureEdge> {
+        let pairs = self.shown.windows(2);
+        pairs.filter_map(|pair| {
+            let mut edges = self.edges.iter();
+            edges.find(|edge| [edge.from, edge.to] == *pair)
+        })
+    }
+
+    fn tallest(&self) -> usize {
+        let count = |level| self.nodes.iter().filter(|node| node.level == level).count();
+        let levels = self.nodes.iter().map(|node| node.level);
+        levels.map(count).max().unwrap_or(0)
+    }
+
+    fn is_shown(&self, edge: &PictureEdge) -> bool {
+        let mut pairs = self.shown.windows(2);
+        pairs.any(|pair| [edge.from, edge.to] == *pair)
+    }
+
+    /// The middle of each set: level by level, each close to those from which lines come.
+    fn places(&self) -> Vec<(f64, f64)> {
+        let levels = self.nodes.iter().map(|node| node.level).max().unwrap_or(0);
+        let tallest = float(self.tallest().max(3));
+        let mut places = vec![(0.0, 0.0); self.nodes.len()];
+        for level in 0..=levels {
+            let at = |position: &usize| self.nodes[*position].level == level;
+            let mut here: Vec<(f64, usize)> = (0..self.nodes.len())
+                .filter(at)
+                .map(|position| {
+                    let before = self.edges.iter().filter(|edge| edge.to == position);
+                    let heights: Vec<f64> = before.map(|edge| places[edge.from].1).collect();
+                    let sum: f64 = heights.iter().sum();
+                    (sum / float(heights.len().max(1)), position)
+                })
+                .collect();
+            here.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let count = float(here.len());
+            for (row, (_, position)) in here.into_iter().enumerate() {
+                let offset = (tallest - count) / 2.0 + float(row) + 0.5;
+                places[position] = (MARGIN + COLUMN * float(level), HEAD + ROW * offset);
+            }
+        }
+        places
+    }
+
+    fn line(&self, svg: &mut String, edge: &PictureEdge, places: &[(f64, f64)]) {
+        let ((x1, y1), (x2, y2)) = (places[edge.from], places[edge.to]);
+        let (stroke, width) = if self.is_shown(edge) {
+            ("#d55e00", 3.0)
+        } else {
+            ("#bbbbbb", 1.0)
+        };
+        let _ = writeln!(
+            svg,
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{stroke}\" \
+             stroke-width=\"{width}\"><title>{}: {}</title></line>",
+            escaped(&edge.words),
+            percent(edge.value)
+        );
+    }
+
+    fn set(
+        &self,
+        svg: &mut String,
+        (position, node): (usize, &PictureNode),
+        (x, y): (f64, f64),
+        best: f64,
+        tallest: usize,
+    ) {
+        let share = if best > 0.0 { node.value / best } else { 0.0 };
+        let (outline, width) = match (self.shown.contains(&position), node.is_end) {
+            (true, _) => ("#d55e00", 3.0),
+            (false, true) => ("#3c3c3c", 2.5),
+            (false, false) => ("#3c3c3c", 0.8),
+        };
+        let _ = writeln!(
+            svg,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{}\" fill=\"{}\" stroke=\"{outline}\" \
+             stroke-width=\"{width}\"><title>{}: {}</title></circle>",
+            if node.is_end { 9 } else { 7 },
+            blue(share),
+            escaped(&node.words),
+            percent(node.value)
+        );
+        if tallest <= MOST_LABELLED {
+            text(svg, (x, y + 20.0), 9, "middle", &percent(node.value));
+        }
+    }
+}
+
+fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &str) {
+    let _ = writeln!(
+        svg,
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" \
+         fill=\"#3c3c3c\">{}</text>",
+        escaped(words)
+    );
+}
+
+/// From white to the blue of Okabe & Ito.
+fn blue(share: f64) -> String {
+    let share = share.clamp(0.0, 1.0);
+    let mixed = |end: f64| 255.0 + (end - 255.0) * share;
+    format!("rgb({:.0},{:.0},{:.0})", mixed(0.0), mixed(114.0), mixed(178.0))
+}
+
+fn percent(value: f64) -> String {
+    format!("{:.1} %", 100.0 * value)
+}
+
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+#[allow(clippy::cast_precision_loss, reason = "counts of what is drawn")]
+fn float(count: usize) -> f64 {
+    count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LatticePicture, PictureEdge, PictureNode};
+
+    fn diamond() -> LatticePicture {
+        let node = |level, words: &str, value| PictureNode {
+            level,
+            words: words.to_owned(),
+            value,
+            is_end: level == 2,
+        };
+        let edge = |from, to, words: &str| PictureEdge {
+            from,
+            to,
+            words: words.to_owned(),
+            value: 0.5,
+        };
+        LatticePicture {
+            title: "a < b & c".to_owned(),
+            subtitle: String::new(),
+            nodes: vec![
+                node(0, "nothing", 0.5),
+                node(1, "(a)", 0.5),
+                node(1, "(b)", 0.25),
+                node(2, "(a), (b)", 0.5),
+            ],
+            edges: vec![edge(0, 1, "(a)"), edge(0, 2, "(b)"), edge(1, 3, "(b)"), edge(2, 3, "(a)")],
+            shown: vec![0, 1, 3],
+        }
+    }
+
+    #[test]
+    fn each_set_and_each_line_is_drawn_once() {
+        let svg = diamond().svg();
+        assert_eq!(svg.matches("<circle").count(), 4);
+        assert_eq!(svg.matches("<line").count(), 4);
+        // The order that is shown is numbered, and its happenings stand below.
+        assert_eq!(svg.matches(">1  (a)</text>").count(), 1);
+        assert_eq!(svg.matches(">2  (b)</text>").count(), 1);
+        assert!(svg.contains("a &lt; b &amp; c") && svg.contains("(a), (b): 50.0 %"), "{svg}");
+        assert_eq!(svg, diamond().svg());
+    }
+
+    #[test]
+    fn nothing_can_be_drawn() {
+        assert!(LatticePicture::default().svg().ends_with("</svg>\n"));
+    }
+}
