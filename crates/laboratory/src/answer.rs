@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::compare::{self, Experiment, ExperimentError, Part, Results};
 use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
+use crate::record::TrialRecords;
 
 /// An experiment of either kind.
 #[derive(Clone, Debug)]
@@ -114,6 +115,18 @@ pub fn compare(
     request: CompareRequest<'_>,
     watcher: &mut (dyn Watcher + Send),
 ) -> Result<CompareAnswer, CompareError> {
+    compare_recorded(request, None, watcher)
+}
+
+/// The same, with a record of each trial.
+///
+/// # Errors
+/// As for [`compare`].
+pub fn compare_recorded(
+    request: CompareRequest<'_>,
+    records: Option<&TrialRecords>,
+    watcher: &mut (dyn Watcher + Send),
+) -> Result<CompareAnswer, CompareError> {
     let CompareRequest { experiment, part } = request;
     let of = experiment.count(part);
     let shared = Mutex::new((watcher, 0));
@@ -128,10 +141,12 @@ pub fn compare(
     };
     Ok(match experiment {
         AnyExperiment::Timed(experiment) => {
-            CompareAnswer::Timed(compare::run(experiment, part, &observe)?)
+            let results = compare::run_recorded(experiment, part, records, &observe)?;
+            CompareAnswer::Timed(results)
         }
         AnyExperiment::Untimed(experiment) => {
-            CompareAnswer::Untimed(perturbed::run(experiment, part, &observe)?)
+            let results = perturbed::run_recorded(experiment, part, records, &observe)?;
+            CompareAnswer::Untimed(results)
         }
     })
 }
@@ -221,10 +236,10 @@ impl CompareAnswer {
         }
     }
 
-    /// The plots, by name; those of experiments on a clock have none.
+    /// The plots, by name.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         match self {
-            Self::Timed(_) => Vec::new(),
+            Self::Timed(results) => results.plots(),
             Self::Untimed(results) => perturbed::plots(results),
         }
     }

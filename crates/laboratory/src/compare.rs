@@ -10,6 +10,7 @@ mod clairvoyant;
 mod experiment;
 mod optimum;
 pub(crate) mod parts;
+mod plots;
 mod results;
 mod trials;
 
@@ -23,6 +24,8 @@ pub use results::{Cell, Pair, Results, ResultsError};
 
 use parts::Partial;
 use trials::Setting;
+
+use crate::record::TrialRecords;
 
 /// The trials to make, and the number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +63,19 @@ pub fn run(
     part: Part,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
+    run_recorded(experiment, part, None, observe)
+}
+
+/// The same, with a record of each trial.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_recorded(
+    experiment: &Experiment,
+    part: Part,
+    records: Option<&TrialRecords>,
+    observe: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<Results, ExperimentError> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(part.jobs)
         .build()
@@ -90,7 +106,7 @@ pub fn run(
     let parts: Vec<Result<Results, ExperimentError>> = pool.install(|| {
         settings
             .par_iter()
-            .map(|setting| setting.run(part, &told, &goes_on))
+            .map(|setting| setting.run(part, records, &told, &goes_on))
             .collect()
     });
     // In the order of the settings, whichever was ready first.

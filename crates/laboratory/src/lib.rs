@@ -9,6 +9,7 @@
 //! - [`compare`]: temporal execution (`docs/experiments.md`).
 //! - [`perturbed`]: worlds without time, in which starts and effects fail and facts change by
 //!   themselves (`docs/perturbed-worlds.md`); the experiments of paper 2.
+//! - [`record`]: what came of each trial, as a table for other programs.
 //! - [`timed`]: what the best of all executors could reach on a clock, bounded from both sides.
 //! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.
@@ -27,6 +28,7 @@
 pub mod answer;
 pub mod compare;
 pub mod perturbed;
+pub mod record;
 pub mod timed;
 pub mod untimed;
 pub mod worlds;

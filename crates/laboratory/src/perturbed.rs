@@ -10,11 +10,12 @@ mod planner;
 mod results;
 mod table;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
-    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest,
+    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest, Trial,
     UntimedExecutor, UntimedWorld, all_actions, trial,
 };
 use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
@@ -26,12 +27,13 @@ use elbowroom_probability::optimum::{self, DeadEnds};
 use rayon::prelude::*;
 
 pub use experiment::{
-    Case, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
+    Case, OptimumRules, PerturbedError, PerturbedExperiment, PlannerKind, Published, WorldKind,
 };
 pub use results::{PerturbedResults, Row, Work};
 pub use table::{plots, records, table};
 
 use crate::compare::Part;
+use crate::record::{TrialRecord, TrialRecords};
 use planner::EmbeddedPlans;
 
 /// Callbacks of the trials.
@@ -40,6 +42,8 @@ struct Watch<'w> {
     goes_on: &'w (dyn Fn() -> bool + Sync),
     /// One has been made.
     tell: &'w (dyn Fn() + Sync),
+    /// Where each is recorded.
+    records: Option<&'w TrialRecords>,
 }
 
 /// One case, ready to be run.
@@ -54,6 +58,7 @@ struct Setting<'e> {
     chances: Chances,
     perturbed: Option<PerturbedFacts>,
     foresight: OnceLock<Result<Foresighted, NoForesight>>,
+    other_optima: OnceLock<Result<BTreeMap<OptimumRules, f64>, PerturbedError>>,
 }
 
 /// Makes the trials of each case, in each world, with each executor. `observe` is told how many are
@@ -67,12 +72,26 @@ pub fn run(
     part: Part,
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<PerturbedResults, PerturbedError> {
+    run_recorded(experiment, part, None, observe)
+}
+
+/// The same, with a record of each trial.
+///
+/// # Errors
+/// As for [`run`].
+pub fn run_recorded(
+    experiment: &PerturbedExperiment,
+    part: Part,
+    records: Option<&TrialRecords>,
+    observe: &(dyn Fn(u64) -> bool + Sync),
+) -> Result<PerturbedResults, PerturbedError> {
     let done = AtomicU64::new(0);
     let watch = Watch {
         goes_on: &|| observe(done.load(Ordering::Relaxed)),
         tell: &|| {
             observe(done.fetch_add(1, Ordering::Relaxed) + 1);
         },
+        records,
     };
     let cases = (0..).zip(&experiment.cases);
     let settings: Vec<Setting<'_>> = cases
@@ -143,22 +162,49 @@ impl<'e> Setting<'e> {
             chances,
             perturbed,
             foresight: OnceLock::new(),
+            other_optima: OnceLock::new(),
         })
     }
 
     /// The table of the sound world, made when it is first asked for.
     fn table(&self) -> &Result<Foresighted, NoForesight> {
         self.foresight.get_or_init(|| {
-            // The first plan takes a round; each step that ends in a dead end takes another.
-            let patience = self.experiment.rounds.saturating_sub(1).max(1);
             let settings = optimum::Settings {
                 most_running: self.case.most_running,
-                dead_ends: DeadEnds::Patience(patience),
+                dead_ends: self.patience(),
                 ..optimum::Settings::default()
             };
             let actions = self.actions.clone();
             Foresighted::new(&self.task, actions, &self.likelihoods, settings)
         })
+    }
+
+    /// The optimum by other rules, as far as the experiment asks for it.
+    fn other_optima(&self) -> &Result<BTreeMap<OptimumRules, f64>, PerturbedError> {
+        self.other_optima.get_or_init(|| {
+            let rules = self.case.also.iter().map(|&rules| {
+                let settings = optimum::Settings {
+                    most_running: self.case.most_running,
+                    dead_ends: if rules.loses_dead_ends() {
+                        DeadEnds::Lost
+                    } else {
+                        self.patience()
+                    },
+                    enforces_over_all: rules.keeps_over_all(),
+                    ..optimum::Settings::default()
+                };
+                let actions = self.actions.clone();
+                let found = Foresighted::new(&self.task, actions, &self.likelihoods, settings);
+                let found = found.map_err(|error| self.no_table(&error))?;
+                Ok((rules, results::rounded(found.value())))
+            });
+            rules.collect()
+        })
+    }
+
+    fn patience(&self) -> DeadEnds {
+        // The first plan takes a round; each step that ends in a dead end takes another.
+        DeadEnds::Patience(self.experiment.rounds.saturating_sub(1).max(1))
     }
 
     fn foresight(&self) -> Result<&Foresighted, PerturbedError> {
@@ -193,6 +239,34 @@ impl<'e> Setting<'e> {
         }
     }
 
+    fn record(
+        &self,
+        world: WorldKind,
+        executor: ExecutorName,
+        (trial, seed): (u64, u64),
+        made: &Trial,
+    ) -> TrialRecord {
+        let place = |of: Option<usize>| of.unwrap_or_default();
+        let mut worlds = self.experiment.worlds.iter();
+        let mut executors = self.experiment.executors.iter();
+        let verdict = if made.is_success { "goal-reached" } else { "failed" };
+        TrialRecord {
+            place: (
+                usize::try_from(self.number).unwrap_or(usize::MAX),
+                place(worlds.position(|it| *it == world)),
+            ),
+            trial,
+            row: place(executors.position(|it| *it == executor)),
+            seed,
+            case: self.case.name.clone(),
+            column: world.name().to_owned(),
+            executor: executor.name().to_owned(),
+            verdict: verdict.to_owned(),
+            time: None,
+            replans: made.replans,
+        }
+    }
+
     fn row(
         &self,
         world: WorldKind,
@@ -212,6 +286,7 @@ impl<'e> Setting<'e> {
         let is_dead_end = foresight.map(|foresight| {
             move |state: &State, running: &[ActionName]| foresight.is_dead_end(state, running)
         });
+        let kind_of_world = world;
         let mut plans = self.plans();
         let mut game = Game {
             task: &self.task,
@@ -223,6 +298,9 @@ impl<'e> Setting<'e> {
             },
         };
         let mut row = Row::new(self.case, world, kind, foresight.map(Foresighted::value));
+        if world == WorldKind::Sound {
+            row.other_optima = self.other_optima().clone()?;
+        }
         let first_seed = (self.experiment.seed.wrapping_mul(1_000_003))
             .wrapping_add(self.number.wrapping_mul(1_000_000_007));
         for number in part.numbers() {
@@ -240,7 +318,11 @@ impl<'e> Setting<'e> {
                     sound = SoundWorld::new(&self.chances, self.task.initial(), seed);
                     &mut sound
                 };
-            row.add(trial(&mut game, world, &mut *executor));
+            let made = trial(&mut game, world, &mut *executor);
+            if let Some(records) = watch.records {
+                records.add(self.record(kind_of_world, kind, (number, seed), &made));
+            }
+            row.add(made);
             (watch.tell)();
         }
         Ok(row)

@@ -26,9 +26,13 @@ pub(crate) struct CompareArgs {
     /// Run nothing; merge the results of parts
     #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
     pub(crate) merge: Vec<PathBuf>,
-    /// Write results.json, table.md, table.csv and any plots to this folder
+    /// Write results.json, table.md, table.csv and plots to this folder
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    /// Also write trials.csv there: seed, case, column, trial, executor, verdict, time and replans of
+    /// each trial
+    #[arg(long, requires = "output", conflicts_with = "merge")]
+    pub(crate) each_trial: bool,
     /// Print the results as one JSON document
     #[arg(long)]
     pub(crate) json: bool,

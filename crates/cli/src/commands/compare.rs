@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
-    AnyExperiment, CompareAnswer, CompareError, CompareRequest, compare,
+    AnyExperiment, CompareAnswer, CompareError, CompareRequest, compare_recorded,
 };
 use elbowroom_laboratory::compare::Part;
+use elbowroom_laboratory::record::TrialRecords;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::CompareArgs;
@@ -42,15 +43,16 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     if let Some(seed) = arguments.seed {
         experiment.set_seed(seed);
     }
+    let records = arguments.each_trial.then(TrialRecords::default);
     let answer = if arguments.merge.is_empty() {
-        make(arguments, &experiment)?
+        make(arguments, &experiment, records.as_ref())?
     } else {
         merged(&arguments.merge, &experiment)?
     };
     let table = answer.table(&experiment)?;
     // What was computed is shown, whatever becomes of the files.
     let written = match &arguments.output {
-        Some(folder) => write(folder, &answer, &table),
+        Some(folder) => write(folder, &answer, &table, records),
         None => Ok(()),
     };
     if arguments.json {
@@ -68,7 +70,11 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     })
 }
 
-fn make(arguments: &CompareArgs, experiment: &AnyExperiment) -> Result<CompareAnswer, Failure> {
+fn make(
+    arguments: &CompareArgs,
+    experiment: &AnyExperiment,
+    records: Option<&TrialRecords>,
+) -> Result<CompareAnswer, Failure> {
     let (shard, shards) = arguments.shard.unwrap_or((0, 1));
     let part = Part {
         trials: arguments.trials.unwrap_or(experiment.trials()),
@@ -83,7 +89,7 @@ fn make(arguments: &CompareArgs, experiment: &AnyExperiment) -> Result<CompareAn
         ),
         stopwatch: Stopwatch::start(&Interrupt::listen()),
     };
-    let answer = compare(CompareRequest { experiment, part }, &mut watch);
+    let answer = compare_recorded(CompareRequest { experiment, part }, records, &mut watch);
     watch.bar.finish_and_clear();
     Ok(answer?)
 }
@@ -123,11 +129,19 @@ fn merged(paths: &[PathBuf], experiment: &AnyExperiment) -> Result<CompareAnswer
     Ok(CompareAnswer::merged(&parts)?)
 }
 
-fn write(folder: &Path, answer: &CompareAnswer, table: &Table) -> Result<(), Failure> {
+fn write(
+    folder: &Path,
+    answer: &CompareAnswer,
+    table: &Table,
+    records: Option<TrialRecords>,
+) -> Result<(), Failure> {
     let write = |name: &str, text: &str| output::write_file(&folder.join(name), text);
     write("results.json", &format!("{:#}\n", answer.json()))?;
     write("table.md", &table.markdown())?;
     write("table.csv", &answer.records().csv())?;
+    if let Some(records) = records {
+        write("trials.csv", &records.table().csv())?;
+    }
     for (name, plot) in answer.plots() {
         let svg = plot.svg().map_err(|error| Failure::new(error, ""))?;
         write(&format!("{name}.svg"), &svg)?;

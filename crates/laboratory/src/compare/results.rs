@@ -341,7 +341,7 @@ impl Cell {
     }
 
     /// The share of runs that reached the goal.
-    fn coverage(&self) -> Proportion {
+    pub(super) fn coverage(&self) -> Proportion {
         Proportion {
             successes: self.successes,
             count: self.runs,
@@ -349,7 +349,7 @@ impl Cell {
     }
 
     /// The mean number of new plans of successful runs.
-    fn mean_replans(&self) -> Mean {
+    pub(super) fn mean_replans(&self) -> Mean {
         Mean {
             sum: self.replans,
             count: self.successes,

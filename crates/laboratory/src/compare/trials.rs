@@ -21,6 +21,8 @@ use elbowroom::execute::{
 };
 use elbowroom::flow;
 
+use crate::record::{TrialRecord, TrialRecords};
+
 /// The number of plans remembered for one problem: some megabytes.
 const PLANS: usize = 20_000;
 
@@ -62,6 +64,7 @@ impl Setting<'_> {
     pub(super) fn run(
         &self,
         part: Part,
+        records: Option<&TrialRecords>,
         tell: &(dyn Fn() -> bool + Sync),
         goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Results, ExperimentError> {
@@ -73,7 +76,7 @@ impl Setting<'_> {
         let mut common = self.common(goes_on)?;
         for trial in part.numbers().skip(self.piece).step_by(self.pieces) {
             for column in 0..experiment.columns.len() {
-                self.trial(trial, column, &mut common, &mut results);
+                self.trial((trial, column), records, &mut common, &mut results);
                 if !tell() {
                     return Ok(results);
                 }
@@ -147,7 +150,13 @@ impl Setting<'_> {
     }
 
     /// Every executor in the same world.
-    fn trial(&self, trial: u64, column: usize, common: &mut Common<'_>, results: &mut Results) {
+    fn trial(
+        &self,
+        (trial, column): (u64, usize),
+        records: Option<&TrialRecords>,
+        common: &mut Common<'_>,
+        results: &mut Results,
+    ) {
         // The same seed in all columns: their worlds differ only where the columns do.
         let seed = self
             .experiment
@@ -162,6 +171,9 @@ impl Setting<'_> {
             let report = self.execute(seed, spec, column, common);
             reached.push(report.verdict == Verdict::GoalReached);
             results.cells[row][column].count(&report);
+            if let Some(records) = records {
+                records.add(self.record((trial, seed), column, row, &report));
+            }
         }
         if self.experiment.clairvoyant {
             let world = &common.columns[column].world;
@@ -178,6 +190,36 @@ impl Setting<'_> {
             pair.only_first += u64::from(reached[0] && !this);
             pair.only_this += u64::from(*this && !reached[0]);
         }
+    }
+
+    fn record(
+        &self,
+        (trial, seed): (u64, u64),
+        column: usize,
+        row: usize,
+        report: &Report,
+    ) -> TrialRecord {
+        TrialRecord {
+            place: (self.problem, column),
+            trial,
+            row,
+            seed,
+            case: self.words(),
+            column: self.experiment.columns[column].name.clone(),
+            executor: self.experiment.executors[row].to_string(),
+            verdict: report.verdict.name().to_owned(),
+            time: Some(report.time.to_decimal(6)),
+            replans: report.replans,
+        }
+    }
+
+    /// What was filled in.
+    fn words(&self) -> String {
+        let filling = self.filling.iter();
+        let filling: Vec<_> = filling
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        filling.join(", ")
     }
 
     fn execute(
@@ -282,14 +324,7 @@ impl Setting<'_> {
         if self.filling.is_empty() {
             return ExperimentError::other(format!("the problem: {message}"));
         }
-        let filling = self.filling.iter();
-        let filling: Vec<_> = filling
-            .map(|(name, value)| format!("{name} = {value}"))
-            .collect();
-        ExperimentError::other(format!(
-            "the problem with {}: {message}",
-            filling.join(", ")
-        ))
+        ExperimentError::other(format!("the problem with {}: {message}", self.words()))
     }
 }
 

@@ -48,6 +48,8 @@ pub struct Case {
     pub problem: String,
     /// For the optimum: how many actions are under way at once at most.
     pub most_running: usize,
+    /// By which other rules the optimum is calculated, too.
+    pub also: Vec<OptimumRules>,
     /// A likelihood file (`docs/formats/likelihoods.md`).
     pub likelihoods: String,
     /// What others have measured in the world as published.
@@ -103,6 +105,40 @@ impl WorldKind {
             Self::Sound => "sound",
             Self::AsPublished => "as-published",
         }
+    }
+}
+
+/// Rules by which the optimum is calculated beside those of the trials. Those are: a step that ends in a dead
+/// end uses up a planning round; conditions over all are not looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OptimumRules {
+    /// A run in a dead end is lost.
+    DeadEndsLost,
+    /// An action without what it needs over all breaks off at once.
+    OverAllKept,
+    /// Both.
+    DeadEndsLostOverAllKept,
+}
+
+impl OptimumRules {
+    /// As in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DeadEndsLost => "dead-ends-lost",
+            Self::OverAllKept => "over-all-kept",
+            Self::DeadEndsLostOverAllKept => "dead-ends-lost-over-all-kept",
+        }
+    }
+
+    /// Whether a run in a dead end is lost.
+    pub fn loses_dead_ends(self) -> bool {
+        matches!(self, Self::DeadEndsLost | Self::DeadEndsLostOverAllKept)
+    }
+
+    /// Whether an action without what it needs over all breaks off at once.
+    pub fn keeps_over_all(self) -> bool {
+        matches!(self, Self::OverAllKept | Self::DeadEndsLostOverAllKept)
     }
 }
 
@@ -189,7 +225,10 @@ struct File {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OptimumFile {
+    #[serde(default = "no_limit")]
     most_running: usize,
+    #[serde(default)]
+    also: Vec<OptimumRules>,
 }
 
 #[derive(Deserialize)]
@@ -203,6 +242,10 @@ struct CaseFile {
 #[derive(Deserialize)]
 struct Head {
     format: String,
+}
+
+fn no_limit() -> usize {
+    usize::MAX
 }
 
 fn ten() -> usize {
@@ -232,6 +275,7 @@ impl PerturbedExperiment {
                 domain,
                 problem,
                 most_running,
+                also,
                 likelihoods,
                 published,
             } = case;
@@ -239,7 +283,9 @@ impl PerturbedExperiment {
             let published = published
                 .as_ref()
                 .map(|it| json!([it.trials, it.successes]));
-            json!([name, domain, problem, most_running, likelihoods, published])
+            let own = json!([name, domain, problem, most_running, likelihoods, published]);
+            // Results of experiments that do not ask for it stay what they are.
+            if also.is_empty() { own } else { json!([own, also]) }
         });
         let worlds: Vec<&str> = worlds.iter().map(|world| world.name()).collect();
         json!([
@@ -363,12 +409,15 @@ fn own_cases(
         given(&read.problem, "problem")?,
     );
     let most_running = read.optimum.as_ref().map(|optimum| optimum.most_running);
+    let also = read.optimum.as_ref().map(|optimum| optimum.also.clone());
+    let also = also.unwrap_or_default();
     let case = |case: &CaseFile| {
         Ok(Case {
             name: case.name.clone(),
             domain: domain.clone(),
             problem: problem.clone(),
             most_running: most_running.unwrap_or(usize::MAX),
+            also: also.clone(),
             likelihoods: named(source, &case.likelihoods, file)?,
             published: case.published.clone(),
         })

@@ -1,10 +1,12 @@
 //! What trials in perturbed worlds came to.
 
+use std::collections::BTreeMap;
+
 use crate::untimed::Trial;
 use elbowroom_report::statistics::{Mean, Proportion};
 use serde::{Deserialize, Serialize};
 
-use super::{Case, PerturbedError, PerturbedExperiment, WorldKind};
+use super::{Case, OptimumRules, PerturbedError, PerturbedExperiment, WorldKind};
 use crate::compare::Part;
 use crate::compare::parts::{self, Partial, fingerprint};
 use crate::untimed::ExecutorName;
@@ -132,6 +134,14 @@ pub struct Row {
     pub published: Option<Proportion>,
     /// The best success probability there can be, where it is known.
     pub optimum: Option<f64>,
+    /// The same by other rules, if the experiment asks for it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub other_optima: BTreeMap<OptimumRules, f64>,
+}
+
+/// So many digits are read back as they were written.
+pub(super) fn rounded(probability: f64) -> f64 {
+    (probability * 1e12).round() / 1e12
 }
 
 /// Means of what was done.
@@ -170,8 +180,8 @@ impl Row {
             succeeded: Work::default(),
             failed: Work::default(),
             published,
-            // So many digits are read back as they were written.
-            optimum: optimum.map(|optimum| (optimum * 1e12).round() / 1e12),
+            optimum: optimum.map(rounded),
+            other_optima: BTreeMap::new(),
         }
     }
 

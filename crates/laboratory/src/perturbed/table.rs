@@ -6,7 +6,7 @@ use elbowroom_report::table::Table;
 
 use crate::compare::parts;
 
-use super::{PerturbedResults, Row, WorldKind};
+use super::{OptimumRules, PerturbedResults, Row, WorldKind};
 use crate::untimed::ExecutorName;
 
 /// The results as a table.
@@ -57,10 +57,16 @@ fn of_rows(
     interval: impl Fn(&Row) -> Vec<String>,
 ) -> Table {
     let before = ["case", "world", "executor", "success %"];
-    let after = [
-        "published %",
-        "z",
-        "optimum %",
+    let mut rules: Vec<OptimumRules> = Vec::new();
+    for row in rows {
+        for &own in row.other_optima.keys() {
+            if !rules.contains(&own) {
+                rules.push(own);
+            }
+        }
+    }
+    let optima = rules.iter().map(|rules| format!("optimum % ({})", rules.name()));
+    let work = [
         "replans",
         "messages (success)",
         "failed starts (success)",
@@ -83,6 +89,10 @@ fn of_rows(
             percent(row.published.and_then(Proportion::share)),
             z.unwrap_or_default(),
             percent(row.optimum),
+        ]);
+        let others = rules.iter().map(|rules| row.other_optima.get(rules).copied());
+        cells.extend(others.map(percent));
+        cells.extend([
             mean(row.replans),
             mean(row.succeeded.messages),
             mean(row.succeeded.failed_starts),
@@ -93,10 +103,13 @@ fn of_rows(
         ]);
         cells
     };
+    let after = ["published %", "z", "optimum %"];
     let headings = before.iter().chain(interval_headings).chain(&after);
+    let headings = headings.map(|heading| (*heading).to_owned());
+    let headings = headings.chain(optima).chain(work.map(str::to_owned));
     Table {
         caption: String::new(),
-        headings: headings.map(|heading| (*heading).to_owned()).collect(),
+        headings: headings.collect(),
         keys: 3,
         rows: rows.iter().map(row).collect(),
         notes: Vec::new(),

@@ -1,0 +1,70 @@
+//! Results on a clock as plots.
+
+use elbowroom_report::plot::{IntervalPlot, Point, Series};
+use elbowroom_report::statistics::{Mean, Proportion};
+
+use super::results::Cell;
+use super::{Results, optimum};
+
+impl Results {
+    /// The plots, with a name for a file each: the coverage of each executor in each column, with its
+    /// 95 % interval, and the mean number of new plans of successful runs.
+    pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
+        let mut coverage = self.plot("coverage, with 95 % intervals", "runs that reach the goal, %", &|cell| {
+            share(cell.coverage())
+        });
+        coverage.reference = self.reference();
+        let replans = self.plot("new plans of successful runs", "mean", &|cell| {
+            mean(cell.mean_replans())
+        });
+        vec![("coverage".to_owned(), coverage), ("replans".to_owned(), replans)]
+    }
+
+    fn plot(
+        &self,
+        what: &str,
+        axis: &str,
+        value: &dyn Fn(&Cell) -> Option<Point>,
+    ) -> IntervalPlot {
+        let series = self.rows.iter().zip(&self.cells).map(|(name, cells)| Series {
+            name: name.clone(),
+            points: cells.iter().map(value).collect(),
+        });
+        IntervalPlot {
+            title: format!("{}: {what}", self.title),
+            axis: axis.to_owned(),
+            groups: self.columns.clone(),
+            series: series.collect(),
+            reference: None,
+        }
+    }
+
+    /// The upper bound of what the best of all executors reaches, where it says something.
+    fn reference(&self) -> Option<Series> {
+        let point = |column: &super::ColumnOptimum| {
+            column.unknown.is_none().then_some(Point {
+                value: 100.0 * column.upper,
+                interval: None,
+            })
+        };
+        let points: Vec<Option<Point>> = self.optimum.iter().map(point).collect();
+        points.iter().any(Option::is_some).then(|| Series {
+            name: format!("{}, at most", optimum::ROW),
+            points,
+        })
+    }
+}
+
+fn share(of: Proportion) -> Option<Point> {
+    Some(Point {
+        value: 100.0 * of.share()?,
+        interval: of.wilson().map(|(lower, upper)| (100.0 * lower, 100.0 * upper)),
+    })
+}
+
+fn mean(of: Mean) -> Option<Point> {
+    of.value().map(|value| Point {
+        value,
+        interval: None,
+    })
+}
