@@ -55,7 +55,6 @@ fn the_optimum_depends_on_what_becomes_of_dead_ends_and_on_conditions_over_all()
     assert!((row.optimum.unwrap() - 0.287).abs() < 0.0005, "{row:?}");
     assert!((lost - 0.196).abs() < 0.0005, "{row:?}");
     // Each rule takes something away.
-    assert!(by(OptimumRules::OverAllKept) < row.optimum.unwrap());
     assert!(by(OptimumRules::DeadEndsLostOverAllKept) < lost);
     let table = perturbed::table(&results);
     assert!(table.headings.iter().any(|it| it == "optimum % (dead-ends-lost)"));
