@@ -110,10 +110,18 @@ fn each_trial_has_a_row_of_its_own_whatever_the_number_of_threads() {
     let (two, _) = each_trial(experiment, &["--trials", "3", "--jobs", "2"], "each-2");
     assert_eq!(one, two);
     let expected = [
-        "coverage.svg", "replans.svg", "results.json", "table.csv", "table.md", "trials.csv",
+        "coverage.svg",
+        "replans.svg",
+        "results.json",
+        "table.csv",
+        "table.md",
+        "trials.csv",
     ];
     assert_eq!(names, expected);
-    assert_eq!(one[0], "seed,case,column,trial,executor,verdict,time,replans");
+    assert_eq!(
+        one[0],
+        "seed,case,column,trial,executor,verdict,time,replans"
+    );
     let text = fs::read_to_string(
         Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/files/late-drives.toml"),
     );
@@ -124,7 +132,10 @@ fn each_trial_has_a_row_of_its_own_whatever_the_number_of_threads() {
     for line in &one[1..] {
         let cells: Vec<&str> = line.split(',').collect();
         assert_eq!(cells.len(), 8, "{line}");
-        assert!(cells[6].parse::<f64>().is_ok() && cells[7].parse::<u32>().is_ok(), "{line}");
+        assert!(
+            cells[6].parse::<f64>().is_ok() && cells[7].parse::<u32>().is_ok(),
+            "{line}"
+        );
     }
 }
 
@@ -134,5 +145,9 @@ fn so_has_each_trial_without_time() {
     let (lines, _) = each_trial(experiment, &["--trials", "2"], "each-3");
     // Ten cases, two worlds, four executors, two trials.
     assert_eq!(lines.len(), 1 + 160);
-    assert!(lines[1].contains(",SF3 p1,as-published,0,esterel,"), "{}", lines[1]);
+    assert!(
+        lines[1].contains(",SF3 p1,as-published,0,esterel,"),
+        "{}",
+        lines[1]
+    );
 }

@@ -18,12 +18,12 @@ mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
 pub use execution::{Execution, execute};
-pub(crate) use facts_only::as_timed;
-pub(crate) use spec::listed;
 pub use external::External;
+pub(crate) use facts_only::as_timed;
 pub use likeliest::{Likeliest, SharedLikeliest};
 pub use memory::{RememberingPlanner, RememberingPreparer};
 pub use planners::{Clockless, Embedded};
+pub(crate) use spec::listed;
 pub use spec::{EMBEDDED, NOBODY, NamedText, RunSpec, SpecError, Spoiler, SpoilerError};
 pub use spoiling::Spoiling;
 pub use vary::check_vary;

@@ -4,11 +4,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use elbowroom::answers::Unwatched;
 use elbowroom::answers::odds::{
     LatticeFinding, LossReason, Odds, OddsAnswer, OddsFinding, OddsRequest, OddsSettings,
     ValueAnswer, odds,
 };
-use elbowroom::answers::Unwatched;
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::pddl::{self, Source};
 use elbowroom::probability::{Likelihoods, likelihoods};
@@ -102,7 +102,10 @@ fn the_published_values_of_the_first_order_are_found() {
             ValueAnswer::Probability(p) => *p,
             ValueAnswer::Unknown(why) => panic!("{why}"),
         };
-        let (own, any) = (value(&odds.gains.as_the_state_asks), value(&odds.gains.any_action));
+        let (own, any) = (
+            value(&odds.gains.as_the_state_asks),
+            value(&odds.gains.any_action),
+        );
         assert!(found < own && own <= any + 1e-12, "{found} {own} {any}");
     }
 }
@@ -118,7 +121,10 @@ fn an_answer_is_a_document_that_can_be_read_again() {
         ..OddsSettings::default()
     };
     let text = serde_json::to_string(&settings).unwrap();
-    assert_eq!(serde_json::from_str::<OddsSettings>(&text).unwrap(), settings);
+    assert_eq!(
+        serde_json::from_str::<OddsSettings>(&text).unwrap(),
+        settings
+    );
     let answer = scene.ask(settings);
     let text = serde_json::to_string_pretty(&answer).unwrap();
     let read: OddsAnswer = serde_json::from_str(&text).unwrap();
@@ -131,7 +137,11 @@ fn the_odds_say_where_and_why_worlds_are_lost() {
     let odds = odds.odds(OddsSettings::default());
     // It starts, the lamp stays whole for one step, and the effect takes place.
     assert!((odds.order.probability - 0.5 * 0.75 * 0.9).abs() < 1e-12);
-    let losses = odds.order.losses.iter().map(|it| (it.at.as_str(), &it.reason));
+    let losses = odds
+        .order
+        .losses
+        .iter()
+        .map(|it| (it.at.as_str(), &it.reason));
     let losses: Vec<_> = losses.collect();
     let throughout = LossReason::Throughout {
         action: "(screw)".to_owned(),
@@ -145,13 +155,23 @@ fn the_odds_say_where_and_why_worlds_are_lost() {
     let start = "start of (screw)";
     assert_eq!(
         losses,
-        [(start, &LossReason::Start), (start, &throughout), ("end of (screw)", &goal)]
+        [
+            (start, &LossReason::Start),
+            (start, &throughout),
+            ("end of (screw)", &goal)
+        ]
     );
     let action = &odds.order.actions[0];
     // After each failed attempt the lamp must be whole still: nothing asks for it, but breaking it is
     // noticed at the start's over-all condition.
-    let retried: f64 = (0..200).map(|n| 0.5_f64.powi(n) * 0.75_f64.powi(n)).sum::<f64>() * 0.3375;
-    assert!((action.if_retried.unwrap() - retried).abs() < 1e-9, "{action:?}");
+    let retried: f64 = (0..200)
+        .map(|n| 0.5_f64.powi(n) * 0.75_f64.powi(n))
+        .sum::<f64>()
+        * 0.3375;
+    assert!(
+        (action.if_retried.unwrap() - retried).abs() < 1e-9,
+        "{action:?}"
+    );
     assert!((action.if_certain - 0.75).abs() < 1e-12);
     assert!((odds.order.facts[0].if_steady - 0.45).abs() < 1e-12);
 }
@@ -174,8 +194,16 @@ fn samples_of_a_world_say_what_its_chances_are() {
         ..OddsSettings::default()
     };
     let executed = scene.odds(settings.clone()).executed;
-    let words: Vec<_> = executed.iter().map(|it| (it.executor.as_str(), it.replans)).collect();
-    let expected = [("live", false), ("live", true), ("adaptable", false), ("adaptable", true)];
+    let words: Vec<_> = executed
+        .iter()
+        .map(|it| (it.executor.as_str(), it.replans))
+        .collect();
+    let expected = [
+        ("live", false),
+        ("live", true),
+        ("adaptable", false),
+        ("adaptable", true),
+    ];
     assert_eq!(words, expected);
     // Executed once as it is, it starts or does not: 5 standard deviations.
     let once = executed[0].reached;
@@ -187,7 +215,11 @@ fn samples_of_a_world_say_what_its_chances_are() {
     assert!(low < 0.7 && 0.7 < high, "{low} {high}");
     // Who tries again gets there.
     assert_eq!(executed[2].reached, 1000);
-    assert_eq!(executed, scene.odds(settings).executed, "one seed, one answer");
+    assert_eq!(
+        executed,
+        scene.odds(settings).executed,
+        "one seed, one answer"
+    );
 }
 
 #[test]
@@ -216,14 +248,19 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
         "(define (problem p) (:domain d) (:objects {} - lamp) (:init) (:goal (and {goals})))",
         objects.join(" ")
     );
-    let plan: String = objects.iter().map(|lamp| format!("0: (light {lamp}) [1]\n")).collect();
+    let plan: String = objects
+        .iter()
+        .map(|lamp| format!("0: (light {lamp}) [1]\n"))
+        .collect();
     let likely = LIKELY.replace("facts.whole.becomes_false = 0.25", "");
     // The best order does not matter here.
     let settings = OddsSettings {
         most_sequences: 100,
         ..settings
     };
-    let long = Scene::new(domain, &problem, &likely).with_plan(&plan).odds(settings);
+    let long = Scene::new(domain, &problem, &likely)
+        .with_plan(&plan)
+        .odds(settings);
     match long.lattice {
         Some(LatticeFinding::Refused(why)) => assert!(why.contains("more than"), "{why}"),
         other => panic!("{other:?}"),
@@ -239,7 +276,10 @@ fn what_is_no_plan_has_no_odds() {
     ));
     let dark = EVENING.replace("(:init (whole))", "(:init)");
     let unsolvable = Scene::new(LAMP, &dark, LIKELY).ask(OddsSettings::default());
-    assert!(matches!(unsolvable.finding, OddsFinding::NoPlan), "{unsolvable:?}");
+    assert!(
+        matches!(unsolvable.finding, OddsFinding::NoPlan),
+        "{unsolvable:?}"
+    );
     let never = LIKELY.replace("start = 0.5", "start = 0.0");
     let never = Scene::new(LAMP, EVENING, &never).ask(OddsSettings::default());
     assert!(matches!(never.finding, OddsFinding::NoOrder), "{never:?}");

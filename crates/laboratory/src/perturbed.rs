@@ -15,8 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::untimed::{
-    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest, Trial,
-    UntimedExecutor, UntimedWorld, all_actions, trial,
+    ActionName, ExecutorName, Foresighted, Game, Limits, Means, NoForesight, Plans, Shortest,
+    Trial, UntimedExecutor, UntimedWorld, all_actions, trial,
 };
 use crate::worlds::{Chances, PerturbedFacts, PublishedWorld, SoundWorld};
 use elbowroom_model::ground::Action;
@@ -249,7 +249,11 @@ impl<'e> Setting<'e> {
         let place = |of: Option<usize>| of.unwrap_or_default();
         let mut worlds = self.experiment.worlds.iter();
         let mut executors = self.experiment.executors.iter();
-        let verdict = if made.is_success { "goal-reached" } else { "failed" };
+        let verdict = if made.is_success {
+            "goal-reached"
+        } else {
+            "failed"
+        };
         TrialRecord {
             place: (
                 usize::try_from(self.number).unwrap_or(usize::MAX),

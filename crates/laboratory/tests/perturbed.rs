@@ -57,7 +57,12 @@ fn the_optimum_depends_on_what_becomes_of_dead_ends_and_on_conditions_over_all()
     // Each rule takes something away.
     assert!(by(OptimumRules::DeadEndsLostOverAllKept) < lost);
     let table = perturbed::table(&results);
-    assert!(table.headings.iter().any(|it| it == "optimum % (dead-ends-lost)"));
+    assert!(
+        table
+            .headings
+            .iter()
+            .any(|it| it == "optimum % (dead-ends-lost)")
+    );
     let read = PerturbedResults::read(&results.json().to_string()).unwrap();
     assert_eq!(read, results);
 }

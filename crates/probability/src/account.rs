@@ -80,7 +80,8 @@ impl Account {
         let retries = Retries::of(model, circumstances, sequence);
         let mut actions = Vec::new();
         for (at, &node) in sequence.iter().enumerate() {
-            let (Node::Start(instance) | Node::Instant(instance)) = model.plan().nodes[node.index()]
+            let (Node::Start(instance) | Node::Instant(instance)) =
+                model.plan().nodes[node.index()]
             else {
                 continue;
             };

@@ -121,9 +121,12 @@ impl Likelihoods {
     /// A fact that neither an action nor the goal mentions has no number in the task, and does not
     /// matter.
     pub fn believed(&self, task: &Task) -> Vec<(FactId, f64)> {
-        let known = self.beliefs.iter().filter_map(|((predicate, arguments), p)| {
-            Some((task.find_fact(*predicate, arguments)?, *p))
-        });
+        let known = self
+            .beliefs
+            .iter()
+            .filter_map(|((predicate, arguments), p)| {
+                Some((task.find_fact(*predicate, arguments)?, *p))
+            });
         known.collect()
     }
 

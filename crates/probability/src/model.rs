@@ -9,9 +9,9 @@ mod requirement;
 
 use std::sync::Arc;
 
-use elbowroom_model::{Step, Task};
 use elbowroom_model::ground::{Condition, Expression, FactId, FluentId};
 use elbowroom_model::problem::UpdateOperator;
+use elbowroom_model::{Step, Task};
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId, PartialOrderPlan};
 

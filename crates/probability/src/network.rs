@@ -251,7 +251,9 @@ impl<'m> PrunedNetwork<'m> {
         let model = self.model;
         let event = model.event(node);
         self.require(&event.condition, node, Reading::OnArrival)?;
-        self.multiply(event.success, (node, Reading::OnArrival), || LossCause::Start);
+        self.multiply(event.success, (node, Reading::OnArrival), || {
+            LossCause::Start
+        });
         let updates = self.updates(node, event);
         self.facts_change(node, event)?;
         for (fluent, number) in updates {
@@ -335,7 +337,9 @@ impl<'m> PrunedNetwork<'m> {
             match self.truth(condition) {
                 Some(true) => {}
                 Some(false) => {
-                    self.multiply(0.0, (node, reading), || LossCause::Condition(condition.clone()));
+                    self.multiply(0.0, (node, reading), || {
+                        LossCause::Condition(condition.clone())
+                    });
                 }
                 None => self.assumed += 1,
             }

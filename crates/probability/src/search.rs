@@ -160,7 +160,8 @@ impl OrderSearch {
     /// A plan's happenings as they are timed, as an order: without the timed initials that do not
     /// matter, or come after all actions. `steps` are in the order of the plan's instances.
     pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
-        let is_timed = |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
+        let is_timed =
+            |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
         let matters = |node: NodeId| self.separations.timed.iter().any(|(own, _)| *own == node);
         let mut order = self.model.as_timed(steps);
         order.retain(|&node| !is_timed(node) || matters(node));

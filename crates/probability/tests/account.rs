@@ -50,7 +50,10 @@ fn success(case: &Case, likelihoods: &Likelihoods, semantics: Semantics, order: 
 }
 
 fn assert_close(found: f64, expected: f64, what: &str) {
-    assert!((found - expected).abs() < 1e-11, "{found} is not {expected}: {what}");
+    assert!(
+        (found - expected).abs() < 1e-11,
+        "{found} is not {expected}: {what}"
+    );
 }
 
 #[test]
@@ -82,7 +85,11 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
                 before = after;
             }
             let last = order.len().checked_sub(1);
-            assert_close(at(last, true), before - worlds.success_probability(), &case.text);
+            assert_close(
+                at(last, true),
+                before - worlds.success_probability(),
+                &case.text,
+            );
             assert_close(account.actions_probability, before, &case.text);
             lossy += account.losses.len();
         }
@@ -102,7 +109,10 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
             let account = Account::of(&model, &case.circumstances, &order).unwrap();
             for share in &account.actions {
                 let own = &case.plan.instance(share.instance).action;
-                let same = case.plan.instances().filter(|(_, it)| it.action.name == own.name);
+                let same = case
+                    .plan
+                    .instances()
+                    .filter(|(_, it)| it.action.name == own.name);
                 if same.count() > 1 {
                     continue;
                 }
@@ -139,7 +149,10 @@ fn certainty_gains_what_it_gains_in_the_world_in_which_there_is_certainty() {
             }
         }
     }
-    assert!(actions > 1000 && facts > 200, "{actions} actions, {facts} facts");
+    assert!(
+        actions > 1000 && facts > 200,
+        "{actions} actions, {facts} facts"
+    );
 }
 
 #[test]
@@ -153,7 +166,10 @@ fn retrying_gains_the_sum_over_all_numbers_of_failed_attempts() {
             let model = model(&case, semantics);
             let account = Account::of(&model, &case.circumstances, &order).unwrap();
             let starts = order.iter().enumerate().filter(|(_, node)| {
-                matches!(case.plan.nodes[node.index()], Node::Start(_) | Node::Instant(_))
+                matches!(
+                    case.plan.nodes[node.index()],
+                    Node::Start(_) | Node::Instant(_)
+                )
             });
             for ((position, &node), share) in starts.zip(&account.actions) {
                 let mut failed = worlds(&case, &case.likelihoods, semantics);
@@ -183,10 +199,20 @@ fn a_lattice_has_all_orders_in_it() {
     let mut rng = ChaCha8Rng::seed_from_u64(14);
     let mut many = 0;
     for _ in 0..150 {
-        let case = case(&mut rng, Taste { timed: false, couples: false, actions: 3, ..TASTE });
+        let case = case(
+            &mut rng,
+            Taste {
+                timed: false,
+                couples: false,
+                actions: 3,
+                ..TASTE
+            },
+        );
         let semantics = Semantics::Paper;
         let search = OrderSearch::new(model(&case, semantics), SearchSettings::default());
-        let lattice = search.lattice(&case.circumstances, LatticeLimits::default()).unwrap();
+        let lattice = search
+            .lattice(&case.circumstances, LatticeLimits::default())
+            .unwrap();
         let orders = twin::orders::all(&case, semantics, &search);
         assert_eq!(lattice.orders, orders.len(), "{}", case.text);
         let mut sets: BTreeMap<Vec<NodeId>, f64> = BTreeMap::new();
@@ -241,10 +267,19 @@ fn a_lattice_beyond_its_limits_is_refused() {
     // Each lamp is off, being lit, or lit. Of the 6! / 2^3 ways there is no time for six: what takes as long
     // cannot begin after one of two that began together has ended, and end before the other.
     assert_eq!((lattice.nodes.len(), lattice.orders), (27, 84));
-    let limits = LatticeLimits { nodes: 20, ..LatticeLimits::default() };
+    let limits = LatticeLimits {
+        nodes: 20,
+        ..LatticeLimits::default()
+    };
     assert_eq!(search.lattice(&initial, limits), Err(TooLarge::Nodes(20)));
-    let limits = LatticeLimits { sequences: 50, ..LatticeLimits::default() };
-    assert_eq!(search.lattice(&initial, limits), Err(TooLarge::Sequences(50)));
+    let limits = LatticeLimits {
+        sequences: 50,
+        ..LatticeLimits::default()
+    };
+    assert_eq!(
+        search.lattice(&initial, limits),
+        Err(TooLarge::Sequences(50))
+    );
 }
 
 #[test]
@@ -267,13 +302,25 @@ fn a_loss_names_what_was_not_so() {
     let instance = account.actions[0].instance;
     let fact = |fact, truth| LossCause::Fact { fact, truth };
     let found = account.losses.into_iter();
-    let found: Vec<_> = found.map(|it| (it.position, it.reading, it.cause, it.mass)).collect();
+    let found: Vec<_> = found
+        .map(|it| (it.position, it.reading, it.cause, it.mass))
+        .collect();
     assert_eq!(
         found,
         [
             (Some(0), Reading::OnArrival, LossCause::Start, 0.5),
-            (Some(0), Reading::Throughout(instance), fact(whole, true), 0.125),
-            (Some(1), Reading::Goal, fact(lit, true), 0.037_499_999_999_999_98),
+            (
+                Some(0),
+                Reading::Throughout(instance),
+                fact(whole, true),
+                0.125
+            ),
+            (
+                Some(1),
+                Reading::Goal,
+                fact(lit, true),
+                0.037_499_999_999_999_98
+            ),
         ]
     );
 }

@@ -207,7 +207,12 @@ fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, words: &s
 fn blue(share: f64) -> String {
     let share = share.clamp(0.0, 1.0);
     let mixed = |end: f64| 255.0 + (end - 255.0) * share;
-    format!("rgb({:.0},{:.0},{:.0})", mixed(0.0), mixed(114.0), mixed(178.0))
+    format!(
+        "rgb({:.0},{:.0},{:.0})",
+        mixed(0.0),
+        mixed(114.0),
+        mixed(178.0)
+    )
 }
 
 fn percent(value: f64) -> String {
@@ -259,7 +264,12 @@ mod tests {
                 node(1, "(b)", 0.25),
                 node(2, "(a), (b)", 0.5),
             ],
-            edges: vec![edge(0, 1, "(a)"), edge(0, 2, "(b)"), edge(1, 3, "(b)"), edge(2, 3, "(a)")],
+            edges: vec![
+                edge(0, 1, "(a)"),
+                edge(0, 2, "(b)"),
+                edge(1, 3, "(b)"),
+                edge(2, 3, "(a)"),
+            ],
             shown: vec![0, 1, 3],
         }
     }
@@ -272,7 +282,10 @@ mod tests {
         // The order that is shown is numbered, and its happenings stand below.
         assert_eq!(svg.matches(">1  (a)</text>").count(), 1);
         assert_eq!(svg.matches(">2  (b)</text>").count(), 1);
-        assert!(svg.contains("a &lt; b &amp; c") && svg.contains("(a), (b): 50.0 %"), "{svg}");
+        assert!(
+            svg.contains("a &lt; b &amp; c") && svg.contains("(a), (b): 50.0 %"),
+            "{svg}"
+        );
         assert_eq!(svg, diamond().svg());
     }
 

@@ -4,9 +4,7 @@ mod text;
 
 use std::sync::Arc;
 
-use elbowroom::answers::odds::{
-    LatticeFinding, OddsFinding, OddsRequest, OddsSettings, odds,
-};
+use elbowroom::answers::odds::{LatticeFinding, OddsFinding, OddsRequest, OddsSettings, odds};
 use elbowroom::probability::likelihoods;
 use elbowroom::sim::WorldModel;
 
@@ -47,7 +45,10 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     };
     let mut watch = Stopwatch::start(&Interrupt::listen());
     let answer = odds(&request, &mut watch).map_err(|error| {
-        Failure::new(error, "docs/probability.md says what is calculated, and for which plans")
+        Failure::new(
+            error,
+            "docs/probability.md says what is calculated, and for which plans",
+        )
     })?;
     let title = format!("{}: the orders of its plan", answer.problem);
     let mut refusal = None;
@@ -94,11 +95,11 @@ fn settings(arguments: &OddsArgs) -> Result<OddsSettings, Failure> {
     };
     if !arguments.executor.is_empty() {
         let read = arguments.executor.iter().map(|name| name.parse());
-        settings.executors = read
-            .collect::<Result<_, _>>()
-            .map_err(|error: elbowroom::execution::executors::UnknownExecutor| {
+        settings.executors = read.collect::<Result<_, _>>().map_err(
+            |error: elbowroom::execution::executors::UnknownExecutor| {
                 Failure::new(error, "`elbowroom run --help` describes them all")
-            })?;
+            },
+        )?;
         if let Some(odd) = settings.executors.iter().find(|spec| spec.asks_odds()) {
             return Err(Failure::new(
                 format!("`{odd}` compares plans while it executes one, which is not sampled here"),

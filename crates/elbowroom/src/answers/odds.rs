@@ -237,7 +237,9 @@ fn finding(
             }
         }
     } else {
-        let order = subject.search.order_of(&subject.initial, &subject.as_planned);
+        let order = subject
+            .search
+            .order_of(&subject.initial, &subject.as_planned);
         OrderAnswer::of(&subject, &order.map_err(coupled)?, None)?
     };
     let gains = GainsAnswer::of(&mut subject, &order, watcher)?;
@@ -257,7 +259,9 @@ fn finding(
 
 /// A plan of the embedded planner.
 fn planned(task: &Task) -> PlanAnswer {
-    Embedded::default().plan(task, &Situation::initial(task)).answer
+    Embedded::default()
+        .plan(task, &Situation::initial(task))
+        .answer
 }
 
 fn coupled(error: elbowroom_probability::TooCoupled) -> RequestError {

@@ -10,26 +10,30 @@ impl Results {
     /// The plots, with a name for a file each: the coverage of each executor in each column, with its
     /// 95 % interval, and the mean number of new plans of successful runs.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
-        let mut coverage = self.plot("coverage, with 95 % intervals", "runs that reach the goal, %", &|cell| {
-            share(cell.coverage())
-        });
+        let mut coverage = self.plot(
+            "coverage, with 95 % intervals",
+            "runs that reach the goal, %",
+            &|cell| share(cell.coverage()),
+        );
         coverage.reference = self.reference();
         let replans = self.plot("new plans of successful runs", "mean", &|cell| {
             mean(cell.mean_replans())
         });
-        vec![("coverage".to_owned(), coverage), ("replans".to_owned(), replans)]
+        vec![
+            ("coverage".to_owned(), coverage),
+            ("replans".to_owned(), replans),
+        ]
     }
 
-    fn plot(
-        &self,
-        what: &str,
-        axis: &str,
-        value: &dyn Fn(&Cell) -> Option<Point>,
-    ) -> IntervalPlot {
-        let series = self.rows.iter().zip(&self.cells).map(|(name, cells)| Series {
-            name: name.clone(),
-            points: cells.iter().map(value).collect(),
-        });
+    fn plot(&self, what: &str, axis: &str, value: &dyn Fn(&Cell) -> Option<Point>) -> IntervalPlot {
+        let series = self
+            .rows
+            .iter()
+            .zip(&self.cells)
+            .map(|(name, cells)| Series {
+                name: name.clone(),
+                points: cells.iter().map(value).collect(),
+            });
         IntervalPlot {
             title: format!("{}: {what}", self.title),
             axis: axis.to_owned(),
@@ -58,7 +62,9 @@ impl Results {
 fn share(of: Proportion) -> Option<Point> {
     Some(Point {
         value: 100.0 * of.share()?,
-        interval: of.wilson().map(|(lower, upper)| (100.0 * lower, 100.0 * upper)),
+        interval: of
+            .wilson()
+            .map(|(lower, upper)| (100.0 * lower, 100.0 * upper)),
     })
 }
 

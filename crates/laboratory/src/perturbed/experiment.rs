@@ -285,7 +285,11 @@ impl PerturbedExperiment {
                 .map(|it| json!([it.trials, it.successes]));
             let own = json!([name, domain, problem, most_running, likelihoods, published]);
             // Results of experiments that do not ask for it stay what they are.
-            if also.is_empty() { own } else { json!([own, also]) }
+            if also.is_empty() {
+                own
+            } else {
+                json!([own, also])
+            }
         });
         let worlds: Vec<&str> = worlds.iter().map(|world| world.name()).collect();
         json!([

@@ -65,7 +65,9 @@ fn of_rows(
             }
         }
     }
-    let optima = rules.iter().map(|rules| format!("optimum % ({})", rules.name()));
+    let optima = rules
+        .iter()
+        .map(|rules| format!("optimum % ({})", rules.name()));
     let work = [
         "replans",
         "messages (success)",
@@ -90,7 +92,9 @@ fn of_rows(
             z.unwrap_or_default(),
             percent(row.optimum),
         ]);
-        let others = rules.iter().map(|rules| row.other_optima.get(rules).copied());
+        let others = rules
+            .iter()
+            .map(|rules| row.other_optima.get(rules).copied());
         cells.extend(others.map(percent));
         cells.extend([
             mean(row.replans),

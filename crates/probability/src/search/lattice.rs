@@ -198,9 +198,9 @@ impl Walk<'_> {
     /// The probability of the sequence as it stands, if it is an order.
     fn ends(&mut self) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
-        let is_timed =
-            |node: &NodeId| matches!(model.plan().nodes[node.index()], Node::Timed(_));
-        if !self.network.running().is_empty() || self.network.sequence().last().is_some_and(is_timed)
+        let is_timed = |node: &NodeId| matches!(model.plan().nodes[node.index()], Node::Timed(_));
+        if !self.network.running().is_empty()
+            || self.network.sequence().last().is_some_and(is_timed)
         {
             return Ok(None);
         }
@@ -225,8 +225,7 @@ impl Walk<'_> {
         let mut best = 0.0;
         if self.network.push(node)? > 0.0 {
             let running = self.network.running();
-            let works =
-                !self.must_work || self.nominal.apply(model, model.event(node), running);
+            let works = !self.must_work || self.nominal.apply(model, model.event(node), running);
             if works && self.rooms.push(model, node, timed_before) {
                 self.mark(node, what, true);
                 best = self.go_on()?;

@@ -144,11 +144,21 @@ fn reason(reason: &LossReason) -> String {
     };
     match reason {
         LossReason::Start => "it does not start".to_owned(),
-        LossReason::Condition { condition, since: by } => since(condition, by),
-        LossReason::Throughout { action, condition, since: by } => {
+        LossReason::Condition {
+            condition,
+            since: by,
+        } => since(condition, by),
+        LossReason::Throughout {
+            action,
+            condition,
+            since: by,
+        } => {
             format!("{} during {action}", since(condition, by))
         }
-        LossReason::Goal { condition, since: by } => format!("goal: {}", since(condition, by)),
+        LossReason::Goal {
+            condition,
+            since: by,
+        } => format!("goal: {}", since(condition, by)),
     }
 }
 
@@ -162,7 +172,10 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
         ways.extend(retried.map(|p| (p, format!("{name} were tried until it starts"))));
     }
     for fact in &order.facts {
-        ways.push((fact.if_steady, format!("{} never changed by itself", fact.fact)));
+        ways.push((
+            fact.if_steady,
+            format!("{} never changed by itself", fact.fact),
+        ));
     }
     ways.retain(|(p, _)| *p - order.probability >= NEGLIGIBLE);
     ways.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -195,7 +208,10 @@ fn gains(text: &mut String, odds: &Odds, look: Look) {
     if let Some(other) = gains.best_order.as_ref().filter(|_| !order.is_best) {
         rows.push(best(other, "the best order of this plan"));
     }
-    rows.extend(ways.into_iter().map(|(p, what)| row(p, format!("if {what}"))));
+    rows.extend(
+        ways.into_iter()
+            .map(|(p, what)| row(p, format!("if {what}"))),
+    );
     table(text, &["then", "with"], rows, look);
     for why in unknown {
         let words = format!(
@@ -219,7 +235,9 @@ fn executed(text: &mut String, all: &[ExecutedAnswer], look: Look) {
         let end = one.ends.first().map(|end| {
             let cause = end.cause.as_deref().unwrap_or(&end.verdict);
             let action = end.action.as_deref().unwrap_or_default();
-            format!("{}x {cause} {action}", end.samples).trim_end().to_owned()
+            format!("{}x {cause} {action}", end.samples)
+                .trim_end()
+                .to_owned()
         });
         let replans = if one.replans { "yes" } else { "no" };
         vec![
@@ -230,7 +248,13 @@ fn executed(text: &mut String, all: &[ExecutedAnswer], look: Look) {
             end.unwrap_or_default(),
         ]
     });
-    let headings = ["executor", "new plans", "reached", "95 % interval", "mostly lost to"];
+    let headings = [
+        "executor",
+        "new plans",
+        "reached",
+        "95 % interval",
+        "mostly lost to",
+    ];
     table(text, &headings, rows.collect(), look);
 }
 

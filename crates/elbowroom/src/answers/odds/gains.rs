@@ -62,7 +62,10 @@ impl GainsAnswer {
         let own: Vec<Action> = subject.search.model().plan().instances().fold(
             Vec::new(),
             |mut actions: Vec<Action>, (_, instance)| {
-                if !actions.iter().any(|known| known.name == instance.action.name) {
+                if !actions
+                    .iter()
+                    .any(|known| known.name == instance.action.name)
+                {
                     actions.push(instance.action.clone());
                 }
                 actions
@@ -114,7 +117,11 @@ impl BestOrderAnswer {
         Ok(order.map(|order| Self {
             probability: order.probability,
             is_proven: stop == SearchStop::Complete,
-            happenings: order.sequence.iter().map(|&node| model.node_words(node)).collect(),
+            happenings: order
+                .sequence
+                .iter()
+                .map(|&node| model.node_words(node))
+                .collect(),
         }))
     }
 }

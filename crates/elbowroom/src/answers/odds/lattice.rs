@@ -56,7 +56,9 @@ pub struct EdgeAnswer {
 
 impl LatticeFinding {
     pub(super) fn of(subject: &Subject<'_>, order: &OrderAnswer) -> Self {
-        let lattice = subject.search.lattice(&subject.initial, LatticeLimits::default());
+        let lattice = subject
+            .search
+            .lattice(&subject.initial, LatticeLimits::default());
         match lattice {
             Ok(lattice) => Self::Lattice(LatticeAnswer::of(subject, &lattice, order)),
             Err(error) => Self::Refused(error.to_string()),

@@ -4,9 +4,7 @@ use elbowroom_model::ground::FactId;
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 use elbowroom_probability::account::Account;
-use elbowroom_probability::{
-    Layer, Loss, LossCause, Model, Reading, SearchStop, TotalOrderPlan,
-};
+use elbowroom_probability::{Layer, Loss, LossCause, Model, Reading, SearchStop, TotalOrderPlan};
 use elbowroom_report::exact;
 use serde::{Deserialize, Serialize};
 
@@ -152,7 +150,10 @@ impl OrderAnswer {
         let model = &**subject.search.model();
         let account = Account::of(model, &subject.initial, &order.sequence).map_err(coupled)?;
         let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
-            matches!(model.plan().nodes[node.index()], Node::Start(_) | Node::Instant(_))
+            matches!(
+                model.plan().nodes[node.index()],
+                Node::Start(_) | Node::Instant(_)
+            )
         });
         let action = |id: InstanceId| model.plan().instance(id).action.name.clone();
         let mut left = 1.0 - lost(&account.losses, None);
@@ -183,9 +184,10 @@ impl OrderAnswer {
             assumed_conditions: order.assumed_conditions,
             has_time: order.slots.len() == order.sequence.len(),
             happenings: happenings.collect(),
-            goal: order.layers.last().map_or_else(LayerAnswer::nothing, |layer| {
-                LayerAnswer::of(model, layer)
-            }),
+            goal: order
+                .layers
+                .last()
+                .map_or_else(LayerAnswer::nothing, |layer| LayerAnswer::of(model, layer)),
             losses: account
                 .losses
                 .iter()
