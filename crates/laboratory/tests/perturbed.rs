@@ -48,7 +48,10 @@ fn conditions_over_all_matter_only_where_what_is_lost_comes_back() {
     experiment.executors.truncate(1);
     let results = perturbed::run(&experiment, part(1, 0), &|_| true).unwrap();
     for row in &results.rows {
-        let (optimum, kept) = (row.optimum.unwrap(), row.other_optima[&OptimumRules::OverAllKept]);
+        let (optimum, kept) = (
+            row.optimum.unwrap(),
+            row.other_optima[&OptimumRules::OverAllKept],
+        );
         // A machine that has broken works again only in these two.
         let comes_back = ["SF3 p6", "SF3 p7"].contains(&row.case.as_str());
         assert_eq!(kept < optimum - 1e-9, comes_back, "{row:?}");
