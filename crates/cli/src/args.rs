@@ -162,7 +162,7 @@ pub(crate) struct ReportArgs {
     /// Write the page there instead of to standard output
     #[arg(short, long, value_name = "FILE.html")]
     pub(crate) output: Option<PathBuf>,
-    /// Write the run in the format of Perfetto (https://ui.perfetto.dev) there; without `--output`, no page
+    /// Write the run in the format of Perfetto (ui.perfetto.dev) there; without `--output`, no page
     #[arg(long, value_name = "FILE.pftrace")]
     pub(crate) perfetto: Option<PathBuf>,
     /// Write the run as an MCAP file, for Foxglove and others, there; without `--output`, no page

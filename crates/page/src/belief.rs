@@ -223,7 +223,7 @@ fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
         words: format!(
             "{} at first, {} at last, between {} and {}",
             word(values().next()),
-            word(values().last()),
+            word(values().next_back()),
             word(values().min()),
             word(values().max()),
         ),

@@ -2,7 +2,7 @@
 //!
 //! Numbers are for drawing; whatever is read is a text, and was worked out exactly.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
@@ -68,7 +68,7 @@ impl From<&str> for Text {
 #[derive(Debug, Default)]
 pub(crate) struct Texts {
     texts: Vec<String>,
-    positions: HashMap<String, usize>,
+    positions: BTreeMap<String, usize>,
 }
 
 impl Texts {

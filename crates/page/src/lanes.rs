@@ -11,6 +11,8 @@ pub(crate) struct Occupant<'a> {
     pub(crate) name: &'a str,
     /// Start and end.
     pub(crate) time: (f64, f64),
+    /// Whether it says which lanes to begin with: what was given up does not.
+    pub(crate) counts: bool,
 }
 
 /// The ways to put actions on lanes, the one to begin with, and the lane of each action in each of
@@ -154,7 +156,9 @@ fn objects(name: &str) -> impl Iterator<Item = &str> {
     reason = "positions of arguments are small"
 )]
 fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> f64 {
-    let mut order: Vec<usize> = (0..occupants.len()).collect();
+    let mut order: Vec<usize> = (0..occupants.len())
+        .filter(|&it| occupants[it].counts)
+        .collect();
     order.sort_by(|&a, &b| occupants[a].time.0.total_cmp(&occupants[b].time.0));
     let mut busy: BTreeMap<&str, f64> = BTreeMap::new();
     let mut score = 0.0;
@@ -177,6 +181,14 @@ fn score(occupants: &[Occupant<'_>], keys: &[Option<(usize, &str)>]) -> f64 {
 mod tests {
     use super::{Occupant, lanes};
 
+    fn occupant(name: &str, time: (f64, f64)) -> Occupant<'_> {
+        Occupant {
+            name,
+            time,
+            counts: true,
+        }
+    }
+
     fn type_of(object: &str) -> Option<&'static str> {
         match object {
             "r1" | "r2" => Some("robot"),
@@ -193,7 +205,7 @@ mod tests {
             ("(open b)", (1.0, 2.0)),
             ("(load r1 b)", (5.1, 6.0)),
         ]
-        .map(|(name, time)| Occupant { name, time });
+        .map(|(name, time)| occupant(name, time));
         let lanes = lanes(&occupants, &type_of);
         let names: Vec<&str> = lanes.groupings.iter().map(|it| it.name.as_str()).collect();
         assert_eq!(names, ["robot", "place", "action"]);
@@ -206,33 +218,33 @@ mod tests {
 
     #[test]
     fn objects_that_would_do_several_things_at_once_are_no_lanes_to_begin_with() {
-        let occupants = ["(serve a r1)", "(serve a r2)", "(serve a r3)"].map(|name| Occupant {
-            name,
-            time: (0.0, 9.0),
-        });
+        let occupants =
+            ["(serve a r1)", "(serve a r2)", "(serve a r3)"].map(|name| occupant(name, (0.0, 9.0)));
         let type_of = |object: &str| Some(if object == "a" { "place" } else { "robot" });
         let lanes = lanes(&occupants, &type_of);
         assert_eq!(lanes.groupings[lanes.chosen].name, "robot");
     }
 
     #[test]
+    fn what_was_given_up_does_not_choose_the_lanes() {
+        let mut occupants = ["(drive r1 a)", "(drive r1 b)", "(open b)"].map(|name| Occupant {
+            counts: name != "(drive r1 b)",
+            ..occupant(name, (0.0, 9.0))
+        });
+        assert_eq!(lanes(&occupants, &type_of).chosen, 1, "places do as well");
+        occupants[2].counts = false;
+        assert_eq!(lanes(&occupants, &type_of).chosen, 0);
+    }
+
+    #[test]
     fn without_types_the_first_object_is_the_lane_and_without_objects_the_action() {
-        let untyped = [Occupant {
-            name: "(go x y)",
-            time: (0.0, 1.0),
-        }];
+        let untyped = [occupant("(go x y)", (0.0, 1.0))];
         let names = |occupants: &[Occupant<'_>]| -> Vec<String> {
             let lanes = lanes(occupants, &|_| None);
             lanes.groupings.into_iter().map(|it| it.name).collect()
         };
         assert_eq!(names(&untyped), ["first object", "action"]);
-        assert_eq!(
-            names(&[Occupant {
-                name: "(idle)",
-                time: (0.0, 1.0)
-            }]),
-            ["action"]
-        );
+        assert_eq!(names(&[occupant("(idle)", (0.0, 1.0))]), ["action"]);
         assert_eq!(names(&[]), ["action"]);
     }
 }

@@ -213,7 +213,7 @@ impl Trace {
             let track = self.track(&line.name, Some(run), true);
             for (time, value) in &line.points {
                 self.event(*time, Kind::Counter, track, |event| {
-                    event.double(44, *value)
+                    event.double(44, *value);
                 });
             }
         }

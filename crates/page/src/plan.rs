@@ -178,7 +178,7 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
             ..Timeline::default()
         };
         let mut chart = chart(&timeline, &[], texts);
-        chart.heading = "A schedule that fails".to_owned();
+        "A schedule that fails".clone_into(&mut chart.heading);
         sections.push(Section::Chart(chart));
     }
     if !example.values.is_empty() {
@@ -211,6 +211,7 @@ fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
         .map(|action| Occupant {
             name: &action.action,
             time: time(action),
+            counts: true,
         })
         .collect();
     let type_of = |object: &str| timeline.types.get(object).map(String::as_str);

@@ -191,6 +191,7 @@ impl Bars {
             .map(|bar| Occupant {
                 name: &bar.name,
                 time: bar.actual.or(bar.planned).unwrap_or((0.0, 0.0)),
+                counts: bar.actual.is_some(),
             })
             .collect();
         let types = task.map(|task| timeline::types(task, bars.iter().map(|it| it.name.as_str())));

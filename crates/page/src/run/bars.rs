@@ -23,6 +23,8 @@ pub(super) struct Bars {
     steps: Vec<Step>,
     /// What the plans order: steps, the one that comes first, and the other.
     orderings: Vec<(usize, usize)>,
+    /// What is running while a plan is made: the first steps of the plan.
+    running: Vec<String>,
     /// Where the steps of the present plan begin.
     first: usize,
     /// The steps that the last decision starts, in order.
@@ -121,6 +123,10 @@ impl Bars {
                 }
                 _ => {}
             },
+            Line::Planning(planning) => {
+                let running = planning.situation.running.iter();
+                self.running = running.map(|running| running.action.clone()).collect();
+            }
             Line::Over(report) => self.executed(&report.executed),
             _ => {}
         }
@@ -188,6 +194,7 @@ impl Bars {
         self.first = self.steps.len();
         self.ordered.clear();
         self.orderings(line);
+        let continued = std::mem::take(&mut self.running);
         let windows = Windows::of(&line.network, &line.parameters);
         let origin = &line.origin.0;
         for (index, step) in line.steps.iter().enumerate() {
@@ -215,7 +222,8 @@ impl Bars {
                 start,
                 start_window,
                 end_window,
-                is_ordered: false,
+                // What goes on is no new start.
+                is_ordered: continued.get(index) == Some(&step.action),
             });
         }
     }

@@ -53,13 +53,15 @@ impl Guarantees {
                     (DecisionLine::GoalReached, _) => {}
                     (DecisionLine::Replan, _) => {
                         let words = format!("none: {}", decided.reason.words);
-                        self.change(at, -1, "none", &words);
+                        self.change(at, -1, "none", &words, "");
                     }
                     (_, Some(promise)) => {
                         let (level, words) = meaning(promise);
-                        self.change(at, level, promise, words);
+                        self.change(at, level, promise, words, &decided.reason.words);
                     }
-                    (_, None) => self.change(at, -1, "none", "none: this executor gives none"),
+                    (_, None) => {
+                        self.change(at, -1, "none", "none: this executor gives none", "");
+                    }
                 }
             }
             Line::Plan(_) => self.deviation = None,
@@ -78,7 +80,7 @@ impl Guarantees {
         self.segments
     }
 
-    fn change(&mut self, at: f64, level: i8, name: &str, words: &str) {
+    fn change(&mut self, at: f64, level: i8, name: &str, words: &str, reason: &str) {
         let deviation = self.deviation.as_deref();
         if let Some(last) = self.segments.last_mut() {
             if last.level == level && (level >= 0 || name == "none") {
@@ -89,6 +91,8 @@ impl Guarantees {
         let is_worse = self.segments.last().is_some_and(|last| level < last.level);
         let because = match deviation {
             Some(deviation) if is_worse && level >= 0 => format!("; {deviation}"),
+            // Time alone has passed: what is waited for says how.
+            None if is_worse && level >= 0 => format!("; meanwhile, {reason}"),
             _ => String::new(),
         };
         self.segments.push(Segment {

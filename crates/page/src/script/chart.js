@@ -131,15 +131,21 @@ function chartView(chart, textOf, onPick) {
     const box = scroll.getBoundingClientRect(), { gutter, inner } = geometry();
     zoomBy(event.deltaY < 0 ? 1.25 : 0.8, Math.max(0, Math.min(1, (event.clientX - box.left - gutter) / inner)));
   }, { passive: false });
-  const under = (event) => event.target.closest?.("[data-bar]")?.dataset.bar;
-  svg.addEventListener("pointermove", (event) => {
-    const bar = under(event);
-    if (bar !== undefined) pick(Number(bar), false);
-  });
-  svg.addEventListener("click", (event) => {
-    const bar = under(event);
-    if (bar !== undefined) pick(Number(bar), false);
-  });
+  // The bar under the pointer, give or take two pixels.
+  function under(event) {
+    const box = scroll.getBoundingClientRect(), { gutter, scale } = geometry();
+    const [across, down] = [event.clientX - box.left - gutter, event.clientY - box.top - head];
+    if (across < 0 || down < 0) return;
+    const time = (scroll.scrollLeft + across) / scale, near = 2 / scale;
+    const row = layout.rows[Math.floor((scroll.scrollTop + down) / ROW)];
+    const bar = row?.find((index) => {
+      const [begin, end] = drawnSpan(chart.bars[index]);
+      return begin - near <= time && time <= end + near;
+    });
+    if (bar !== undefined) pick(bar, false);
+  }
+  svg.addEventListener("pointermove", under);
+  svg.addEventListener("click", under);
   new ResizeObserver(repaint).observe(scroll);
   addEventListener("beforeprint", () => { isPrinted = true; paint(); });
   addEventListener("afterprint", () => { isPrinted = false; paint(); });

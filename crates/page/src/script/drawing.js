@@ -1,6 +1,6 @@
 // What a chart looks like: everything that lies inside the window, and nothing else.
 
-const ROW = 34, AXIS = 22, STRIP = 22, LETTER = 6.6;
+const ROW = 34, AXIS = 22, STRIP = 22, LETTER = 6.6, MANY = 400;
 
 // Rows for the bars of a lane, so that none covers another: each goes to the first row that is free.
 // What was planned is drawn above what was done, so these two need not be free at the same time. With
@@ -67,41 +67,50 @@ function draw(svg, chart, layout, view) {
     if (x(time) + text.length * LETTER + 4 <= width) ticks.push(shape("text", { x: x(time) + 3, y: 14, class: "faint" }, text));
   }
 
-  // The rows in sight.
+  // The bars in sight.
+  const seen = [];
   const from = Math.max(0, Math.floor(top / ROW) - 1);
   const to = Math.min(layout.rows.length, Math.ceil((top + height - head) / ROW) + 1);
   for (let row = from; row < to; row++) {
-    const y = head + row * ROW - top;
-    const covered = { bar: -Infinity, starts: -Infinity, ends: -Infinity };
     const bars = layout.rows[row];
+    let covered = -Infinity;
     for (let position = firstInSight(chart.bars, bars, left / scale, layout.reach); position < bars.length; position++) {
-      const index = bars[position], bar = chart.bars[index], isCurrent = index === current;
-      const [begin, end] = bar.actual ?? bar.planned;
-      const [from, to] = layout.reach(bar);
-      if (x(from) > width) break;
+      const index = bars[position], bar = chart.bars[index];
+      const [begin, end] = layout.reach(bar);
+      if (x(begin) > width) break;
       // What is no wider than a pixel, on a pixel that is drawn already, would not be seen.
-      if (x(to) < gutter || x(to) < covered.bar + 0.7 && !isCurrent) continue;
-      covered.bar = Math.max(covered.bar, x(to));
-      if ((end - begin) * scale > 3 || isCurrent) {
-        lines.starts += band(bar.starts, "starts", y + 25);
-        lines.ends += band(bar.ends, "ends", y + 30);
-      }
-      boxes(front, bar, index, x, clamp, y, isCurrent);
-      const next = chart.bars[bars[position + 1]];
-      const following = next === undefined ? width : x((next.actual ?? next.planned)[0]);
-      label(texts, bar, Math.max(gutter, x(begin)), x(end), following, y);
-
-      // When it may start or end. Where bands of one row overlap, the first is drawn, and that of the bar
-      // pointed at.
-      function band(range, kind, height) {
-        if (!range) return "";
-        const [a, b] = [clamp(x(range[0] ?? -Infinity)), clamp(x(range[1] ?? Infinity))];
-        if (b < a || a < covered[kind] && !isCurrent) return "";
-        covered[kind] = Math.max(covered[kind], b);
-        const cap = (at) => `M${at} ${height - 3}v6`;
-        return `M${a} ${height}H${Math.max(b, a + 1)}${range[0] === null ? "" : cap(a)}${range[1] === null ? "" : cap(b)}`;
-      }
+      if (x(end) < gutter || x(end) < covered + 0.7 && index !== current) continue;
+      covered = Math.max(covered, x(end));
+      seen.push({ bar, index, row, next: chart.bars[bars[position + 1]], y: head + row * ROW - top });
     }
+  }
+
+  // Many bars are one shape for each kind of them: a shape for each bar would take too long.
+  const boxes = seen.length > MANY ? {} : null;
+  let row = -1, covered;
+  for (const one of seen) {
+    const { bar, index, y, next } = one, isCurrent = index === current;
+    if (one.row !== row) { row = one.row; covered = { starts: -Infinity, ends: -Infinity }; }
+    const [begin, end] = drawnSpan(bar);
+    if ((end - begin) * scale > 3 || isCurrent) {
+      lines.starts += band(bar.starts, "starts", y + 25, isCurrent);
+      lines.ends += band(bar.ends, "ends", y + 30, isCurrent);
+    }
+    drawBox(front, boxes, bar, index, x, clamp, y, isCurrent);
+    const following = next === undefined ? width : x(drawnSpan(next)[0]);
+    label(texts, bar, Math.max(gutter, x(begin)), x(end), following, y);
+  }
+  for (const kind in boxes) front.unshift(shape("path", { class: kind, d: boxes[kind] }));
+
+  // When it may start or end. Where bands of one row overlap, the first is drawn, and that of the bar pointed
+  // at.
+  function band(range, kind, height, isCurrent) {
+    if (!range) return "";
+    const [a, b] = [clamp(x(range[0] ?? -Infinity)), clamp(x(range[1] ?? Infinity))];
+    if (b < a || a < covered[kind] && !isCurrent) return "";
+    covered[kind] = Math.max(covered[kind], b);
+    const cap = (at) => `M${at} ${height - 3}v6`;
+    return `M${a} ${height}H${Math.max(b, a + 1)}${range[0] === null ? "" : cap(a)}${range[1] === null ? "" : cap(b)}`;
   }
 
   // Moments.
@@ -174,24 +183,24 @@ function firstInSight(bars, row, time, reach) {
   return Math.max(0, low - 1);
 }
 
-function boxes(into, bar, index, x, clamp, y, isCurrent) {
+// Where the bar itself is, from when to when.
+const drawnSpan = (bar) => bar.actual ?? bar.planned;
+
+// A bar, what was planned above it, and a frame if it is pointed at. With `boxes`, into these.
+function drawBox(into, boxes, bar, index, x, clamp, y, isCurrent) {
   const box = (span, kind, top, height) => {
     const [a, b] = [clamp(x(span[0])), clamp(x(span[1]))];
-    into.push(shape("rect", { class: kind, x: a, y: y + top, width: Math.max(2, b - a), height, rx: 2, "data-bar": index }));
+    const width = Math.max(2, b - a);
+    if (boxes) boxes[kind] = `${boxes[kind] ?? ""}M${a} ${y + top}h${width}v${height}h${-width}z`;
+    else into.push(shape("rect", { class: kind, x: a, y: y + top, width, height, rx: 2, "data-bar": index }));
     return [a, b];
   };
-  let edges;
-  if (bar.actual) {
-    if (bar.planned) box(bar.planned, "plan", 2, 4);
-    edges = box(bar.actual, `bar ${bar.outcome}`, 7, 14);
-  } else {
-    edges = box(bar.planned, `bar ${bar.outcome}`, 4, 16);
-  }
-  const [a, b] = edges;
+  if (bar.actual && bar.planned) box(bar.planned, "plan", 2, 4);
+  const [top, height] = bar.actual ? [7, 14] : [4, 16];
+  const [a, b] = box(drawnSpan(bar), `bar ${bar.outcome}`, top, height);
   // Not by colour alone: what failed is crossed out.
   if (bar.outcome === "failed" && b - a > 10) {
-    const middle = y + 14;
-    into.push(shape("path", { class: "cross", d: `M${b - 9} ${middle - 4}l6 8m0 -8l-6 8` }));
+    into.push(shape("path", { class: "cross", d: `M${b - 9} ${y + 10}l6 8m0 -8l-6 8` }));
   }
   if (isCurrent) into.push(shape("rect", { class: "current", x: a - 3, y: y + 1, width: b - a + 6, height: 22, rx: 3 }));
 }

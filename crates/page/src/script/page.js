@@ -33,7 +33,7 @@ for (const section of data.sections) {
   }
 }
 if (firstChart?.section.is_run && firstChart.section.decisions.length) {
-  const scrub = scrubView(firstChart.section, textOf, (time) => { for (const move of moving) move(time); });
+  const scrub = scrubView(firstChart.section, textOf, (time, isMoved) => { for (const move of moving) move(time, isMoved); });
   firstChart.view.node.after(scrub.node);
   scrub.show();
 }

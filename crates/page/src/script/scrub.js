@@ -8,14 +8,14 @@ function scrubView(chart, textOf, onTime) {
   const ends = [chart.bars.map((bar) => bar.actual?.[1] ?? 0), decided, chart.changes.map((change) => change.at)];
   const last = ends.flat().reduce((a, b) => Math.max(a, b), 0);
   const step = niceStep(last || 1, 1000);
-  const slider = element("input", { type: "range", min: 0, max: last, step: "any", value: last, id: "time", oninput: () => show(Number(slider.value)) });
+  const slider = element("input", { type: "range", min: 0, max: last, step: "any", value: last, id: "time", oninput: () => show(Number(slider.value), true) });
   const output = element("output", { for: "time" });
   const now = element("div", { class: "now", role: "region", "aria-label": "The run at this time" });
   const moments = [...new Set([...decided, ...chart.changes.map((change) => change.at)])].sort((a, b) => a - b);
   const go = (by) => {
     const at = Number(slider.value);
     const next = by > 0 ? moments.find((moment) => moment > at + 1e-9) : moments[lastAt(moments, at - 1e-9)];
-    if (next !== undefined) { slider.value = next; show(next); }
+    if (next !== undefined) { slider.value = next; show(next, true); }
   };
   slider.addEventListener("keydown", (event) => {
     const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
@@ -36,7 +36,7 @@ function scrubView(chart, textOf, onTime) {
     return { facts: [...facts.keys()].sort(), numbers: [...numbers].sort(([a], [b]) => (a < b ? -1 : 1)) };
   }
 
-  function show(time) {
+  function show(time, isMoved) {
     output.textContent = rounded(time, step / 10);
     slider.setAttribute("aria-valuetext", `time ${rounded(time, step / 10)}`);
     const running = chart.bars.filter((bar) => bar.actual && bar.actual[0] <= time && (time < bar.actual[1] || bar.outcome === "running"));
@@ -52,7 +52,7 @@ function scrubView(chart, textOf, onTime) {
       chart.changes.length ? ["facts", fold(facts, "true fact", "true facts")] : null,
     ];
     now.replaceChildren(element("dl", {}, ...rows.filter(Boolean).flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])));
-    onTime(time);
+    onTime(time, isMoved);
   }
 
   // A list that stays open or closed as the reader left it.
@@ -73,5 +73,5 @@ function scrubView(chart, textOf, onTime) {
         element("button", { type: "button", onclick: () => go(1) }, "later")),
       slider),
     now);
-  return { node, show: () => show(last) };
+  return { node, show: () => show(last, false) };
 }

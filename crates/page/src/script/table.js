@@ -6,7 +6,7 @@ function tableView(table, textOf, onBar) {
   const body = element("tbody");
   const count = element("span", { class: "note", role: "status" });
   const more = element("button", { type: "button" }, "show all");
-  let limit = ROWS, sorted = null, query = "", shown = [], current = -1;
+  let offset = 0, limit = ROWS, sorted = null, query = "", shown = [], current = -1;
   const plain = table.rows.map((row) => row.map(textOf));
   const lower = plain.map((row) => row.join("\u0000").toLowerCase());
 
@@ -41,7 +41,8 @@ function tableView(table, textOf, onBar) {
 
   function fill() {
     shown = order();
-    const visible = shown.slice(0, limit);
+    offset = Math.max(0, Math.min(offset, shown.length - limit));
+    const visible = shown.slice(offset, offset + limit);
     body.replaceChildren(...visible.map((row) => {
       const bar = table.bars[row];
       const cells = plain[row].map((text, column) =>
@@ -53,12 +54,18 @@ function tableView(table, textOf, onBar) {
     }));
     more.hidden = shown.length <= limit;
     more.textContent = `show all ${shown.length}`;
-    count.textContent = shown.length <= limit ? `${shown.length} rows` : `${limit} of ${shown.length} rows`;
+    for (const button of [before, after]) button.hidden = shown.length <= limit;
+    before.disabled = offset === 0;
+    after.disabled = offset + limit >= shown.length;
+    count.textContent = shown.length <= limit ? `${shown.length} rows` : `rows ${offset + 1} to ${offset + visible.length} of ${shown.length}`;
   }
 
-  more.addEventListener("click", () => { limit = Infinity; fill(); });
+  const turn = (name, by) => element("button", { type: "button", onclick: () => { offset += by * ROWS; fill(); } }, name);
+  const before = turn("rows before", -1), after = turn("rows after", 1);
+  more.addEventListener("click", () => { offset = 0; limit = Infinity; fill(); });
   const search = element("input", { type: "search", "aria-label": `Filter: ${table.heading}`, placeholder: "filter", oninput: () => {
     query = search.value.toLowerCase();
+    offset = 0;
     fill();
   } });
   fill();
@@ -67,14 +74,17 @@ function tableView(table, textOf, onBar) {
   const node = element("section", {},
     element("h2", {}, table.heading),
     table.note ? element("p", { class: "note" }, table.note) : null,
-    plain.length > 8 ? element("div", { class: "controls" }, search, count, more) : null,
+    plain.length > 8 ? element("div", { class: "controls" }, search, count, before, after, more) : null,
     box);
 
-  // The row of a moment; rows beyond those shown are brought in.
-  function at(time) {
+  // The row of a moment; somebody who goes there sees the rows around it.
+  function at(time, isMoved) {
     current = lastAt(table.times, time);
     const position = shown.indexOf(current);
-    if (position >= limit) { limit = position + ROWS; fill(); }
+    if (isMoved && (position < offset || position >= offset + limit)) {
+      offset = position - ROWS / 2;
+      fill();
+    }
     for (const row of body.querySelectorAll("tr.current")) row.classList.remove("current");
     body.querySelector(`tr[data-row="${current}"]`)?.classList.add("current");
   }

@@ -124,6 +124,18 @@ test("arrow keys go from action to action and say what limits it", async () => {
   await close(tab);
 });
 
+test("pointing at a bar says what it is", async () => {
+  const tab = await open(file("envelope.html"));
+  const { timeline } = JSON.parse(fs.readFileSync(file("envelope.json"), "utf8"));
+  for (const [index, action] of timeline.actions.entries()) {
+    const box = await tab.locator(`svg rect[data-bar="${index}"]`).boundingBox();
+    await tab.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await tab.waitForTimeout(100);
+    assert.equal(await tab.locator(".panel strong").textContent(), action.action);
+  }
+  await close(tab);
+});
+
 test("lanes can be chosen, and the first choice is the robot", async () => {
   const tab = await open(file("envelope.html"));
   const lanes = () => tab.locator("svg text.lane").allTextContents();
@@ -305,6 +317,31 @@ test("ten thousand actions load, scroll and scrub smoothly", async () => {
   console.log(`   10,000 actions: ${(fs.statSync(made).size / 1e6).toFixed(1)} MB, loaded in ${loaded} ms, frames ${middle.toFixed(0)} ms in the middle, ${worst.toFixed(0)} ms at worst, ${drawn} bars in the page`);
   assert.ok(drawn < 2000, `${drawn} bars are in the page`);
   if (screenshots) await tab.screenshot({ path: path.join(screenshots, "many.png") });
+  await close(tab);
+});
+
+test("a long run loads, and its log follows the slider", async () => {
+  // A stored run, with its middle repeated.
+  const lines = fs.readFileSync(file("run.jsonl"), "utf8").trim().split("\n");
+  const decided = lines.filter((line) => line.startsWith('{"event":"decided"'));
+  const many = Array.from({ length: 3000 }, () => decided).flat();
+  fs.writeFileSync(file("long.jsonl"), [lines[0], lines[1], ...many, ...lines.slice(2)].join("\n"));
+  const tab = await open(page("long.html", file("long.jsonl")));
+  const rows = rowsOf(tab, "What happened, and why");
+  assert.equal(await rows.count(), 200);
+  const times = await tab.evaluate(() => {
+    const slider = document.getElementById("time"), times = [];
+    for (let step = 0; step <= 20; step++) {
+      slider.value = (step / 20) * Number(slider.max);
+      const begun = performance.now();
+      slider.dispatchEvent(new Event("input"));
+      times.push(performance.now() - begun);
+    }
+    return times.sort((a, b) => a - b);
+  });
+  console.log(`   ${many.length} decisions: a step of the slider takes ${times[10].toFixed(0)} ms in the middle, ${times.at(-1).toFixed(0)} ms at worst`);
+  assert.equal(await rows.count(), 200);
+  assert.equal(await tab.locator("tr.current").count(), 1);
   await close(tab);
 });
 

@@ -95,13 +95,13 @@ impl Timeline {
         }
         let mut starts = vec![NodeId::ZERO; plan.plan.instances.len()];
         let mut ends = vec![None; plan.plan.instances.len()];
-        let mut timed = Vec::new();
+        let mut initials = Vec::new();
         for (node, what) in plan.plan.nodes() {
             match what {
                 Node::Zero => {}
                 Node::Start(id) | Node::Instant(id) => starts[id.index()] = node,
                 Node::End(id) => ends[id.index()] = Some(node),
-                Node::Timed(index) => timed.push(TimedFacts {
+                Node::Timed(index) => initials.push(TimedFacts {
                     time: times.planned(node),
                     window: times.window(node),
                     changes: changes(task, index),
@@ -126,7 +126,7 @@ impl Timeline {
         Some(Self {
             types: types(task, names),
             actions,
-            timed,
+            timed: initials,
         })
     }
 }
