@@ -44,7 +44,7 @@ impl Scene {
 
     fn in_world(mut self, sections: &str) -> Self {
         let text = format!("format = \"elbowroom-world\"\nversion = 1\n{sections}");
-        let world = WorldModel::read(&Source::new("world", text.as_str()), self.task.problem());
+        let world = WorldModel::read(Source::new("world", text.as_str()), self.task.problem());
         self.world = Some(world.unwrap());
         self
     }
@@ -243,7 +243,11 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
     let domain = "(define (domain d) (:types lamp) (:predicates (lit ?l - lamp))
         (:durative-action light :parameters (?l - lamp) :duration (= ?duration 1)
           :effect (at end (lit ?l))))";
-    let goals: String = objects.iter().map(|lamp| format!("(lit {lamp})")).collect();
+    let goals: String = objects
+        .iter()
+        .map(|lamp| format!("(lit {lamp})"))
+        .collect::<Vec<_>>()
+        .concat();
     let problem = format!(
         "(define (problem p) (:domain d) (:objects {} - lamp) (:init) (:goal (and {goals})))",
         objects.join(" ")
@@ -251,7 +255,8 @@ fn all_orders_of_a_short_plan_make_a_picture_and_those_of_a_long_one_are_refused
     let plan: String = objects
         .iter()
         .map(|lamp| format!("0: (light {lamp}) [1]\n"))
-        .collect();
+        .collect::<Vec<_>>()
+        .concat();
     let likely = LIKELY.replace("facts.whole.becomes_false = 0.25", "");
     // The best order does not matter here.
     let settings = OddsSettings {

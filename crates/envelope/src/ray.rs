@@ -108,8 +108,8 @@ impl Ray {
             outside: most.clone(),
             cut: None,
         };
-        for index in 0..cuts.len() {
-            self.lower(&mut reached, &cuts[index], index);
+        for (index, cut) in cuts.iter().enumerate() {
+            self.lower(&mut reached, cut, index);
         }
         let half = Rational::new(1, 2);
         let mut halvings = 0;

@@ -2,6 +2,7 @@
 
 mod given;
 
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
 
 use elbowroom_envelope::{
@@ -45,6 +46,11 @@ impl Dice {
         (self.0 >> 33) % bound
     }
 
+    fn one_of<'a>(&mut self, words: &[&'a str]) -> &'a str {
+        let index = usize::try_from(self.below(words.len() as u64));
+        words[index.expect("below the number of words")]
+    }
+
     /// A few bounds between starts and ends, most of them satisfied at the nominal values.
     fn bounds(&mut self) -> String {
         let points = [
@@ -56,9 +62,9 @@ impl Dice {
             "three.end",
         ];
         let mut bounds = String::new();
-        for _ in 0..1 + self.below(4) {
-            let from = points[usize::try_from(self.below(6)).unwrap()];
-            let to = points[usize::try_from(self.below(6)).unwrap()];
+        for _ in 0..=self.below(4) {
+            let from = self.one_of(&points);
+            let to = self.one_of(&points);
             if from == to {
                 continue;
             }
@@ -70,7 +76,7 @@ impl Dice {
                     format!("[{least}, {}]", least + self.below(6))
                 }
             };
-            bounds.push_str(&format!("c: {to} - {from} in {bound}; "));
+            let _ = write!(bounds, "c: {to} - {from} in {bound}; ");
         }
         bounds
     }
@@ -106,7 +112,8 @@ fn widths(envelope: &DecoupledEnvelope) -> Rational {
 fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
     let nominal = Rational::from(NOMINAL);
     let ends = envelope.intervals().iter().flat_map(|interval| {
-        [&interval.lower, &interval.upper].map(|end| (end.value().unwrap() - &nominal).abs())
+        [&interval.lower, &interval.upper]
+            .map(|end| (end.value().expect("a finite end") - &nominal).abs())
     });
     let mut slacks: Vec<Rational> = ends.collect();
     slacks.sort_unstable();
@@ -115,10 +122,10 @@ fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
 
 fn is_symmetric(envelope: &DecoupledEnvelope) -> bool {
     let twice = Rational::from(2 * NOMINAL);
-    envelope
-        .intervals()
-        .iter()
-        .all(|own| own.lower.value().unwrap() + own.upper.value().unwrap() == twice)
+    envelope.intervals().iter().all(|own| {
+        let ends = own.lower.value().zip(own.upper.value());
+        ends.is_some_and(|(lower, upper)| lower + upper == twice)
+    })
 }
 
 fn found(
@@ -131,7 +138,8 @@ fn found(
         symmetric,
         ..BestSettings::default()
     };
-    let run = best(oracle, &settings, None, &mut |_| ControlFlow::Continue(())).unwrap();
+    let run = best(oracle, &settings, None, &mut |_| ControlFlow::Continue(()));
+    let run = run.expect("a plan that can be analysed");
     let envelope = run.envelope.clone().ok()?;
     Some((run, envelope))
 }

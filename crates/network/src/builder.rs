@@ -165,7 +165,8 @@ impl Builder {
             return None;
         }
         let id = LinkId(u32::try_from(self.links.len()).ok()?);
-        if self.ending.insert(end, id).is_some() {
+        // The first one stays the one that ends there: what comes later asks for it by its end.
+        if self.ending.contains_key(&end) {
             report.mistake(
                 at,
                 format!("two contingent links end at `{end_name}`"),
@@ -173,6 +174,7 @@ impl Builder {
             );
             return None;
         }
+        self.ending.insert(end, id);
         self.links.push(ContingentLink {
             activation,
             end,

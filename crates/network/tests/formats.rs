@@ -331,3 +331,14 @@ fn links_that_depend_on_their_own_end_are_refused() {
                   {"activation": "B", "end": "A", "lower": 1, "upper": 2}] }"#;
     assert!(refused("f", text).contains("depends on its own end"));
 }
+
+/// The second link is refused; what names its end afterwards means the first.
+#[test]
+fn two_links_with_one_end_are_refused_whatever_else_names_that_end() {
+    let link = "{\"source\": 0, \"sink\": 1, \"label\": \"one\", \"type\": \"pstc\",
+     \"distribution\": {\"mean\": 10.0, \"sd\": 1.5}},";
+    let text = samples::PSTN_LIB.replacen(link, &link.repeat(2), 1);
+    assert_ne!(text, samples::PSTN_LIB);
+    let said = refused("f.json", &text);
+    assert!(said.contains("two contingent links end at"), "{said}");
+}

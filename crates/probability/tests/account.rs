@@ -84,9 +84,9 @@ fn what_is_lost_and_what_is_left_are_all_worlds() {
                 assert_close(at(Some(position), false), before - after, &case.text);
                 before = after;
             }
-            let last = order.len().checked_sub(1);
+            let end = order.len().checked_sub(1);
             assert_close(
-                at(last, true),
+                at(end, true),
                 before - worlds.success_probability(),
                 &case.text,
             );

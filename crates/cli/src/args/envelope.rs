@@ -10,6 +10,10 @@ use super::number::positive;
 
 #[derive(Args, Debug)]
 #[command(after_long_help = VARY_HELP)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct EnvelopeArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,

@@ -240,7 +240,7 @@ fn finding(
         let order = subject
             .search
             .order_of(&subject.initial, &subject.as_planned);
-        OrderAnswer::of(&subject, &order.map_err(coupled)?, None)?
+        OrderAnswer::of(&subject, &order.map_err(|error| coupled(&error))?, None)?
     };
     let gains = GainsAnswer::of(&mut subject, &order, watcher)?;
     let executed = match request.world {
@@ -264,7 +264,7 @@ fn planned(task: &Task) -> PlanAnswer {
         .answer
 }
 
-fn coupled(error: elbowroom_probability::TooCoupled) -> RequestError {
+fn coupled(error: &elbowroom_probability::TooCoupled) -> RequestError {
     RequestError::Unsupported(error.to_string())
 }
 
@@ -304,7 +304,7 @@ impl<'a> Subject<'a> {
             }
             ControlFlow::Continue(())
         });
-        let found = found.map_err(coupled)?;
+        let found = found.map_err(|error| coupled(&error))?;
         Ok((found.order, found.stop))
     }
 }

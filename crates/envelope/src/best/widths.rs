@@ -109,13 +109,14 @@ pub(super) fn widths(
                 continue;
             }
             Learnt::Cut(cut) if !search.is_known(&cut, &values) => search.learn(cut),
-            _ => match search.shrink(&candidate)? {
-                Some(cut) => search.learn(cut),
-                None => {
+            _ => {
+                if let Some(cut) = search.shrink(&candidate)? {
+                    search.learn(cut);
+                } else {
                     let leaf = search.leaves.remove(at);
                     left = left.max(Some(leaf.bound));
                 }
-            },
+            }
         }
         if steps.is_power_of_two() {
             search.improve(&values)?;

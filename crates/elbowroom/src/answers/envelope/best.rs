@@ -35,12 +35,15 @@ pub struct Best {
 
 /// The best box, or why the plan does not even work as planned; what the box is the best of; and why
 /// the watcher wanted no more, if it did.
+type Found = (Result<DecoupledEnvelope, Objection>, Best, Option<Halt>);
+
+/// Looks for the best box.
 pub(super) fn best(
     subject: &Subject<'_>,
     oracle: &mut Oracle,
     start: Option<&DecoupledEnvelope>,
     watcher: &mut dyn Watcher,
-) -> Result<(Result<DecoupledEnvelope, Objection>, Best, Option<Halt>), RequestError> {
+) -> Result<Found, RequestError> {
     let settings = &subject.request.search.best;
     let mut halt = None;
     let mut steps = 0;

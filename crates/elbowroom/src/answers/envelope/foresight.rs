@@ -40,7 +40,6 @@ pub(super) fn foresight(
         return Ok(None);
     }
     let unknown = unknown(
-        subject.plan,
         oracle,
         envelope,
         &request.search.settings().precisions(subject.plan),
@@ -70,14 +69,13 @@ pub(super) fn foresight(
 
 /// The quantities whose values would have to be known in advance for some end to move further.
 fn unknown(
-    plan: &ParametrizedPlan,
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     steps: &[Rational],
     watcher: &mut dyn Watcher,
 ) -> Result<Vec<ParameterId>, RequestError> {
     let mut unknown = Vec::new();
-    for index in 0..plan.parameters.len() {
+    for (index, step) in steps.iter().enumerate() {
         for side in Side::BOTH {
             if let ControlFlow::Break(()) = flow(watcher) {
                 return Ok(unknown);
@@ -90,7 +88,7 @@ fn unknown(
                 continue;
             };
             // An end that has room for one step may still be stopped by the next larger one.
-            let mut distance = steps[index].clone();
+            let mut distance = step.clone();
             for _ in 0..=FARTHER {
                 let farther = end.with_reach(envelope, Some(&reach + &distance));
                 match oracle.objection(&farther).map_err(FlowError::Refused)? {

@@ -148,7 +148,8 @@ impl OrderAnswer {
         best: Option<SearchStop>,
     ) -> Result<Self, RequestError> {
         let model = &**subject.search.model();
-        let account = Account::of(model, &subject.initial, &order.sequence).map_err(coupled)?;
+        let account = Account::of(model, &subject.initial, &order.sequence)
+            .map_err(|error| coupled(&error))?;
         let starts = order.sequence.iter().enumerate().filter(|(_, node)| {
             matches!(
                 model.plan().nodes[node.index()],
