@@ -121,7 +121,7 @@ pub fn compare(
 /// The same, with a record of each trial.
 ///
 /// # Errors
-/// As for [`compare`].
+/// As for [`compare()`].
 pub fn compare_recorded(
     request: CompareRequest<'_>,
     records: Option<&TrialRecords>,

@@ -9,7 +9,7 @@
 //! come from outside are data: they reach the page in a block of JSON, and the script only ever shows
 //! them as text.
 //!
-//! - [`document`]: what a page shows, as data.
+//! - [`document`](mod@document): what a page shows, as data.
 //! - `plan`, `run`, `experiment`: from answers, traces and results to documents.
 //! - `lanes`: on which lane of a chart an action belongs.
 //! - `html`: the document as a file.
