@@ -13,7 +13,8 @@ const path = require("node:path");
 const { pathToFileURL } = require("node:url");
 const { chromium } = require("playwright-core");
 
-const [, , elbowroom, cases, work, executablePath = "/usr/bin/chromium"] = process.argv;
+const paths = process.argv.map((it, index) => (index > 1 ? path.resolve(it) : it));
+const [, , elbowroom, cases, work, executablePath = "/usr/bin/chromium"] = paths;
 const screenshots = process.env.SCREENSHOTS;
 fs.mkdirSync(work, { recursive: true });
 
