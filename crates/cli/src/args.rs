@@ -17,7 +17,7 @@ use clap_complete::Shell;
 use elbowroom::num::Rational;
 
 pub(crate) use compare::CompareArgs;
-pub(crate) use envelope::{EnvelopeArgs, Growth, Method, Order, controllable};
+pub(crate) use envelope::{EnvelopeArgs, Growth, Order, controllable};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};

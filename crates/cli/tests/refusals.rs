@@ -54,6 +54,28 @@ fn options_of_run_that_could_do_nothing_are_refused() {
 }
 
 #[test]
+fn what_only_the_largest_box_has_asks_for_it_or_is_refused() {
+    let plan = [
+        "envelope",
+        "cases/delivery/domain.pddl",
+        "cases/delivery/problem.pddl",
+        "cases/delivery/plan.plan",
+    ];
+    for options in [
+        &["--objective", "widths"][..],
+        &["--symmetric"],
+        &["--cap", "3"],
+    ] {
+        let said = refusal(&[&plan[..], &["--method", "irr"], options].concat());
+        assert!(said.contains(options[0]), "{said}");
+        assert!(said.contains("leave out --method irr"), "{said}");
+        let implied = elbowroom(&[&plan[..], &["--json"], options].concat());
+        let answer = String::from_utf8(implied.stdout).expect("text");
+        assert!(answer.contains("\"method\": \"best\""), "{options:?}: {answer}");
+    }
+}
+
+#[test]
 fn what_nothing_in_the_problem_is_called_cannot_be_left_open() {
     for (spec, words) in [
         ("duration drve", "did you mean `drive`?"),

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use elbowroom::envelope as library;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
 use super::number::positive;
+use crate::exit::Failure;
 
 #[derive(Args, Debug)]
 #[command(after_long_help = VARY_HELP)]
@@ -24,19 +26,19 @@ pub(crate) struct EnvelopeArgs {
     /// the STN plan file or of the domain (`:synth-parameters`)
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
-    /// The algorithm
-    #[arg(long, value_enum, default_value_t = Method::Irr)]
-    pub(crate) method: Method,
-    /// With --method best: what the box is the greatest of
-    #[arg(long, value_enum, default_value_t = Objective::LeastSlack)]
-    pub(crate) objective: Objective,
-    /// With --method best: both bounds of an interval equally far from the nominal value
+    /// The algorithm; `best` if --objective, --symmetric or --cap is given, otherwise `irr`
+    #[arg(long, value_enum)]
+    method: Option<Method>,
+    /// What the largest box is the greatest of; by default the least slack
+    #[arg(long, value_enum)]
+    objective: Option<Objective>,
+    /// The largest box whose intervals have both bounds equally far from the nominal value
     #[arg(long)]
-    pub(crate) symmetric: bool,
-    /// With --method best: bounds count up to a deviation of N times the nominal value, unless `in
-    /// [LB, UB]` of --vary says less; what nothing stops is infinite all the same
-    #[arg(long, value_name = "N", default_value = "9", value_parser = positive, allow_negative_numbers = true)]
-    pub(crate) cap: Rational,
+    symmetric: bool,
+    /// The largest box where bounds count up to a deviation of N times the nominal value (by default
+    /// 9), unless `in [LB, UB]` of --vary says less; what nothing stops is infinite all the same
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    cap: Option<Rational>,
     /// Step size at which the search ends, in the unit of the plan: each bound is closer to its limit
     /// than twice this. By default a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
@@ -76,6 +78,38 @@ pub(crate) struct EnvelopeArgs {
     pub(crate) json: bool,
 }
 
+impl EnvelopeArgs {
+    /// The algorithm, and what it is asked for.
+    ///
+    /// # Errors
+    /// When IRR is asked for something that only the largest box has.
+    pub(crate) fn method(&self) -> Result<(library::Method, library::BestSettings), Failure> {
+        let for_best = [
+            ("--objective", self.objective.is_some()),
+            ("--symmetric", self.symmetric),
+            ("--cap", self.cap.is_some()),
+        ];
+        let given = for_best.iter().find(|(_, given)| *given);
+        let method = match (self.method, given) {
+            (Some(Method::Irr), Some((flag, _))) => {
+                return Err(Failure::new(
+                    format!("{flag} is about the largest box, which --method irr does not look for"),
+                    format!("leave out --method irr, or {flag}"),
+                ));
+            }
+            (Some(Method::Irr), None) | (None, None) => library::Method::Irr,
+            (Some(Method::Best), _) | (None, Some(_)) => library::Method::Best,
+        };
+        let default = library::BestSettings::default();
+        let best = library::BestSettings {
+            objective: self.objective.map_or(default.objective, Into::into),
+            symmetric: self.symmetric,
+            most: self.cap.clone().unwrap_or(default.most),
+        };
+        Ok((method, best))
+    }
+}
+
 const VARY_HELP: &str = "\
 What --vary can name:
   durations                              all durations (the default)
@@ -110,7 +144,7 @@ pub(crate) enum Objective {
     Widths,
 }
 
-impl From<Objective> for elbowroom::envelope::Objective {
+impl From<Objective> for library::Objective {
     fn from(objective: Objective) -> Self {
         match objective {
             Objective::LeastSlack => Self::LeastSlack,
@@ -148,7 +182,7 @@ pub(crate) enum Guarantee {
     Strong,
 }
 
-impl From<Guarantee> for elbowroom::envelope::Guarantee {
+impl From<Guarantee> for library::Guarantee {
     fn from(guarantee: Guarantee) -> Self {
         match guarantee {
             Guarantee::Weak => Self::Weak,

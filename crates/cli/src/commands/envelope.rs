@@ -19,6 +19,7 @@ use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
+    let (method, best) = arguments.method()?;
     let mut watch = Watch::start(arguments);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
@@ -44,16 +45,9 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
                 args::Growth::Constant => library::Growth::Constant,
             },
             sharpen: arguments.sharpen,
-            method: match arguments.method {
-                args::Method::Irr => library::Method::Irr,
-                args::Method::Best => library::Method::Best,
-            },
+            method,
             most_checks: search.most_checks,
-            best: library::BestSettings {
-                objective: arguments.objective.into(),
-                symmetric: arguments.symmetric,
-                most: arguments.cap.clone(),
-            },
+            best,
         },
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
