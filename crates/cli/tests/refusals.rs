@@ -71,7 +71,10 @@ fn what_only_the_largest_box_has_asks_for_it_or_is_refused() {
         assert!(said.contains("leave out --method irr"), "{said}");
         let implied = elbowroom(&[&plan[..], &["--json"], options].concat());
         let answer = String::from_utf8(implied.stdout).expect("text");
-        assert!(answer.contains("\"method\": \"best\""), "{options:?}: {answer}");
+        assert!(
+            answer.contains("\"method\": \"best\""),
+            "{options:?}: {answer}"
+        );
     }
 }
 

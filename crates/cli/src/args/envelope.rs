@@ -93,7 +93,9 @@ impl EnvelopeArgs {
         let method = match (self.method, given) {
             (Some(Method::Irr), Some((flag, _))) => {
                 return Err(Failure::new(
-                    format!("{flag} is about the largest box, which --method irr does not look for"),
+                    format!(
+                        "{flag} is about the largest box, which --method irr does not look for"
+                    ),
                     format!("leave out --method irr, or {flag}"),
                 ));
             }

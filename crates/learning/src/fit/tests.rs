@@ -1,0 +1,123 @@
+use rand::SeedableRng;
+
+use super::*;
+
+fn drawn(distribution: impl rand_distr::Distribution<f64>, count: usize) -> Vec<f64> {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    (0..count).map(|_| distribution.sample(&mut rng)).collect()
+}
+
+/// The best point of a fine grid, looked at one by one.
+fn by_grid(samples: &[Sample], around: (f64, f64)) -> (f64, f64) {
+    let mut best = (f64::NEG_INFINITY, (0.0, 0.0));
+    for i in 0..=200 {
+        for j in 0..=200 {
+            let mean = around.0 + (f64::from(i) - 100.0) * 0.01;
+            let deviation = around.1 + (f64::from(j) - 100.0) * 0.005;
+            if deviation <= 0.0 {
+                continue;
+            }
+            let value = log_likelihood(
+                samples,
+                1e-9,
+                |x| standard_density((x - mean) / deviation) / deviation,
+                |x| upper_tail((x - mean) / deviation),
+            );
+            if value > best.0 {
+                best = (value, (mean, deviation));
+            }
+        }
+    }
+    best.1
+}
+
+#[test]
+fn newton_finds_the_best_point_of_a_grid() {
+    let values = drawn(
+        rand_distr::Normal::new(12.0, 3.0).expect("a distribution"),
+        60,
+    );
+    for limit in [f64::INFINITY, 14.0, 12.0, 10.0] {
+        let samples: Vec<Sample> = values
+            .iter()
+            .map(|&value| {
+                if value <= limit {
+                    Sample::observed(value)
+                } else {
+                    Sample::censored(limit)
+                }
+            })
+            .collect();
+        let (mean, deviation, _) = location_and_scale(&samples).expect("a fit");
+        let grid = by_grid(&samples, (mean, deviation));
+        assert!((grid.0 - mean).abs() <= 0.0101, "{grid:?} {mean}");
+        assert!((grid.1 - deviation).abs() <= 0.0051, "{grid:?} {deviation}");
+    }
+}
+
+#[test]
+fn what_is_cut_off_counts() {
+    let values = drawn(
+        rand_distr::Normal::new(12.0, 3.0).expect("a distribution"),
+        400,
+    );
+    let samples: Vec<Sample> = values
+        .iter()
+        .map(|&value| {
+            if value <= 12.0 {
+                Sample::observed(value)
+            } else {
+                Sample::censored(12.0)
+            }
+        })
+        .collect();
+    let fit = best(&samples, 0.001).expect("a fit");
+    assert!((fit.mean - 12.0).abs() < 0.6, "{fit:?}");
+    // Leaving out what was cut off would make all actions look quick.
+    let kept: Vec<Sample> = samples.iter().filter(|s| !s.is_censored).copied().collect();
+    let naive = best(&kept, 0.001).expect("a fit");
+    assert!(naive.mean < 10.5, "{naive:?}");
+}
+
+#[test]
+fn the_family_is_found_again() {
+    let of = |values: Vec<f64>| {
+        let samples: Vec<Sample> = values.into_iter().map(Sample::observed).collect();
+        best(&samples, 0.001).expect("a fit").distribution
+    };
+    let normal = rand_distr::Normal::new(20.0, 5.0).expect("a distribution");
+    assert!(matches!(
+        of(drawn(normal, 300)),
+        Distribution::Normal { .. }
+    ));
+    let lognormal = rand_distr::LogNormal::new(1.0, 0.8).expect("a distribution");
+    assert!(matches!(
+        of(drawn(lognormal, 300)),
+        Distribution::LogNormal { .. }
+    ));
+    let uniform = rand_distr::Uniform::new(4.0, 9.0).expect("a distribution");
+    assert!(matches!(
+        of(drawn(uniform, 300)),
+        Distribution::Uniform { .. }
+    ));
+    assert_eq!(of(vec![5.0; 10]), Distribution::Constant(5.0));
+    // Two heaps: no family of ours.
+    let heaps = (0..60).map(|i| {
+        if i % 2 == 0 {
+            3.0 + f64::from(i) / 1e3
+        } else {
+            30.0
+        }
+    });
+    assert!(matches!(of(heaps.collect()), Distribution::Empirical(_)));
+}
+
+#[test]
+fn strange_samples_have_an_answer() {
+    assert_eq!(best(&[], 0.001), None);
+    assert_eq!(best(&[Sample::censored(4.0)], 0.001), None);
+    assert!(best(&[Sample::observed(0.0)], 0.001).is_some());
+    assert!(best(&[Sample::observed(1.0), Sample::censored(9.0)], 0.001).is_none());
+    let wide = [Sample::observed(1e-9), Sample::observed(1e12)];
+    assert!(best(&wide, 0.001).is_some());
+}
