@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use elbowroom_model::Step;
-use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::InstanceId;
 use elbowroom_probability::{
     LayerDispatch, Likelihoods, Model, OrderSearch, Reconsider, SearchSettings, Semantics,
 };
@@ -131,7 +131,7 @@ impl Adaptable {
             let about = About::Said(missing.to_string());
             Box::new(Reason::new(Cause::NoOrder).about(about))
         })?;
-        let as_planned = as_planned(&model, &steps);
+        let as_planned = model.as_timed(&steps);
         let search = OrderSearch::new(model, SearchSettings::default()).beginning_with(as_planned);
         let is_short = search.model().plan().nodes.len() <= SHORT;
         let reconsider = if looks_ahead && is_short {
@@ -142,23 +142,4 @@ impl Adaptable {
         let dispatch = LayerDispatch::new(search, reconsider);
         Ok((Chooser::Orders(Box::new(dispatch)), steps))
     }
-}
-
-/// The plan's happenings as they are timed; ends before what begins at the same time.
-fn as_planned(model: &Model, steps: &[Step]) -> Vec<NodeId> {
-    let timed = model.task().timed();
-    let nodes = model.plan().nodes.iter().enumerate();
-    let mut happenings: Vec<_> = nodes
-        .filter_map(|(index, node)| {
-            let (time, rank) = match *node {
-                Node::Zero => return None,
-                Node::End(id) => (steps[id.index()].end(), 0),
-                Node::Timed(index) => (timed[index].time.clone(), 1),
-                Node::Start(id) | Node::Instant(id) => (steps[id.index()].start.clone(), 2),
-            };
-            Some((time, rank, NodeId::from(index)))
-        })
-        .collect();
-    happenings.sort();
-    happenings.into_iter().map(|(.., node)| node).collect()
 }
