@@ -114,17 +114,20 @@ impl EnvelopeArgs {
 
 const VARY_HELP: &str = "\
 What --vary can name:
-  durations                              all durations (the default)
-  duration ACTIONS                       the durations of these
-  constant ACTIONS FUNCTION [VALUE]      a number in their effects on the function
-  condition ACTIONS FUNCTION [VALUE]     a number in their conditions on the function
-  initial (FUNCTION object ...)          a value at time 0
-  deadline (PREDICATE object ...)        the time of timed initials that make the fact false
-  timed (NAME object ...)                the time of timed initials that change it in any way
-  ?s=VALUE, n0.?r=VALUE                  a :synth-parameters number, nominally VALUE
+  durations                           all durations (the default)
+  duration ACTIONS                    the durations of these
+  constant ACTIONS FUNCTION [VALUE]   a number in their effects on the function
+  condition ACTIONS FUNCTION [VALUE]  a number in their conditions on it
+  initial (FUNCTION object ...)       a value at time 0
+  deadline (PREDICATE object ...)     the time of timed initials that make the
+                                      fact false
+  timed (NAME object ...)             the time of timed initials that change it
+                                      in any way
+  ?s=VALUE, n0.?r=VALUE               a :synth-parameters number, whose nominal
+                                      value is VALUE
 
-ACTIONS is an action's name, a label (n0), or (NAME object _ ...), where _ matches any object. Each
-may be followed by `weight W`, its weight in the search, and `in [LB, UB]`, the range of its values;
+ACTIONS is an action's name, a label (n0), or (NAME object _ ...), where _ matches any object. Each \
+may be followed by `weight W`, its weight in the search, and `in [LB, UB]`, the range of its values; \
 a constant or condition also by `shared`: one parameter for all instances.";
 
 /// The algorithm that computes an envelope.

@@ -47,7 +47,7 @@ pub(crate) enum DurationsChoice {
 
 const FORMATS_HELP: &str = "\
 Formats, told by the content:
-  HEATlab JSON        `nodes` and `constraints`, with the types stc, stcu and pstc
+  HEATlab JSON        `nodes` and `constraints`, of the types stc, stcu, pstc
   PSTN-lib JSON       `timepoints` and `constraints`, with correlations
   CSTNU Tool GraphML  .stn and .stnu; conditional networks are refused
   plain STNU text     begins with `# KIND OF NETWORK`
@@ -55,6 +55,6 @@ Formats, told by the content:
   inequalities        JSON: lists of `[u, v, w]` under the numbers of nodes
   Elbowroom JSON      what --minimal and --dispatchable write
 
-What --minimal and --dispatchable write is GraphML if the name ends in .stn, .stnu, .graphml or
-.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md says what the answers
+What --minimal and --dispatchable write is GraphML if the name ends in .stn, .stnu, .graphml or \
+.xml, and otherwise Elbowroom JSON, in which nothing is lost. docs/networks.md says what the answers \
 mean, docs/formats/network.md has the formats.";

@@ -48,11 +48,12 @@ Planners:
   optic             OPTIC; ELBOWROOM_OPTIC
   tfd               Temporal Fast Downward; ELBOWROOM_TFD
   lpg-td            LPG-td; ELBOWROOM_LPG
-  up:ENGINE         an engine of unified-planning, such as up:aries; ELBOWROOM_PYTHON names the
-                    Python that has it
-  \"CMD …\"           any program that prints a plan or writes it to {plan}. {domain} and {problem}
-                    are its files, {time} and {memory} the limits in seconds and MB
+  up:ENGINE         an engine of unified-planning, such as up:aries;
+                    ELBOWROOM_PYTHON names the Python that has it
+  \"CMD …\"           any program that prints a plan or writes it to {plan};
+                    {domain} and {problem} are its files, {time} and {memory}
+                    the limits in seconds and MB
 
-Every plan is validated before it is printed, whichever planner made it. At the time limit and on
-Ctrl-C the best plan so far is printed. docs/planners.md says how to install each planner and what
+Every plan is validated before it is printed, whichever planner made it. At the time limit and on \
+Ctrl-C the best plan so far is printed. docs/planners.md says how to install each planner and what \
 each outcome means.";

@@ -1,0 +1,76 @@
+//! The help is laid out for a terminal of 80 columns.
+
+mod command;
+
+use std::process::Command;
+
+use command::root;
+
+/// The help of a subcommand, or of the whole command, on a terminal of so many columns.
+fn help(subcommand: Option<&str>, columns: u32) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .current_dir(root())
+        .args(subcommand)
+        .arg("--help")
+        .env("COLUMNS", columns.to_string())
+        .output()
+        .expect("the command can be started");
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// All subcommands, as the help lists them.
+fn subcommands() -> Vec<String> {
+    let help = help(None, 100);
+    let listed = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty());
+    let names: Vec<String> = listed
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next().map(str::to_owned))
+        .collect();
+    assert!(names.iter().any(|name| name == "envelope"), "{names:?}");
+    names
+}
+
+/// What follows the options, which the argument parser lays out.
+fn after_the_options(help: &str) -> Vec<&str> {
+    let lines: Vec<&str> = help.lines().collect();
+    let last = lines.iter().rposition(|line| line.contains("--version"));
+    lines
+        .into_iter()
+        .skip(last.map_or(0, |last| last + 2))
+        .collect()
+}
+
+#[test]
+fn every_line_of_the_help_fits_into_80_columns() {
+    let all = subcommands();
+    let names = all.iter().map(|name| Some(name.as_str()));
+    for name in names.chain([None]).filter(|name| *name != Some("help")) {
+        let help = help(name, 80);
+        for line in help.lines() {
+            assert!(line.chars().count() <= 80, "{name:?}: {line}");
+        }
+    }
+}
+
+/// A table with columns would come apart if a row had to be wrapped.
+#[test]
+fn tables_in_the_help_look_the_same_in_80_columns() {
+    let mut rows = 0;
+    for name in subcommands().iter().filter(|name| *name != "help") {
+        let (wide, narrow) = (help(Some(name), 100), help(Some(name), 80));
+        let narrow = after_the_options(&narrow);
+        for row in after_the_options(&wide) {
+            let has_columns = row.starts_with("  ") && row.trim().contains("  ");
+            if has_columns {
+                assert!(narrow.contains(&row), "{name}: {row}");
+                rows += 1;
+            }
+        }
+    }
+    assert!(rows > 20, "{rows} rows");
+}
