@@ -281,9 +281,9 @@ impl Soundness {
         if let Requirement::Separation { first, second } = broken.requirement
             && broken.case.differences.len() == 1
         {
-            // The wrong way round may do no harm, if they are far apart or one is a timed initial
-            // after the end of the plan. But schedules are convex: between such a one and the one
-            // that the order was taken from lies one with the happenings in order, and too near.
+            // The wrong way round may do no harm if they are far apart. But schedules are convex:
+            // between such a one and the one that the order was taken from lies one with the
+            // happenings in order, and too near.
             let mut near = broken.case.clone();
             near.differences.push(Difference::not_after(first, second));
             let witness = bad_case::witness(&self.reduction, envelope, &near, None);

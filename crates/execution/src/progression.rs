@@ -8,6 +8,7 @@
 //! which the judge says.
 
 mod effects;
+mod goal;
 mod motion;
 mod polynomial;
 mod reading;
@@ -22,6 +23,7 @@ use elbowroom_model::ground::{
 use elbowroom_model::{RunningAction, State, Task};
 use elbowroom_num::{Interval, Rational};
 
+pub(crate) use goal::Outlook;
 pub use reading::Unreadable;
 
 use crate::event::{Measured, Ticket};

@@ -25,8 +25,9 @@
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
 //! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
 //!
-//! The goal is not taken as reached while anything is under way or in doubt, and not before the
-//! world has had a chance to look ([`World::look`]).
+//! The goal is not taken as reached while anything is under way or in doubt, not before the last
+//! timed initial that changes what it reads, and not before the world has had a chance to look
+//! ([`World::look`]).
 
 mod account;
 mod agenda;
@@ -54,7 +55,7 @@ use crate::event::{Command, Ticket};
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 use crate::planning::Planner;
 use crate::preparation::{PrepareError, Preparer};
-use crate::progression::Progression;
+use crate::progression::{Outlook, Progression};
 use crate::reason::{About, Cause, Reason};
 use crate::record::{Entry, Recorder};
 use crate::world::{World, WorldError};
@@ -213,7 +214,10 @@ impl<'a> Run<'a> {
             }
             Decision::Wait { until } => self.wait(until)?,
             Decision::Replan => self.replan(&decided.reason)?,
-            Decision::GoalReached => self.goal_reached(),
+            Decision::GoalReached => match self.belief.outlook() {
+                Outlook::Awaited(time) => self.wait(Some(time))?,
+                Outlook::Reached | Outlook::Unmet => self.goal_reached(),
+            },
         }
         Ok(())
     }
@@ -270,15 +274,35 @@ impl<'a> Run<'a> {
     }
 
     fn is_goal_certain(&self) -> bool {
-        self.belief.is_goal() == Ok(true) && self.account.open_tickets().next().is_none()
+        self.needs_no_plan() == Some(Outlook::Reached)
+    }
+
+    /// Whether the goal is reached, or will be, without any more doing.
+    fn needs_no_plan(&self) -> Option<Outlook> {
+        let is_idle = self.account.open_tickets().next().is_none();
+        let outlook = is_idle.then(|| self.belief.outlook());
+        outlook.filter(|outlook| *outlook != Outlook::Unmet)
+    }
+
+    /// What to do instead of planning, if no plan is needed: take the goal for reached, or wait for
+    /// the timed initials that it depends on, and ask again.
+    fn go_without_plan(&mut self, reason: &Reason) -> bool {
+        match self.needs_no_plan() {
+            None | Some(Outlook::Unmet) => return false,
+            Some(Outlook::Reached) => self.goal_reached(),
+            Some(Outlook::Awaited(time)) => {
+                self.agenda.push(Todo::Replan(reason.clone()));
+                self.agenda.push(Todo::Pass(time));
+            }
+        }
+        self.news.clear();
+        true
     }
 
     /// Plans from here; see [`RunningRule`] for what becomes of what is running.
     fn replan(&mut self, reason: &Reason) -> Result<(), Stop> {
         // What deviated may have been the last thing to do.
-        if self.is_goal_certain() {
-            self.news.clear();
-            self.goal_reached();
+        if self.go_without_plan(reason) {
             return Ok(());
         }
         if reason.cause != Cause::NewPlan {

@@ -69,9 +69,10 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
         let mut rng = ChaCha8Rng::seed_from_u64(number);
         let world = SmallWorld::random(&mut rng, number % 2 == 0);
         let best = world.best();
-        for first_cells in [twin::CLOSES / 2, twin::CLOSES] {
+        for first_cells in [twin::ENDS / 2, twin::ENDS] {
             let settings = Settings {
                 first_cells: first_cells as usize,
+                horizon: Some(i64::from(twin::ENDS).into()),
                 // One grid and no other.
                 gap: 1.0,
                 ..Settings::default()
@@ -81,7 +82,7 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
                 found.lower <= best + 1e-12 && best <= found.upper + 1e-12,
                 "{number}: {best} is outside of {found:?}\n{world:#?}"
             );
-            if first_cells == twin::CLOSES && best > 0.0 && found.upper - found.lower < 0.1 {
+            if first_cells == twin::ENDS && best > 0.0 && found.upper - found.lower < 0.1 {
                 close += 1;
             }
         }
@@ -114,14 +115,15 @@ fn light_that_goes_out_early_is_no_gain() {
     // match down or the mending up would both be wrong. There is one match, and it must burn down: who
     // could drop it would have light for ever.
     let domain = "(define (domain d) (:requirements :durative-actions)
-        (:predicates (unused) (light) (burnt) (mended) (day))
+        (:predicates (unused) (light) (burnt) (mended) (day) (done))
+        (:action finish :parameters () :precondition (and (mended) (burnt) (day)) :effect (done))
         (:durative-action burn :parameters () :duration (= ?duration 4)
           :condition (at start (unused))
           :effect (and (at start (light)) (at start (not (unused))) (at end (not (light))) (at end (burnt))))
         (:durative-action mend :parameters () :duration (= ?duration 5)
           :condition (over all (light)) :effect (at end (mended))))";
     let problem = "(define (problem p) (:domain d) (:init (unused) (day) (at 9 (not (day))))
-        (:goal (and (mended) (burnt) (day))))";
+        (:goal (done)))";
     let world = "format = \"elbowroom-world\"\nversion = 1
         [[duration]]\naction = \"burn\"\nvalues = [4, 8]";
     assert_encloses(&bounds(domain, problem, world, &Settings::default()), 0.5);
@@ -155,6 +157,23 @@ fn what_the_process_does_not_know_is_refused_by_name() {
     assert_eq!(
         refused(go, "[reports]\nlost = 0.5"),
         "the world's reports are not perfect"
+    );
+}
+
+#[test]
+fn a_goal_that_a_timed_initial_changes_is_refused() {
+    let task = task(
+        "(define (domain d) (:requirements :strips) (:predicates (a))
+            (:action make :parameters () :precondition () :effect (a)))",
+        "(define (problem p) (:domain d) (:init (at 9 (not (a)))) (:goal (a)))",
+    );
+    let world = "format = \"elbowroom-world\"\nversion = 1\n";
+    let model = WorldModel::read(world, task.problem()).expect("it is a world");
+    let found = optimum(&task, &model, &Settings::default(), &|| true);
+    assert_eq!(
+        found.expect_err("it is refused").what,
+        "a timed initial changes what the goal reads, so that the goal is not reached as soon as it \
+         holds"
     );
 }
 

@@ -12,8 +12,8 @@
 //!   happening group in between, the state after the group counts.
 //! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
 //!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
-//! - The goal holds after the last happening of the plan's actions. Timed initials after that do
-//!   not count, unless [`Settings::counts_later_timed`] says so.
+//! - The goal holds in the end: after the last happening of the plan's actions, and after all timed
+//!   initials, unless [`Settings::counts_later_timed`] says otherwise.
 //!
 //! A part of a condition that says nothing (it reads a fluent without a value, divides by zero)
 //! is a violation, unless the other parts decide whatever it would say.
@@ -76,7 +76,9 @@ pub struct Settings {
     /// ten-thousandth, whatever its `-t`.
     pub slack: Rational,
     /// Whether timed initials after the last happening of the plan's actions count, so that the
-    /// goal holds after all of them: what VAL, unified-planning and Tamer ask for.
+    /// goal holds after all of them. That is the meaning in the field (VAL, unified-planning and
+    /// Tamer agree), and what networks, envelopes, planner and executors rely on. Without it, the
+    /// goal is read after the last happening of the plan's actions.
     pub counts_later_timed: bool,
     /// Whether happenings of one time interfere only if they write the same. Their conditions read
     /// the state before in any case; with this, another happening of that time may change what they
@@ -85,13 +87,14 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// As exact as can be: tolerance 0, and interfering happenings ε apart.
+    /// As exact as can be: tolerance 0, interfering happenings ε apart, the goal after all timed
+    /// initials.
     fn default() -> Self {
         Self {
             needs_separation: true,
             tolerance: Rational::ZERO,
             slack: Rational::ZERO,
-            counts_later_timed: false,
+            counts_later_timed: true,
             allows_simultaneous_reads: false,
         }
     }
@@ -109,11 +112,10 @@ impl Settings {
     }
 
     /// What unified-planning does with a problem without an ε: what happens at one time reads the
-    /// state before, nothing needs to be apart, and the goal holds after all timed effects.
+    /// state before, and nothing needs to be apart.
     pub fn like_unified_planning() -> Self {
         Self {
             needs_separation: false,
-            counts_later_timed: true,
             allows_simultaneous_reads: true,
             ..Self::default()
         }
@@ -166,7 +168,7 @@ impl Verdict {
 pub struct Report {
     /// The time of the last happening of the plan's actions.
     pub makespan: Rational,
-    /// The state then. Derived facts are not listed.
+    /// The state in the end, in which the goal holds. Derived facts are not listed.
     pub state: State,
     /// For each comparison that some action, or the goal, needs by itself (not as part of a
     /// disjunction), how close it came to failing: by step, the goal's last.

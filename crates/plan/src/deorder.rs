@@ -15,7 +15,8 @@
 //! - Rates of continuous effects are treated like over-all conditions. So are over-all conditions
 //!   of conditional effects, but what came between start and end stays strictly between, as such
 //!   a condition must not become true either.
-//! - Timed initials that change what the goal reads stay on their side of the plan's end.
+//! - The goal is read in the end, after all timed initials too, so it needs no constraint of its own:
+//!   what writes a fact or fluent last does so in every schedule.
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
 //!
@@ -26,7 +27,6 @@
 //! up there as far as nothing needs them.
 
 pub(crate) mod durations;
-mod goal;
 mod implied;
 mod order;
 mod over_all;
@@ -108,7 +108,6 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
         })?;
     let mut sides = Order::default();
     over_all::order(task, &stn_plan, &timeline, &mut order, &mut sides);
-    goal::order(task, &stn_plan, &times, &mut order);
     stn_plan
         .constraints
         .extend(durations::constraints(task, &stn_plan, &times));

@@ -22,7 +22,7 @@ use crate::total_order::{Slot, TotalOrderPlan};
 /// The next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
-    /// The goal holds and nothing is under way.
+    /// The goal holds, nothing is under way, and no timed initial changes what the goal reads any more.
     GoalReached,
     /// This happening.
     Next(NextHappening),
@@ -117,7 +117,8 @@ impl LayerDispatch {
     }
 
     fn holds_goal(&self, circumstances: &Circumstances) -> bool {
-        goal_holds(self.search.model(), circumstances)
+        self.search.is_goal_settled(&circumstances.now)
+            && goal_holds(self.search.model(), circumstances)
     }
 }
 

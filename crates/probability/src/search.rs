@@ -31,6 +31,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use elbowroom_model::Step;
+use elbowroom_num::Rational;
 use elbowroom_plan::{Node, NodeId};
 
 use crate::circumstances::Circumstances;
@@ -158,16 +159,37 @@ impl OrderSearch {
     }
 
     /// A plan's happenings as they are timed, as an order: without the timed initials that do not
-    /// matter, or come after all actions. `steps` are in the order of the plan's instances.
+    /// matter, and of those that come after all actions, with those up to the last that changes what
+    /// the goal reads. `steps` are in the order of the plan's instances.
     pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
         let is_timed =
             |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
         let matters = |node: NodeId| self.separations.timed.iter().any(|(own, _)| *own == node);
+        let until_goal = &self.separations.timed[..self.separations.timed_until_goal];
+        let is_for_goal = |node: NodeId| until_goal.iter().any(|(own, _)| *own == node);
         let mut order = self.model.as_timed(steps);
         order.retain(|&node| !is_timed(node) || matters(node));
-        let last = order.iter().rposition(|&node| !is_timed(node));
+        let last = order
+            .iter()
+            .rposition(|&node| !is_timed(node) || is_for_goal(node));
         order.truncate(last.map_or(0, |last| last + 1));
         order
+    }
+
+    /// Whether no timed initial after `now` changes what the goal reads. Until then it is not reached.
+    pub fn is_goal_settled(&self, now: &Rational) -> bool {
+        self.separations.is_goal_settled(now)
+    }
+
+    /// Whether an order may end here as far as timed initials go: with the last one that the goal
+    /// depends on behind it, and not with one that nothing comes after. `next_timed` counts those
+    /// that have passed.
+    fn may_be_over(&self, next_timed: usize, sequence: &[NodeId]) -> bool {
+        let until_goal = self.separations.timed_until_goal;
+        let is_timed =
+            |node: &NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
+        let ends_with_timed = sequence.last().is_some_and(is_timed);
+        next_timed == until_goal || next_timed > until_goal && !ends_with_timed
     }
 
     /// The order most likely to succeed from here.

@@ -68,8 +68,8 @@ enum Rules {
     /// PDDL 2.1, with ε.
     #[default]
     Pddl,
-    /// PDDL 2.1 with ε, and the goal after all timed initials.
-    PddlLaterTimed,
+    /// The same, with the goal after the plan's last action, whatever timed initials do later.
+    PddlGoalAfterActions,
     /// What unified-planning does where a problem has no ε.
     UnifiedPlanning,
 }
@@ -135,8 +135,8 @@ impl Task {
             let settings = match (&options.tolerance, options.rules) {
                 (Some(tolerance), _) => Settings::like_val(number(tolerance, "tolerance")?),
                 (None, Rules::Pddl) => Settings::default(),
-                (None, Rules::PddlLaterTimed) => Settings {
-                    counts_later_timed: true,
+                (None, Rules::PddlGoalAfterActions) => Settings {
+                    counts_later_timed: false,
                     ..Settings::default()
                 },
                 (None, Rules::UnifiedPlanning) => Settings::like_unified_planning(),

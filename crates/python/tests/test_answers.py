@@ -75,8 +75,8 @@ def test_rules_of_judgement_can_be_chosen() -> None:
     problem = elbowroom.read(
         domain, "(define (problem q) (:domain d) (:init (at 9 (not (p)))) (:goal (p)))"
     )
-    assert problem.check("1: (a)")
-    assert not problem.check("1: (a)", rules="pddl-later-timed")
+    assert not problem.check("1: (a)")
+    assert problem.check("1: (a)", rules="pddl-goal-after-actions")
     assert problem.check("10: (a)", rules="unified-planning")
     with pytest.raises(elbowroom.RequestError, match="unknown variant `mine`"):
         problem.check("1: (a)", rules="mine")

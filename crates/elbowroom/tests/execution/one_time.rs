@@ -172,7 +172,7 @@ fn a_timed_initial_may_end_what_just_ends_and_open_what_just_starts() {
 /// Random conditions, effects and plans, on a grid so coarse that most things coincide.
 #[test]
 fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
-    let (mut valid, mut invalid) = (0, 0);
+    let (mut valid, mut whole, mut invalid) = (0, 0, 0);
     for seed in 0..runs("ELBOWROOM_ONE_TIME_PLANS", 4000) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (domain, problem, plan) = random_problem(&mut rng);
@@ -185,9 +185,17 @@ fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
                 let outcome = execute(&scene);
                 let report = &outcome.report;
                 assert_eq!(report.verdict, Verdict::GoalReached, "{}", about());
-                assert_eq!(outcome.truth, judged.state, "{}", about());
-                assert_eq!(outcome.belief.as_ref(), Some(&judged.state), "{}", about());
-                assert_eq!(report.time, judged.makespan, "{}", about());
+                // The run is over when no timed initial changes any more what the goal reads. The
+                // judge tells of the state after all of them.
+                let timed = scene.task.timed();
+                if timed.iter().all(|it| it.time <= judged.makespan) {
+                    whole += 1;
+                    assert_eq!(outcome.truth, judged.state, "{}", about());
+                    assert_eq!(outcome.belief.as_ref(), Some(&judged.state), "{}", about());
+                    assert_eq!(report.time, judged.makespan, "{}", about());
+                } else {
+                    assert!(report.time >= judged.makespan, "{}", about());
+                }
                 let again = scene.judged(report);
                 assert!(again.is_valid(), "{}\n{again:?}", about());
             }
@@ -205,7 +213,10 @@ fn worlds_and_beliefs_agree_with_the_judge_on_random_plans() {
             validate::Verdict::Undecided(_) => {}
         }
     }
-    assert!(valid > 300 && invalid > 300, "{valid}, {invalid}");
+    assert!(
+        whole > 200 && valid > 300 && invalid > 300,
+        "{whole} of {valid}, {invalid}"
+    );
 }
 
 fn pick<'a>(rng: &mut ChaCha8Rng, among: &[&'a str]) -> &'a str {

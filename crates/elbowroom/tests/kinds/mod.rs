@@ -80,7 +80,8 @@ pub(crate) fn kinds() -> Vec<Kind> {
         battery::THREE_JOBS_AT_ONCE,
         battery::THREE_JOBS_IN_TURN,
         tide::CHANGES_THAT_NOTHING_READS,
-        tide::CHANGES_THAT_SERVE_THE_GOAL,
+        tide::GOAL_THAT_COMES_BY_ITSELF,
+        tide::GOAL_THAT_IS_TAKEN_AWAY,
         deadline::TWO_DEADLINES,
     ]
 }

@@ -26,16 +26,35 @@ pub(crate) const CHANGES_THAT_NOTHING_READS: Kind = Kind {
     not_dynamic: &[],
 };
 
-/// It is clear, becomes clear once more, and only then foggy: that the sky clears limits nothing.
-pub(crate) const CHANGES_THAT_SERVE_THE_GOAL: Kind = Kind {
-    name: "a timed initial that makes the goal's fact what it is",
+/// The fog lifts long after the ship is unloaded, and nothing has to wait for that.
+pub(crate) const GOAL_THAT_COMES_BY_ITSELF: Kind = Kind {
+    name: "a goal that a timed initial brings about in the end",
     domain: DOMAIN,
     problem: "(define (problem clear) (:domain harbour)
-  (:init (at 30 (not (fog))) (at 50 (fog)))
+  (:init (fog) (at 30 (fog)) (at 50 (not (fog))))
   (:goal (and (unloaded) (not (fog)))))",
     plan: "0: (unload) [10]\n",
-    inside: &["dur_0=[0,49.999]"],
-    outside: &["dur_0=[0,50]"],
-    dynamic: &["dur_0=[0,49.999]"],
+    inside: &["dur_0=[0,100]"],
+    outside: &[],
+    dynamic: &["dur_0=[0,100]"],
+    not_dynamic: &[],
+};
+
+/// The shop opens at 10 and closes at 28, and the lamps go out at 30: what is lit before then does
+/// not count, so it takes more than 2 to light one.
+pub(crate) const GOAL_THAT_IS_TAKEN_AWAY: Kind = Kind {
+    name: "a timed initial that takes the goal away from who is too early",
+    domain: "(define (domain lamps)
+  (:requirements :strips :durative-actions :timed-initial-literals)
+  (:predicates (open) (lit))
+  (:durative-action light :parameters () :duration (= ?duration 10)
+    :condition (at start (open)) :effect (at end (lit))))",
+    problem: "(define (problem evening) (:domain lamps)
+  (:init (at 10 (open)) (at 28 (not (open))) (at 30 (not (lit))))
+  (:goal (lit)))",
+    plan: "25: (light) [10]\n",
+    inside: &["dur_0=[2.002,100]"],
+    outside: &["dur_0=[2,10]"],
+    dynamic: &["dur_0=[2.002,100]"],
     not_dynamic: &[],
 };

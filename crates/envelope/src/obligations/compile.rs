@@ -293,7 +293,7 @@ impl Compiler<'_> {
             }
         }
         for condition in self.plan.goal.conjuncts() {
-            let bad_cases = goal_cases(self.task, plan, &timeline, &self.substitution, condition)?;
+            let bad_cases = goal_cases(self.task, &timeline, &self.substitution, condition)?;
             let requirement = Requirement::Goal {
                 condition: condition.clone(),
             };

@@ -334,7 +334,7 @@ impl Contest<'_> {
             return self.mismatch("counterexample is no schedule", envelope, &details);
         }
         if let Requirement::Separation { first, second } = broken.requirement
-            && self.is_only_timed(first, second, schedule)
+            && self.are_timed(first, second)
         {
             self.tally.count("timed initials too near");
             return Ok(());
@@ -352,17 +352,10 @@ impl Contest<'_> {
         }
     }
 
-    /// The judge does not mind how near a timed initial is to another one, or to the last action
-    /// before it.
-    fn is_only_timed(&self, first: NodeId, second: NodeId, schedule: &Schedule) -> bool {
+    /// The judge does not mind how near a timed initial is to another one.
+    fn are_timed(&self, first: NodeId, second: NodeId) -> bool {
         let is_timed = |id: NodeId| matches!(self.plan.plan.nodes[id.index()], Node::Timed(_));
-        let nodes = self.plan.plan.nodes().skip(1);
-        let last = nodes
-            .filter(|(id, _)| !is_timed(*id))
-            .map(|(id, _)| &schedule[id])
-            .max();
-        (is_timed(first) && is_timed(second))
-            || (is_timed(second) && last < Some(&schedule[second]))
+        is_timed(first) && is_timed(second)
     }
 
     fn is_schedule(&self, valuation: &Valuation, schedule: &Schedule) -> bool {

@@ -38,8 +38,7 @@ pub(crate) struct Break {
     pub(crate) what: String,
     pub(crate) valuation: Valuation,
     pub(crate) schedule: Schedule,
-    /// It is only that a timed initial is too near to another one, or to an action from after the
-    /// end of the plan. The judge does not mind.
+    /// It is only that a timed initial is too near to another one. The judge does not mind.
     pub(crate) is_only_timed: bool,
 }
 

@@ -3,7 +3,7 @@
 //!
 //! As in their tool, simultaneous time points are tried in every order. Where the judge is more
 //! precise, the text follows the judge: over-all conditions are read at every moment between two
-//! positions of different times, and timed initials after the last action do not count.
+//! positions of different times.
 
 mod causes;
 mod effects;

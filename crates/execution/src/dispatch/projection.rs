@@ -62,8 +62,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
             Node::Zero | Node::Timed(_) => {}
         }
     }
-    let goal = state.task().goal().clone();
-    let unmet = state.unmet(&goal, None);
+    let unmet = state.unmet_in_the_end();
     (!unmet.is_empty()).then(|| Failure {
         action: None,
         condition: in_words(&state, &unmet).join(" and "),

@@ -8,7 +8,7 @@ use elbowroom_stn::WindowEnd;
 use super::{Dispatch, explain, is_instantaneous};
 use crate::executor::{Decided, Decision, Moment, Order, StepId};
 use crate::horizon::Horizon;
-use crate::progression::Progression;
+use crate::progression::{Outlook, Progression};
 use crate::reason::{About, Cause, Reason};
 
 impl Dispatch {
@@ -222,18 +222,23 @@ impl Dispatch {
     }
 }
 
-/// The plan is done: is the goal reached?
+/// The plan is done: is the goal reached, or will it be without any more doing?
 fn at_the_end(moment: &Moment<'_>) -> Decided {
     let belief = moment.belief;
-    if belief.is_goal() == Ok(true) {
-        return Decided {
+    match belief.outlook() {
+        Outlook::Reached => Decided {
             decision: Decision::GoalReached,
             reason: Reason::new(Cause::GoalReached),
-        };
+        },
+        Outlook::Awaited(time) => Decided {
+            decision: Decision::Wait { until: Some(time) },
+            reason: Reason::new(Cause::NothingDue).about(About::GoalSettled),
+        },
+        Outlook::Unmet => {
+            let unmet = in_words(belief, &belief.unmet_in_the_end());
+            replan(Reason::new(Cause::PlanDone).about(About::Conditions(unmet)))
+        }
     }
-    let task = belief.task();
-    let unmet = belief.unmet(task.goal(), None);
-    replan(Reason::new(Cause::PlanDone).about(About::Conditions(in_words(belief, &unmet))))
 }
 
 /// An over-all condition of something running that does not hold.

@@ -42,6 +42,8 @@ pub enum About {
     SeenAtTheEnd,
     /// Whatever is observed next.
     AnyObservation,
+    /// The last timed initial that changes what the goal reads.
+    GoalSettled,
     /// The end of what is under way.
     EndOfRunning,
     /// The start of what was told to start.
@@ -117,6 +119,7 @@ impl fmt::Display for About {
             }
             Self::SeenAtTheEnd => "what the world looks like at the end",
             Self::AnyObservation => "something is observed",
+            Self::GoalSettled => "the last timed initial that the goal depends on",
             Self::EndOfRunning => "what is under way has ended",
             Self::StartOfOrdered => "what was told to start has started",
             Self::EndOfCancelled => "what was told to stop has stopped",

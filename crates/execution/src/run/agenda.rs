@@ -28,6 +28,8 @@ pub(super) enum Todo {
     NoteSilence(Ticket, Rational),
     /// Wait until these have ended; without any named, until all have.
     Settle(Option<Vec<Ticket>>),
+    /// See what is to be done instead of the plan.
+    Replan(Reason),
     /// Make a plan from here.
     Plan(Reason),
     /// Begin with a plan as soon as the time is over that it took to make it.
@@ -73,6 +75,7 @@ impl Run<'_> {
             }
             Todo::NoteSilence(ticket, since) => self.note_silence(ticket, since),
             Todo::Settle(awaited) => self.go_on_settling(awaited),
+            Todo::Replan(reason) => self.replan(&reason)?,
             Todo::Plan(reason) => self.plan_from_here(&reason)?,
             Todo::Adopt(made) => self.adopt(made)?,
             Todo::Tell(news) => {

@@ -64,8 +64,7 @@ impl Run<'_> {
     /// Asks the planner; the plan is taken up when the time that this takes has passed.
     pub(super) fn plan_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
         self.news.clear();
-        if self.is_goal_certain() {
-            self.goal_reached();
+        if self.go_without_plan(reason) {
             return Ok(());
         }
         let (situation, running) = self.situation();

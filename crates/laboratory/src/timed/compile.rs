@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use elbowroom_model::Task;
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, SnapAction,
 };
 use elbowroom_model::problem::{self, Comparison, TimedChange, TimedInitial};
 use elbowroom_model::reachability::{self, Answer};
+use elbowroom_model::{Footprint, Task};
 use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, ExogenousChange, Failure, WorldModel};
 
@@ -269,7 +269,14 @@ impl Compiler<'_> {
                 time: exogenous.time.clone(),
             });
         }
+        let goal = Footprint::of_condition(self.task, self.task.goal());
         for timed in self.task.timed() {
+            if Footprint::of_timed(timed).writes_what_is_read_by(&goal) {
+                return Err(NotTabulated::new(
+                    "a timed initial changes what the goal reads, so that the goal is not reached \
+                     as soon as it holds",
+                ));
+            }
             let (mut adds, mut deletes) = (0, 0);
             for change in &timed.changes {
                 match change {

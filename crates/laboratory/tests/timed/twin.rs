@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// The counter closes then, and with it all hope is gone.
-pub(crate) const CLOSES: u32 = 8;
+/// The run ends then, and with it all hope is gone.
+pub(crate) const ENDS: u32 = 8;
 
 const FACTS: usize = 4;
 
@@ -91,7 +91,7 @@ impl SmallWorld {
     pub(crate) fn domain(&self) -> String {
         let mut text =
             "(define (domain small) (:requirements :durative-actions :negative-preconditions)
-            (:predicates (f0) (f1) (f2) (f3) (open))\n"
+            (:predicates (f0) (f1) (f2) (f3))\n"
                 .to_owned();
         for (index, action) in self.actions.iter().enumerate() {
             let timed = |when: &str, what: Option<Literal>| {
@@ -122,7 +122,7 @@ impl SmallWorld {
         let goal = listed(&mut self.goal.iter().copied());
         format!(
             "(define (problem p) (:domain small)
-               (:init {initial} (open) (at {CLOSES} (not (open)))) (:goal (and (open) {goal})))"
+               (:init {initial}) (:goal (and {goal})))"
         )
     }
 
@@ -171,8 +171,8 @@ impl SmallWorld {
         if self.is_won(now) {
             return 1.0;
         }
-        // The counter closes, and nothing that happens then or later is of use.
-        if now.time == CLOSES {
+        // The run ends, and nothing that happens later is of use.
+        if now.time == ENDS {
             return 0.0;
         }
         if let Some(value) = known.get(now) {

@@ -50,7 +50,7 @@ pub(super) struct Group<'a> {
 
 /// All happenings by time; those that the tolerance does not tell apart form one group.
 ///
-/// Timed initials after the last happening of the plan are left out unless they count, and so is
+/// Timed initials after the last happening of the plan are left out if they do not count, and so is
 /// all that has happened when the plan begins in mid-execution.
 pub(super) fn timeline<'a>(
     task: &'a Task,

@@ -45,7 +45,7 @@ const SUPPORTED: &[(&str, &str)] = &[
     (
         "Timed initial literals and fluents",
         "`(at 10 (p))`, `(at 10 (not (p)))`, `(at 10 (= (f) 3))`; two that contradict each other at \
-         one time are a mistake in the problem",
+         one time are a mistake in the problem; the goal counts after all of them",
     ),
     ("Derived predicates", "stratified rules"),
     ("Metrics", "read; they have no bearing on validity"),

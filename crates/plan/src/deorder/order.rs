@@ -32,12 +32,6 @@ impl Order {
         }
     }
 
-    /// Whether some node is demanded to come after this one.
-    pub(super) fn has_successor(&self, node: NodeId) -> bool {
-        let from_node = (node, NodeId(0))..=(node, NodeId(u32::MAX));
-        self.distances.range(from_node).next().is_some()
-    }
-
     /// The constraints, by nodes.
     pub(super) fn into_constraints(self) -> impl Iterator<Item = Constraint> {
         self.distances

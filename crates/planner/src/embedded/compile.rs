@@ -66,8 +66,9 @@ pub(crate) struct Compiled {
     pub(crate) goal: Formula,
     /// What a plan shall have little of, if that is more than the makespan and was asked for.
     pub(crate) metric: Option<Metric>,
-    /// The timed initials that write something the goal reads.
-    pub(crate) goal_timed: Vec<u32>,
+    /// How many timed initials come before the goal is settled, as far as they go: those up to the
+    /// last that writes something the goal reads.
+    pub(crate) timed_until_goal: u32,
     /// The rules of derived facts: what a stratum negates is settled in an earlier one.
     pub(crate) strata: Vec<Vec<Rule>>,
     /// The derived facts, by stratum.

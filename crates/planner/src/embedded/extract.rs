@@ -10,7 +10,6 @@ use super::network::{Network, NodeId, SETTLED};
 use super::root::root;
 use super::state::State;
 use super::symbolic;
-use super::time::NEVER;
 
 /// A step of the plan to be.
 #[derive(Clone, Debug)]
@@ -33,10 +32,12 @@ pub(crate) fn plan_of(
     for &step in steps {
         replay.take(step)?;
     }
+    while replay.state.timed < compiled.timed_until_goal {
+        replay.take(Step::Timed)?;
+    }
     if replay.state.symbolic.is_some() {
         replay.stepper.reach_goal(&mut replay.state)?;
     }
-    replay.wait_for_timed()?;
     let Replay {
         stepper,
         state,
@@ -112,24 +113,6 @@ impl<'a> Replay<'a> {
                 self.timings[ended?].end = Some(if is_new { node } else { foreseen_end });
             }
             Step::Timed => {}
-        }
-        Some(())
-    }
-
-    /// The goal may need a timed initial that comes after all else: then something must wait.
-    fn wait_for_timed(&mut self) -> Option<()> {
-        let (compiled, state) = (self.stepper.compiled, &mut self.state);
-        let goals = compiled.goal_timed.iter();
-        let past = goals.filter(|&&timed| timed < state.timed);
-        let times = past.map(|&timed| compiled.timed[timed as usize].time);
-        let needed = times.max().unwrap_or(-NEVER);
-        if state.earliest_end() < needed {
-            let mut nodes = (0..state.network.node_count()).rev();
-            state.network = nodes.find_map(|node| {
-                let mut network = state.network.clone();
-                let node = NodeId::try_from(node).ok()?;
-                network.delay(node, needed).ok().map(|()| network)
-            })?;
         }
         Some(())
     }

@@ -51,12 +51,18 @@ impl Names {
     }
 }
 
-/// A proof that no plan exists, if the goal is out of reach from the beginning even when nothing
-/// that was reached is ever lost.
+/// A proof that no plan exists, if timed initials take a part of the goal away for good, or if the
+/// goal is out of reach from the beginning even when nothing that was reached is ever lost.
 pub(crate) fn relaxed_proof(names: &Names, compiled: &Compiled) -> Option<Proof> {
     let uncompressed: Option<Compressibility> = None;
     let initial = root(compiled);
     let mut relaxed = Relaxed::new(compiled, uncompressed);
+    if let Some((literal, end)) = relaxed.lost_goal() {
+        let end = compiled.scale.units(end).to_decimal(3);
+        let literal = names.literal(literal);
+        let why = format!("`{literal}` no longer holds from {end} on, whatever is done");
+        return Some(Proof::Unreachable(vec![why]));
+    }
     if relaxed.evaluate(&initial).is_some() {
         return None;
     }

@@ -173,6 +173,16 @@ impl<'a> Relaxed<'a> {
             .collect()
     }
 
+    /// A literal of the goal that changes at fixed times only and is false in the end, and when it
+    /// last becomes so.
+    pub(crate) fn lost_goal(&self) -> Option<(Literal, Ticks)> {
+        let mut goals = self.compiled.goal.literals.iter();
+        goals.find_map(|&literal| {
+            let (_, end) = self.graph.spans_of(literal)?.last()?;
+            (*end < NEVER).then_some((literal, *end))
+        })
+    }
+
     /// The number of timetables: literals that change at fixed times only.
     pub(crate) fn timetable_count(&self) -> usize {
         self.graph.timetable.len()
@@ -208,7 +218,7 @@ impl<'a> Relaxed<'a> {
             return None;
         }
         self.extract(state, &mut estimate);
-        if !self.compiled.goal_timed.is_empty() {
+        if state.timed < self.compiled.timed_until_goal {
             self.await_timed(state, &mut estimate);
         }
         self.list_applicable(state, &mut estimate);

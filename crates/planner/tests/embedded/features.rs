@@ -50,6 +50,25 @@ fn a_window_that_is_too_short_is_a_proof_with_a_reason() {
 }
 
 #[test]
+fn the_goal_counts_after_all_timed_initials() {
+    let plan = |problem: &str| describe(&answer(DOOR, problem));
+    // Nothing waits for what comes by itself.
+    let closing = "(:init (open) (at 17 (not (open)))) (:goal (and (in) (not (open))))";
+    assert_eq!(plan(closing), "0: (enter) [10]");
+    assert_eq!(plan("(:init (at 7 (open))) (:goal (open))"), "");
+    // What is taken away again has to be done later, or not at all.
+    let turned_out = "(:init (open) (at 20 (not (in)))) (:goal (in))";
+    assert_eq!(plan(turned_out), "10001/1000: (enter) [10]");
+    let closed = "(:init (open) (at 17 (not (open)))) (:goal (and (in) (open)))";
+    assert_eq!(
+        plan(closed),
+        "no plan exists: `(open)` no longer holds from 17 on, whatever is done"
+    );
+    let too_early = "(:init (open) (at 17 (not (open))) (at 20 (not (in)))) (:goal (in))";
+    assert!(plan(too_early).starts_with("none found"), "{}", plan(too_early));
+}
+
+#[test]
 fn a_goal_that_nothing_brings_about_is_named() {
     let problem = "(:init) (:goal (in))";
     assert_eq!(

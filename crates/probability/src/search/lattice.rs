@@ -198,9 +198,10 @@ impl Walk<'_> {
     /// The probability of the sequence as it stands, if it is an order.
     fn ends(&mut self) -> Result<Option<f64>, TooLarge> {
         let model = &*self.search.model;
-        let is_timed = |node: &NodeId| matches!(model.plan().nodes[node.index()], Node::Timed(_));
         if !self.network.running().is_empty()
-            || self.network.sequence().last().is_some_and(is_timed)
+            || !self
+                .search
+                .may_be_over(self.next_timed, self.network.sequence())
         {
             return Ok(None);
         }

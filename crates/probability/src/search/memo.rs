@@ -36,7 +36,7 @@ struct Key {
     is_used: Vec<bool>,
     running: Vec<InstanceId>,
     next_timed: usize,
-    /// Such a sequence is no order as it stands, as the goal is read after an action.
+    /// Such a sequence may be no order as it stands: see `OrderSearch::may_be_over`.
     is_timed_last: bool,
     truths: Vec<Truth>,
     numbers: Vec<Number>,

@@ -181,10 +181,8 @@ impl<'s, 'w> Run<'s, 'w> {
 
     /// Keeps the sequence so far, if it is an order and better than the best.
     fn consider(&mut self) -> Result<(), TooCoupled> {
-        let last = self.network.sequence().last();
-        let is_timed =
-            |node: &NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
-        if !self.network.running().is_empty() || last.is_some_and(is_timed) {
+        if !self.network.running().is_empty()
+            || !self.search.may_be_over(self.next_timed, self.network.sequence()) {
             return Ok(());
         }
         if self.must_work {

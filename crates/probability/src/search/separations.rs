@@ -18,6 +18,9 @@ pub(crate) struct Separations {
     never_after: Vec<Vec<NodeId>>,
     /// The timed initials that matter, in order of time.
     pub(crate) timed: Vec<(NodeId, Rational)>,
+    /// How many of them an order has: those up to the last that changes what the goal reads. The
+    /// goal counts after all timed initials.
+    pub(crate) timed_until_goal: usize,
     /// By instance.
     pub(crate) durations: Vec<(Rational, Option<Rational>)>,
     pub(crate) starts: Vec<NodeId>,
@@ -53,7 +56,8 @@ impl Separations {
                 never_after[link.to.index()].push(link.from);
             }
         }
-        let mut read: Vec<Footprint> = vec![Footprint::of_condition(task, task.goal())];
+        let goal = Footprint::of_condition(task, task.goal());
+        let mut read: Vec<Footprint> = vec![goal.clone()];
         for (_, instance) in plan.instances() {
             if let Body::Durative(body) = &instance.action.body {
                 read.push(Footprint::of_condition(task, &body.over_all));
@@ -81,12 +85,19 @@ impl Separations {
                 }
                 _ => None,
             });
+        let timed: Vec<(NodeId, Rational)> = timed.collect();
+        let is_for_goal =
+            |(node, _): &(NodeId, Rational)| footprints[node.index()].writes_what_is_read_by(&goal);
         let ids = || plan.instances().map(|(id, _)| id);
         Self {
             epsilon: task.epsilon().clone(),
             apart,
             never_after,
-            timed: timed.collect(),
+            timed_until_goal: timed
+                .iter()
+                .rposition(is_for_goal)
+                .map_or(0, |last| last + 1),
+            timed,
             durations: ids().map(|id| plan.duration(id)).collect(),
             starts: ids().map(|id| model.start(id)).collect(),
             ends: ids().map(|id| model.end(id)).collect(),
@@ -139,6 +150,12 @@ impl Separations {
         let earliest = (&running.start + least).max(now.clone());
         let latest = greatest.as_ref().map(|greatest| &running.start + greatest);
         (earliest, latest.filter(|latest| latest >= now))
+    }
+
+    /// Whether no timed initial after `now` changes what the goal reads.
+    pub(crate) fn is_goal_settled(&self, now: &Rational) -> bool {
+        let last = self.timed_until_goal.checked_sub(1);
+        last.is_none_or(|last| self.timed[last].1 <= *now)
     }
 
     /// Whether the clock matters, and not only time differences.

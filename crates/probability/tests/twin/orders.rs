@@ -1,5 +1,6 @@
 //! All orders, one after the other.
 
+use elbowroom_model::Footprint;
 use elbowroom_plan::{Node, NodeId};
 use elbowroom_probability::{Candidates, Likelihoods, OrderSearch, Semantics};
 
@@ -52,7 +53,7 @@ fn extend(
     }
     let must_work = search.settings().candidates == Candidates::Working;
     let is_timed = |node: &NodeId| matches!(case.plan.nodes[node.index()], Node::Timed(_));
-    if worlds.running().is_empty() && !sequence.last().is_some_and(is_timed) {
+    if worlds.running().is_empty() && may_be_over(case, sequence) {
         let p = worlds.success_probability();
         let counts = !must_work || nominal.success_probability() > 0.0;
         if counts && p > 0.0 {
@@ -87,4 +88,27 @@ fn extend(
             sequence.pop();
         }
     }
+}
+
+/// The goal counts after all timed initials: those to come that change what it reads belong to an
+/// order, and an order ends with no other ones.
+fn may_be_over(case: &Case, sequence: &[NodeId]) -> bool {
+    let goal = Footprint::of_condition(&case.task, case.task.goal());
+    let concerns_goal =
+        |index: usize| Footprint::of_timed(&case.task.timed()[index]).writes_what_is_read_by(&goal);
+    let is_to_come = |index: usize| case.task.timed()[index].time > case.circumstances.now;
+    let mut nodes = (0..).map(NodeId::from).zip(&case.plan.nodes);
+    let is_complete = nodes.all(|(node, what)| match what {
+        Node::Timed(index) if is_to_come(*index) && concerns_goal(*index) => {
+            sequence.contains(&node)
+        }
+        _ => true,
+    });
+    let ends_well = sequence
+        .last()
+        .is_none_or(|last| match case.plan.nodes[last.index()] {
+            Node::Timed(index) => concerns_goal(index),
+            _ => true,
+        });
+    is_complete && ends_well
 }

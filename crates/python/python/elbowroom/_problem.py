@@ -139,9 +139,10 @@ class Problem:
         Args:
             plan: a plan with fixed times.
             tolerance: judges as VAL does with this ``-t``; without it, exactly.
-            rules: without a tolerance: ``"pddl"``; ``"pddl-later-timed"``, where the goal must hold
-                after all timed initials; or ``"unified-planning"``, where in addition nothing needs
-                to be apart, and what happens at one time reads the state before.
+            rules: without a tolerance: ``"pddl"``, where the goal holds after all timed initials;
+                ``"pddl-goal-after-actions"``, where it holds after the plan's last action; or
+                ``"unified-planning"``, where nothing needs to be apart, and what happens at one time
+                reads the state before.
 
         Raises:
             ReadError: if the plan cannot be read.

@@ -37,22 +37,18 @@ _TAKEN = frozenset(
 )
 _INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a"}
 
-ALL_OVER, FINISH, FINISHED, COST = "all-timed-over", "finish", "finished", "action-costs"
-"""What is added to a problem: see :class:`Translation`."""
+COST = "action-costs"
+"""The fluent that is added where actions have costs."""
 
 
 class Translation:
     """A problem of unified-planning, and what it is in PDDL.
 
-    unified-planning asks for the goal after all timed effects. With ``until_all_timed``, the
-    problem in PDDL has an action ``(finish)`` that waits for them, and without which the goal is not
-    reached; it is no action of the original, and left out of the plans that come back.
-
     Raises:
         UnsupportedError: if the problem has something that has no counterpart; it says what.
     """
 
-    def __init__(self, problem: UPProblem, until_all_timed: bool = False) -> None:
+    def __init__(self, problem: UPProblem) -> None:
         if not isinstance(problem, UPProblem):
             raise UnsupportedError(
                 f"a {type(problem).__name__} is no action-based problem; only these are supported"
@@ -61,9 +57,8 @@ class Translation:
         if problem.kind.has_bounded_types():
             problem = _without_bounds(problem)
         self.source = problem
-        self.has_finish = until_all_timed and bool(problem.timed_effects)
         self._names: dict[tuple[str, Any], str] = {}
-        self._used = {ALL_OVER, FINISH, FINISHED, COST, *_TAKEN}
+        self._used = {COST, *_TAKEN}
         self._simplify = problem.environment.simplifier.simplify
         self._refuse_what_has_no_counterpart()
         self.domain_text = "\n".join(self._domain())
@@ -205,8 +200,6 @@ class Translation:
         yield f"  (:constants {' '.join(constants)})"
         is_fact = [fluent for fluent in problem.fluents if fluent.type.is_bool_type()]
         predicates = [self._signature(fluent) for fluent in is_fact]
-        if self.has_finish:
-            predicates += [f"({ALL_OVER})", f"({FINISHED})"]
         yield f"  (:predicates {' '.join(predicates)})"
         functions = [self._signature(fluent) for fluent in problem.fluents if fluent not in is_fact]
         if self._costs() is not None:
@@ -214,9 +207,6 @@ class Translation:
         yield f"  (:functions {' '.join(functions)})"
         for action in problem.actions:
             yield from self._action(action)
-        if self.has_finish:
-            yield f"  (:action {FINISH} :parameters () :precondition ({ALL_OVER})"
-            yield f"    :effect ({FINISHED}))"
         yield ")"
 
     def _signature(self, fluent: Any) -> str:
@@ -306,18 +296,12 @@ class Translation:
                 yield f"    (= {target} {self.condition(value)})"
         if self._costs() is not None:
             yield f"    (= ({COST}) 0)"
-        last = Fraction(0)
         for timing, effects in problem.timed_effects.items():
             time = _absolute(timing)
-            last = max(last, time)
             for effect in effects:
                 yield f"    {self._timed(time, effect)}"
-        if self.has_finish:
-            yield f"    (at {last + 1} ({ALL_OVER}))"
         yield "  )"
         goals = [self.condition(goal) for goal in problem.goals]
-        if self.has_finish:
-            goals.append(f"({FINISHED})")
         yield f"  (:goal (and {' '.join(goals)}))"
         metric = self._metric()
         if metric is not None:
@@ -363,16 +347,12 @@ class Translation:
         if isinstance(plan, SequentialPlan):
             # One after the other, further apart than any ε.
             gap = max(Fraction(1), 2 * Fraction(self.original.epsilon or 0))
-            untimed: list[tuple[Fraction, str, Fraction | None]] = [
-                (gap * (i + 1), self._instance(it), None) for i, it in enumerate(plan.actions)
-            ]
-            return self._with_finish(untimed)
+            return [(gap * (i + 1), self._instance(it), None) for i, it in enumerate(plan.actions)]
         if isinstance(plan, TimeTriggeredPlan):
-            timed = [
+            return [
                 (Fraction(start), self._instance(it), None if d is None else Fraction(d))
                 for start, it, d in plan.timed_actions
             ]
-            return self._with_finish(timed)
         if isinstance(plan, STNPlan):
             converted = plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, self.original)
             return self.steps(converted)
@@ -380,25 +360,14 @@ class Translation:
             f"a {type(plan).__name__} is not supported; give a sequential or time-triggered plan"
         )
 
-    def _with_finish(
-        self, steps: list[tuple[Fraction, str, Fraction | None]]
-    ) -> list[tuple[Fraction, str, Fraction | None]]:
-        if not self.has_finish:
-            return steps
-        last = max(_absolute(timing) for timing in self.original.timed_effects)
-        end = max((start + (d or 0) for start, _, d in steps), default=Fraction(0))
-        return [*steps, (max(last + 2, end + 1), f"({FINISH})", None)]
-
     def _instance(self, instance: ActionInstance) -> str:
         words = [self.name("action", instance.action)]
         words += [self._walk(it, {}) for it in instance.actual_parameters]
         return f"({' '.join(words)})"
 
-    def instance(self, action: str) -> ActionInstance | None:
-        """An action of ours as one of the original problem; ``None`` for ``(finish)``."""
+    def instance(self, action: str) -> ActionInstance:
+        """An action of ours as one of the original problem."""
         name, *arguments = action.strip("()").split()
-        if name == FINISH and self.has_finish:
-            return None
         manager = self.original.environment.expression_manager
         objects = [manager.ObjectExp(self.objects[it]) for it in arguments]
         return ActionInstance(self.actions[name], tuple(objects))
@@ -406,11 +375,10 @@ class Translation:
     def plan_back(self, steps: Iterable[Any]) -> Any:
         """Our plan as a sequential plan, if the problem has no time, or a time-triggered one."""
         made = [(s.start, self.instance(s.action), s.duration) for s in steps]
-        kept = [(start, it, duration) for start, it, duration in made if it is not None]
         environment = self.original.environment
         if self.original.kind.has_continuous_time() or self.original.kind.has_discrete_time():
-            return TimeTriggeredPlan(kept, environment)
-        ordered = sorted(kept, key=lambda it: it[0])
+            return TimeTriggeredPlan(made, environment)
+        ordered = sorted(made, key=lambda it: it[0])
         return SequentialPlan([it for _, it, _ in ordered], environment)
 
 

@@ -155,7 +155,7 @@ class ElbowroomPlanner(Engine, OneshotPlannerMixin, AnytimePlannerMixin):  # typ
     def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
         status = PlanGenerationResultStatus
         try:
-            translated = Translation(problem, until_all_timed=True)
+            translated = Translation(problem)
             found = translated.problem.plan(time_limit=timeout, first=first)
         except UnsupportedError as error:
             message = LogMessage(LogLevel.ERROR, str(error))
@@ -180,7 +180,7 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
     """Elbowroom's judge, with the rules of unified-planning.
 
     Without an ε in the problem, what happens at one time reads the state before, and nothing needs
-    to be apart; with one, interfering happenings keep it. The goal must hold after all timed effects.
+    to be apart; with one, interfering happenings keep it. The goal holds after all timed effects.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -216,7 +216,7 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
 
     def _validate(self, problem: Any, plan: Any) -> ValidationResult:
         translated = Translation(problem)
-        rules = "pddl-later-timed" if problem.epsilon else "unified-planning"
+        rules = "pddl" if problem.epsilon else "unified-planning"
         verdict = translated.problem.check(translated.steps(plan), rules=rules)
         if verdict.violation is None:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
@@ -237,14 +237,13 @@ class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unus
 def envelope(problem: UPProblem, plan: Any, **options: Any) -> Envelope:
     """How far each quantity of a plan may deviate while the plan still works.
 
-    The goal is protected until after all timed effects. Options are those of
-    :meth:`elbowroom.Problem.envelope`; actions in them have their names in PDDL, which are those of
-    the problem in lower case.
+    Options are those of :meth:`elbowroom.Problem.envelope`; actions in them have their names in PDDL,
+    which are those of the problem in lower case.
 
     Raises:
         UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
     """
-    translated = Translation(problem, until_all_timed=True)
+    translated = Translation(problem)
     return translated.problem.envelope(translated.steps(plan), **options)
 
 
@@ -258,7 +257,7 @@ def to_stn(problem: UPProblem, plan: Any) -> STNPlan:
         UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
         RequestError: if the plan does not work.
     """
-    translated = Translation(problem, until_all_timed=True)
+    translated = Translation(problem)
     stn = translated.problem.stn(translated.steps(plan))
     whats = _instances(stn.text)
     start = STNPlanNode(TimepointKind.GLOBAL_START)
@@ -272,9 +271,8 @@ def to_stn(problem: UPProblem, plan: Any) -> STNPlan:
         label, _, end = name.partition(".")
         if name in fixed or label not in whats:
             continue
-        made.setdefault(label, translated.instance(whats[label]))
-        if made[label] is None:
-            continue
+        if label not in made:
+            made[label] = translated.instance(whats[label])
         kind = {"start": TimepointKind.START, "end": TimepointKind.END}
         kept[name] = STNPlanNode(
             kind.get(end, TimepointKind.START), made[label]
@@ -320,7 +318,7 @@ def execute(problem: UPProblem, plan: Any, **options: Any) -> Run:
     Raises:
         UnsupportedError: if the problem or the plan has what has no counterpart; it says what.
     """
-    translated = Translation(problem, until_all_timed=True)
+    translated = Translation(problem)
     return translated.problem.run(translated.steps(plan), **options)
 
 

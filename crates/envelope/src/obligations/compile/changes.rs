@@ -6,13 +6,12 @@ use elbowroom_model::ground::{Change, Expression, FactId, FluentId};
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
 
-use super::super::goal::lasts;
 use super::super::timeline::{FluentChange, Reading};
 use super::super::{BadCase, Difference, Obligation, Obligations, Refusal, Requirement};
 use super::guards::GuardPart;
 use super::{Compiler, Run};
 use crate::linear::Linear;
-use elbowroom_plan::{InstanceId, Node, NodeId};
+use elbowroom_plan::{InstanceId, NodeId};
 
 impl Compiler<'_> {
     /// The continuous changes that begin at the start of an instance, with their rates; `None` is
@@ -134,8 +133,7 @@ impl Compiler<'_> {
         Ok(recorded)
     }
 
-    /// Several updates of one fluent by one happening must all be increases and decreases. Timed
-    /// initials that come after the plan's last action do not count.
+    /// Several updates of one fluent by one happening must all be increases and decreases.
     pub(super) fn forbid_conflicts(
         &self,
         run: &Run,
@@ -147,20 +145,12 @@ impl Compiler<'_> {
             if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
                 continue;
             }
-            let when = match self.plan.plan.nodes[node.index()] {
-                Node::Timed(_) => lasts(&self.plan.plan)
-                    .into_iter()
-                    .map(|last| vec![Difference::not_after(node, last)])
-                    .collect(),
-                _ => vec![Vec::new()],
-            };
-            let bad_cases = when.into_iter().map(|differences| BadCase {
-                differences,
-                inequalities: run.timeline.assumptions.clone(),
-            });
             obligations.direct.push(Obligation {
                 requirement: Requirement::OneUpdate { node, fluent },
-                bad_cases: bad_cases.collect(),
+                bad_cases: vec![BadCase {
+                    differences: Vec::new(),
+                    inequalities: run.timeline.assumptions.clone(),
+                }],
             });
         }
     }

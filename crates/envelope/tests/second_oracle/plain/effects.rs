@@ -175,19 +175,14 @@ impl<'a> Search<'a> {
         world.placed.extend(group);
         world.remaining.retain(|node| !group.contains(node));
         world.last = group.to_vec();
-        let is_over = world
-            .remaining
-            .iter()
-            .all(|&node| matches!(self.node(node), Node::Timed(_)));
-        if is_over {
+        if world.remaining.is_empty() {
             let context = Context {
                 facts: world.facts.clone(),
                 values: world.values.clone(),
                 duration: None,
             };
             let goal = &self.plan.goal;
-            self.require(goal, &context, "goal")?;
-            return self.separate_later(&world);
+            return self.require(goal, &context, "goal");
         }
         self.next_groups(&world, &mut Vec::new(), 0)
     }

@@ -40,7 +40,7 @@ impl Search<'_> {
                 return Ok(());
             }
         }
-        self.separate(world, &[], group)?;
+        self.separate(world, group)?;
         if self.found.is_some() {
             return Ok(());
         }
@@ -64,10 +64,9 @@ impl Search<'_> {
 
     /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only if
     /// the time of one is open.
-    fn separate(&mut self, world: &World, unplaced: &[usize], group: &[usize]) -> Step {
+    fn separate(&mut self, world: &World, group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
-            let others = world.placed.iter().chain(unplaced);
-            for &other in others.chain(&group[..position]) {
+            for &other in world.placed.iter().chain(&group[..position]) {
                 let footprint = |node: usize| self.footprint(node);
                 if !footprint(node).interferes_with(&footprint(other)) {
                     continue;
@@ -81,17 +80,11 @@ impl Search<'_> {
                 let missing = gap.minus(&Polynomial::constant(self.epsilon));
                 self.system.push();
                 self.assert(&missing, Relation::Below)?;
-                if unplaced.contains(&other) {
-                    // Neither is placed yet, so the other may as well come later.
-                    let opposite = Polynomial::difference(Symbol::Time(node), Symbol::Time(other));
-                    let missing = opposite.minus(&Polynomial::constant(self.epsilon));
-                    self.assert(&missing, Relation::Below)?;
-                }
                 if self.system.is_feasible() {
                     let (first, second) = (self.node(other), self.node(node));
                     self.report(format!("{first:?} and {second:?} too near"));
-                    if are_timed {
-                        self.mark_timed();
+                    if let Some(found) = self.found.as_mut().filter(|_| are_timed) {
+                        found.is_only_timed = true;
                     }
                 }
                 self.system.pop();
@@ -101,24 +94,6 @@ impl Search<'_> {
             }
         }
         Ok(())
-    }
-
-    /// Timed initials after the last action keep away from it as well.
-    pub(super) fn separate_later(&mut self, world: &World) -> Step {
-        for (position, &node) in world.remaining.iter().enumerate() {
-            if self.found.is_some() {
-                return Ok(());
-            }
-            self.separate(world, &world.remaining[..position], &[node])?;
-            self.mark_timed();
-        }
-        Ok(())
-    }
-
-    fn mark_timed(&mut self) {
-        if let Some(found) = &mut self.found {
-            found.is_only_timed = true;
-        }
     }
 
     /// Whether the time of a timed initial depends on a parameter: no constraint fixes it.

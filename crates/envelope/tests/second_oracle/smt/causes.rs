@@ -19,7 +19,7 @@ enum Moment {
     Arrival(usize),
     /// Right after a time point.
     After(usize),
-    /// After the last action.
+    /// After everything.
     Last,
 }
 
@@ -175,18 +175,7 @@ impl Encoder<'_> {
             Moment::After(here) if node == here => "true".to_owned(),
             Moment::Arrival(here) => self.places.is_before(node, here),
             Moment::After(here) => not(&self.places.is_before(here, node)),
-            Moment::Last => match self.node(node) {
-                Node::Timed(_) => {
-                    let actions = self
-                        .nodes()
-                        .filter(|&other| !matches!(self.node(other), Node::Timed(_)));
-                    let later: Vec<_> = actions
-                        .map(|action| not(&self.places.is_before(action, node)))
-                        .collect();
-                    or(&later)
-                }
-                _ => "true".to_owned(),
-            },
+            Moment::Last => "true".to_owned(),
         }
     }
 }

@@ -4,7 +4,7 @@ use elbowroom_model::Footprint;
 use elbowroom_model::ground::{Condition, Expression};
 use elbowroom_plan::{Bound, InstanceId, Node, NodeId};
 
-use super::text::{and, not, number, or};
+use super::text::{and, not, number};
 use super::{At, Encoder, NotEncoded};
 
 impl Encoder<'_> {
@@ -116,33 +116,10 @@ impl Encoder<'_> {
         Ok(())
     }
 
-    /// The goal is read after the last position whose time is that of the last action.
+    /// The goal is read after the last position.
     pub(super) fn goal(&mut self) -> Result<(), NotEncoded> {
-        let actions: Vec<_> = self
-            .nodes()
-            .filter(|&node| !matches!(self.node(node), Node::Timed(_)))
-            .collect();
-        for k in 1..=self.count() {
-            if actions
-                .iter()
-                .any(|node| *self.places.of(*node).start() > k)
-            {
-                continue;
-            }
-            let mut parts = Vec::new();
-            let last: Vec<_> = actions
-                .iter()
-                .map(|node| format!("(= t{node} tau{k})"))
-                .collect();
-            parts.push(or(&last));
-            parts.extend(actions.iter().map(|node| format!("(<= t{node} tau{k})")));
-            if k < self.count() {
-                parts.push(format!("(< tau{k} tau{})", k + 1));
-            }
-            let holds = self.condition(&self.plan.goal, &At::After(k), None)?;
-            parts.push(not(&holds));
-            self.violations.push(and(&parts));
-        }
+        let holds = self.condition(&self.plan.goal, &At::After(self.count()), None)?;
+        self.violations.push(not(&holds));
         Ok(())
     }
 }

@@ -1,7 +1,9 @@
 //! Happenings at the same time, or nearly so.
 
+use proptest::prelude::*;
+
 use super::world::{World, number};
-use crate::validate::Settings;
+use crate::validate::{Settings, Verdict};
 
 fn handover() -> World {
     World::new("")
@@ -101,14 +103,8 @@ fn thrown_out() -> World {
 }
 
 #[test]
-fn a_timed_initial_after_the_plan_counts_only_if_the_settings_say_so() {
-    assert_eq!(thrown_out().judge("1: deliver"), "valid");
-    let world = || {
-        thrown_out().settings(Settings {
-            counts_later_timed: true,
-            ..Settings::default()
-        })
-    };
+fn the_goal_holds_after_timed_initials_that_come_after_the_plan() {
+    let world = thrown_out;
     assert_eq!(
         world().judge("1: deliver"),
         "at 9.000: the goal (p) does not hold: (p) is false since a timed initial at 9.000"
@@ -116,12 +112,69 @@ fn a_timed_initial_after_the_plan_counts_only_if_the_settings_say_so() {
     assert_eq!(world().judge("10: deliver"), "valid");
     assert_eq!(world().timed("11", "(p)").judge("1: deliver"), "valid");
     // Without any action, too.
-    let settings = world().settings;
-    let given = World::new("")
-        .timed("5", "(q)")
-        .goal("(q)")
-        .settings(settings);
-    assert_eq!(given.judge(""), "valid");
+    let given = || World::new("").timed("5", "(q)").goal("(q)");
+    assert_eq!(given().judge(""), "valid");
+    // They take part like any happening.
+    assert_eq!(
+        world().judge("8.9999: deliver"),
+        "at 9.000: (deliver) interferes: (deliver) at 8.9999 and a timed initial at 9.000 both \
+         concern (p) and must be at least 0.001 apart"
+    );
+    // A setting reads the goal after the last action.
+    let early = || Settings {
+        counts_later_timed: false,
+        ..Settings::default()
+    };
+    assert_eq!(world().settings(early()).judge("1: deliver"), "valid");
+    assert_ne!(given().settings(early()).judge(""), "valid");
+}
+
+/// The times are in tenths: timed initials that make one of three facts true or false, and steps of
+/// which each makes one of them true or false and needs another one.
+type Draft = (Vec<(u8, u8, bool)>, Vec<(u8, u8)>, u8);
+
+fn drafts() -> impl Strategy<Value = Draft> {
+    let timed = prop::collection::vec((0..9_u8, 0..3_u8, any::<bool>()), 0..4);
+    let steps = prop::collection::vec((0..9_u8, 0..6_u8), 0..4);
+    (timed, steps, 0..8_u8)
+}
+
+fn drafted((timed, _, goal): &Draft) -> World {
+    const FACTS: [&str; 3] = ["(p)", "(q)", "(r)"];
+    let literal = |fact: u8, truth: bool| match truth {
+        true => FACTS[usize::from(fact)].to_owned(),
+        false => format!("(not {})", FACTS[usize::from(fact)]),
+    };
+    let mut world = World::new("(p)").instant("nothing", "", "");
+    let mut seen = std::collections::BTreeSet::new();
+    for &(time, fact, truth) in timed.iter().filter(|(time, fact, _)| seen.insert((*time, *fact))) {
+        world = world.timed(&format!("{time}.5"), &literal(fact, truth));
+    }
+    for number in 0..6_u8 {
+        let effect = literal(number % 3, number < 3);
+        world = world.instant(&format!("step{number}"), &literal((number + 1) % 3, number % 2 == 0), &effect);
+    }
+    let goal = (0..3).map(|fact| literal(fact, goal >> fact & 1 == 1));
+    world.goal(&goal.collect::<Vec<_>>().join(" "))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn the_goal_is_read_as_if_an_action_without_effects_came_after_all(draft in drafts()) {
+        let plan = draft.1.iter().map(|(time, step)| format!("{time}: step{step}\n"));
+        let plan: String = plan.collect();
+        let verdict = drafted(&draft).verdict(&plan);
+        let after_all = drafted(&draft).settings(Settings {
+            counts_later_timed: false,
+            ..Settings::default()
+        });
+        let longer = after_all.verdict(&format!("{plan}99: nothing"));
+        prop_assert_eq!(verdict.is_valid(), longer.is_valid());
+        let mistake = |verdict: &Verdict| verdict.violation().map(|found| found.mistake.clone());
+        prop_assert_eq!(mistake(&verdict), mistake(&longer));
+    }
 }
 
 #[test]

@@ -194,19 +194,11 @@ impl Relaxed<'_> {
         is_new
     }
 
-    /// Counts the timed initials that must happen before the plan can end, because what was chosen
-    /// ends no earlier, and what they will take from the goal. So it does not seem reached before
-    /// they have happened.
+    /// Counts what the timed initials to come will take from the goal, and that they have to be
+    /// waited for. So the goal does not seem reached before they have happened.
     pub(super) fn await_timed(&self, state: &State, estimate: &mut Estimate) {
         let compiled = self.compiled;
-        let end = state.earliest_end();
-        let timed = compiled.goal_timed.iter();
-        let is_due =
-            |timed: u32| timed >= state.timed && compiled.timed[timed as usize].time <= end;
-        let Some(&last) = timed.rev().find(|&&timed| is_due(timed)) else {
-            return;
-        };
-        let due = &compiled.timed[state.timed as usize..=last as usize];
+        let due = &compiled.timed[state.timed as usize..compiled.timed_until_goal as usize];
         let is_lost = |literal: &&Literal| {
             let fact = literal.fact();
             let writes = due.iter().rev().find_map(|timed| {
@@ -216,6 +208,9 @@ impl Relaxed<'_> {
             literal.holds(&state.facts) && writes.is_some_and(|truth| truth != literal.truth())
         };
         let undone = compiled.goal.literals.iter().filter(is_lost).count();
+        if undone == 0 && estimate.steps > 0 {
+            return;
+        }
         estimate.steps += u32::try_from(due.len() + undone).unwrap_or(u32::MAX >> 8);
         if !estimate.preferred.contains(&Step::Timed) {
             estimate.preferred.push(Step::Timed);

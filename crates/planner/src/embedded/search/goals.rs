@@ -1,5 +1,7 @@
 //! Whether a plan could end in a state, and what led there.
 
+use std::borrow::Cow;
+
 use super::super::apply::{Step, Stepper};
 use super::super::state::State;
 use super::{ROOT, Search};
@@ -11,23 +13,20 @@ impl Search<'_> {
         if !state.open.is_empty() {
             return false;
         }
-        let holds = if state.symbolic.is_some() {
-            let mut stepper = Stepper::new(compiled);
-            stepper.reach_goal(&mut state.clone()).is_some()
+        // The goal is read after all that happens by itself.
+        let mut stepper = Stepper::new(compiled);
+        let mut state = Cow::Borrowed(state);
+        while state.timed < compiled.timed_until_goal {
+            if stepper.advance(state.to_mut(), Step::Timed).is_none() {
+                return false;
+            }
+        }
+        if state.symbolic.is_some() {
+            stepper.reach_goal(state.to_mut()).is_some()
         } else {
             let mut passes = |test| state.passes(compiled, test, None);
             compiled.goal.holds(&state.facts, &mut passes)
-        };
-        if !holds {
-            return false;
         }
-        // What happens by itself before the last happening counts.
-        let end = state.earliest_end();
-        compiled
-            .goal_timed
-            .iter()
-            .filter(|&&timed| timed >= state.timed)
-            .all(|&timed| compiled.timed[timed as usize].time > end)
     }
 
     /// The choices that lead to a state.
@@ -48,7 +47,13 @@ impl Search<'_> {
         let (Some(limit), Some(metric)) = (&self.limit, &self.compiled.metric) else {
             return true;
         };
-        let spent = self.nodes[number as usize].state.spent(metric);
+        let state = &self.nodes[number as usize].state;
+        let mut to_come = self.compiled.timed[state.timed as usize..].iter();
+        if to_come.any(|timed| !timed.assigns.is_empty()) {
+            // The metric counts after all timed initials, too.
+            return true;
+        }
+        let spent = state.spent(metric);
         !metric.time.is_zero() || spent.is_none_or(|spent| spent <= limit.value)
     }
 }

@@ -28,10 +28,7 @@ impl Search<'_> {
                 if let (Some(mine), Some(theirs)) = (&node.projection, projection) {
                     is_no_later = is_no_later && mine.is_no_later_than(theirs, self.is_timeless);
                 }
-                // A goal that waits for a timed initial needs a happening so late.
-                let waits = !self.compiled.goal_timed.is_empty()
-                    && other.earliest_end() < state.earliest_end();
-                if is_no_later && !waits {
+                if is_no_later {
                     return true;
                 }
                 variants += 1;

@@ -54,7 +54,7 @@ impl<'a> Builder<'a> {
         }
         self.note_compression_safe(&annotations, &timed, !strata.is_empty());
         self.note_compressibility();
-        let goal_timed = self.timed_for_goal(grounding, &coming);
+        let timed_until_goal = self.timed_until_goal(grounding, &coming);
         let (metric, cost) = self.metric(situation, &timed);
         if !goes_on() {
             return None;
@@ -106,7 +106,7 @@ impl<'a> Builder<'a> {
             timed,
             goal,
             metric,
-            goal_timed,
+            timed_until_goal,
             strata,
             derived,
             beginning,
@@ -259,14 +259,14 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The timed initials that write something the goal reads.
-    fn timed_for_goal(&self, grounding: &Grounding, coming: &Coming<'_>) -> Vec<u32> {
+    /// See [`Compiled::timed_until_goal`].
+    fn timed_until_goal(&self, grounding: &Grounding, coming: &Coming<'_>) -> u32 {
         let mut goal = Separations::default();
         goal.need_from_now_on(self.task, &grounding.goal, &self.links);
         let is_read = |access: &Access| goal.after.iter().any(|(read, _)| read == access);
-        let timed = coming.separations.iter().enumerate();
-        let timed = timed.filter(|(_, separations)| separations.makes.iter().any(is_read));
-        timed.map(|(number, _)| narrow(number)).collect()
+        let mut timed = coming.separations.iter();
+        let last = timed.rposition(|separations| separations.makes.iter().any(is_read));
+        last.map_or(0, |last| narrow(last + 1))
     }
 
     /// The metric, and what has been spent of it in the situation.

@@ -40,6 +40,13 @@ impl Graph {
         Some(Literal(narrow(place)))
     }
 
+    /// When the literal holds, if it changes at fixed times only.
+    pub(crate) fn spans_of(&self, literal: Literal) -> Option<&[(Ticks, Ticks)]> {
+        let number = self.timetable_of[literal.index()];
+        let spans = self.timetable.get(number as usize)?;
+        Some(spans)
+    }
+
     /// Finds the literals that only timed initials change.
     pub(super) fn add_timetables(&mut self, compiled: &Compiled) {
         self.timetable_of = vec![NONE; 2 * compiled.facts.len()];

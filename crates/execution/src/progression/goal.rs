@@ -1,0 +1,56 @@
+//! What becomes of the goal if nothing more is done: [`Outlook`].
+
+use elbowroom_model::Footprint;
+use elbowroom_model::ground::Condition;
+use elbowroom_num::Rational;
+
+use super::Progression;
+
+/// What becomes of the goal if nothing more is done. It counts after all timed initials, so it is
+/// not decided before the last of those that change what it reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Outlook {
+    /// It holds, and no timed initial changes what it reads any more.
+    Reached,
+    /// It will hold from then on: timed initials to come change what it reads.
+    Awaited(Rational),
+    /// It will not hold, or that cannot be said.
+    Unmet,
+}
+
+impl Progression {
+    /// What becomes of the goal if nothing more is done, and what is under way has no effect.
+    pub(crate) fn outlook(&self) -> Outlook {
+        let (last, state) = self.in_the_end();
+        if state.is_goal() != Ok(true) {
+            return Outlook::Unmet;
+        }
+        last.map_or(Outlook::Reached, Outlook::Awaited)
+    }
+
+    /// The parts of the goal that will not hold in the end, or say nothing.
+    pub(crate) fn unmet_in_the_end(&self) -> Vec<&Condition> {
+        let goal = self.task.goal();
+        let (_, state) = self.in_the_end();
+        let mut parts = goal.conjuncts();
+        parts.retain(|part| state.holds(part, None) != Ok(true));
+        parts
+    }
+
+    /// The state after the last timed initial to come that changes what the goal reads, and when
+    /// that is.
+    fn in_the_end(&self) -> (Option<Rational>, Self) {
+        let goal = Footprint::of_condition(&self.task, self.task.goal());
+        let to_come = self.task.timed().get(self.timed..).unwrap_or(&[]);
+        let is_read = |changes: &Footprint| changes.writes_what_is_read_by(&goal);
+        let mut to_come = to_come.iter().rev();
+        let last = to_come.find(|timed| is_read(&Footprint::of_timed(timed)));
+        let last = last.map(|timed| timed.time.clone());
+        let mut state = self.clone();
+        if let Some(last) = &last {
+            // What cannot be computed shows as a goal that says nothing.
+            let _ = state.advance(last);
+        }
+        (last, state)
+    }
+}
