@@ -65,7 +65,11 @@ fn the_goal_counts_after_all_timed_initials() {
         "no plan exists: `(open)` no longer holds from 17 on, whatever is done"
     );
     let too_early = "(:init (open) (at 17 (not (open))) (at 20 (not (in)))) (:goal (in))";
-    assert!(plan(too_early).starts_with("none found"), "{}", plan(too_early));
+    assert!(
+        plan(too_early).starts_with("none found"),
+        "{}",
+        plan(too_early)
+    );
 }
 
 #[test]

@@ -182,7 +182,10 @@ impl<'s, 'w> Run<'s, 'w> {
     /// Keeps the sequence so far, if it is an order and better than the best.
     fn consider(&mut self) -> Result<(), TooCoupled> {
         if !self.network.running().is_empty()
-            || !self.search.may_be_over(self.next_timed, self.network.sequence()) {
+            || !self
+                .search
+                .may_be_over(self.next_timed, self.network.sequence())
+        {
             return Ok(());
         }
         if self.must_work {

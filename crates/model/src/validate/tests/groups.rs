@@ -147,12 +147,19 @@ fn drafted((timed, _, goal): &Draft) -> World {
     };
     let mut world = World::new("(p)").instant("nothing", "", "");
     let mut seen = std::collections::BTreeSet::new();
-    for &(time, fact, truth) in timed.iter().filter(|(time, fact, _)| seen.insert((*time, *fact))) {
+    for &(time, fact, truth) in timed
+        .iter()
+        .filter(|(time, fact, _)| seen.insert((*time, *fact)))
+    {
         world = world.timed(&format!("{time}.5"), &literal(fact, truth));
     }
     for number in 0..6_u8 {
         let effect = literal(number % 3, number < 3);
-        world = world.instant(&format!("step{number}"), &literal((number + 1) % 3, number % 2 == 0), &effect);
+        world = world.instant(
+            &format!("step{number}"),
+            &literal((number + 1) % 3, number % 2 == 0),
+            &effect,
+        );
     }
     let goal = (0..3).map(|fact| literal(fact, goal >> fact & 1 == 1));
     world.goal(&goal.collect::<Vec<_>>().join(" "))
