@@ -76,8 +76,7 @@ impl From<Colour> for anstream::ColorChoice {
 }
 
 /// The command line; a program that is called as VAL is takes VAL's.
-pub(crate) fn spoken() -> Vec<OsString> {
-    let mut line: Vec<OsString> = std::env::args_os().collect();
+pub(crate) fn spoken(mut line: Vec<OsString>) -> Vec<OsString> {
     let program = line.first().map(Path::new).and_then(Path::file_stem);
     if program.is_some_and(|name| name.eq_ignore_ascii_case("validate")) {
         line.insert(1, "val".into());

@@ -1,7 +1,6 @@
 //! How the command ends: `docs/exit-codes.md`.
 
 use std::fmt::{self, Write as _};
-use std::process::ExitCode;
 
 use elbowroom::text::{Diagnostics, Record};
 use serde::Serialize;
@@ -23,12 +22,6 @@ pub(crate) enum Exit {
     Bug = 70,
     /// Somebody asked the run to end before it was over.
     Interrupted = 130,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(exit as u8)
-    }
 }
 
 /// Why there is no answer: the input cannot be understood, or the outside world failed.

@@ -70,7 +70,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     ("page", &["elbowroom", "laboratory"]),
     ("cli", &["elbowroom", "laboratory", "page"]),
-    ("python", &["elbowroom", "laboratory"]),
+    ("python", &["elbowroom", "laboratory", "cli"]),
 ];
 
 #[test]

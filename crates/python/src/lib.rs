@@ -31,6 +31,8 @@
 )]
 
 mod campaign;
+mod command;
+mod odds;
 mod planner;
 mod recorder;
 mod run;
@@ -47,6 +49,10 @@ use pyo3::prelude::*;
 mod native {
     #[pymodule_export]
     use crate::campaign::{Experiment, experiment_files};
+    #[pymodule_export]
+    use crate::command::command;
+    #[pymodule_export]
+    use crate::odds::odds;
     #[pymodule_export]
     use crate::run::{executors, run};
     #[pymodule_export]

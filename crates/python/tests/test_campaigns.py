@@ -58,6 +58,33 @@ def test_parts_of_another_experiment_are_refused(tmp_path: Path) -> None:
         elbowroom.compare(TABLE, trials=4, shards=2, folder=tmp_path)
 
 
+@pytest.mark.parametrize("change", ["cut", "digit", "empty"])
+def test_a_damaged_part_is_named_and_made_again(
+    whole: elbowroom.Comparison, tmp_path: Path, change: str
+) -> None:
+    elbowroom.compare(TABLE, trials=4, shards=2, folder=tmp_path)
+    path = tmp_path / "part-1-of-2.json"
+    written = path.read_text()
+    at = written.index('"successes": ') + len('"successes": ')
+    digit = str((int(written[at]) + 1) % 10)
+    damaged = {"cut": written[: len(written) // 2], "empty": "", "digit": written[:at] + digit + written[at + 1 :]}
+    path.write_text(damaged[change])
+    with pytest.warns(elbowroom.DamagedWarning, match="part-1-of-2.json is damaged"):
+        again = elbowroom.compare(TABLE, trials=4, shards=2, folder=tmp_path)
+    assert again.results == whole.results
+    assert path.read_text() == written
+
+
+def test_a_part_that_the_command_has_made_is_taken(
+    whole: elbowroom.Comparison, tmp_path: Path
+) -> None:
+    # It comes without a sum of its bytes.
+    (tmp_path / "part-0-of-2.json").write_text(TABLE.make(4, (0, 2)))
+    kept = (tmp_path / "part-0-of-2.json").stat().st_mtime_ns
+    assert elbowroom.compare(TABLE, trials=4, shards=2, folder=tmp_path).results == whole.results
+    assert (tmp_path / "part-0-of-2.json").stat().st_mtime_ns == kept
+
+
 def test_without_a_scheduler_the_script_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

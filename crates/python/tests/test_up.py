@@ -17,7 +17,7 @@ from unified_planning.engines import PlanGenerationResultStatus as Status  # noq
 from unified_planning.engines import ValidationResultStatus  # noqa: E402
 from unified_planning.model import Problem  # noqa: E402
 from unified_planning.plans import PlanKind  # noqa: E402
-from unified_planning.shortcuts import OneshotPlanner, PlanValidator  # noqa: E402
+from unified_planning.shortcuts import OneshotPlanner, PlanValidator, Replanner  # noqa: E402
 from unified_planning.test.examples import get_example_problems  # noqa: E402
 
 up.shortcuts.get_environment().credits_stream = None
@@ -106,6 +106,83 @@ def test_a_network_has_the_plan_among_its_schedules() -> None:
     again = stn.convert_to(PlanKind.TIME_TRIGGERED_PLAN, case.problem)
     with PlanValidator(name="elbowroom-val") as validator:
         assert validator.validate(case.problem, again)
+
+
+def test_a_planner_returns_a_network_if_asked() -> None:
+    case = temporal()
+    with OneshotPlanner(name="elbowroom", params={"plan": "stn"}) as planner:
+        plan = planner.solve(case.problem).plan
+    assert plan.kind == PlanKind.STN_PLAN and plan.is_consistent
+    again = plan.convert_to(PlanKind.TIME_TRIGGERED_PLAN, case.problem)
+    with PlanValidator(name="elbowroom-val") as validator:
+        assert validator.validate(case.problem, again)
+    # What comes back can be asked about: the bounds are read, not one of the schedules.
+    envelope = elbowroom.envelope(case.problem, plan)
+    assert envelope.answer == "envelope" and envelope.rows()
+    assert elbowroom.up.execute(case.problem, plan).verdict == "goal-reached"
+    with pytest.raises(up.exceptions.UPUsageError, match="time-triggered and stn"):
+        OneshotPlanner(name="elbowroom", params={"plan": "tree"})
+
+
+def test_a_network_is_valid_if_all_its_schedules_are() -> None:
+    case = temporal()
+    network = elbowroom.up.to_stn(case.problem, case.valid_plans[0])
+    with PlanValidator(name="elbowroom-val", plan_kind=PlanKind.STN_PLAN) as validator:
+        assert validator.validate(case.problem, network)
+        loose = up.plans.STNPlan(
+            [
+                (first, lower, upper, second)
+                for first, found in network.get_constraints().items()
+                for lower, upper, second in found
+                if first.action_instance == second.action_instance
+            ]
+        )
+        result = validator.validate(case.problem, loose)
+    assert result.status == ValidationResultStatus.INVALID and result.log_messages
+
+
+def boxes() -> Any:
+    problem = up.shortcuts.Problem("boxes")
+    done = [problem.add_fluent(f"done{i}", default_initial_value=False) for i in range(2)]
+    for i in range(2):
+        action = up.shortcuts.DurativeAction(f"do{i}")
+        action.set_closed_duration_interval(2, 5)
+        action.add_effect(up.shortcuts.EndTiming(), done[i], True)
+        problem.add_action(action)
+    problem.add_goal(done[0])
+    return problem, done
+
+
+def test_a_replanner_plans_for_what_the_problem_has_become() -> None:
+    problem, done = boxes()
+
+    def names(found: Any) -> set[str]:
+        return {it.action.name for _, it, _ in found.plan.timed_actions}
+
+    with Replanner(problem, name="elbowroom") as replanner:
+        first = replanner.resolve()
+        assert names(first) == {"do0"}
+        # As long as the plan works it is kept.
+        replanner.update_initial_value(done[1], True)
+        assert replanner.resolve() is first
+        replanner.update_initial_value(done[1], False)
+        replanner.add_goal(done[1])
+        assert names(replanner.resolve()) == {"do0", "do1"}
+        replanner.remove_goal(done[0])
+        # It still works, though it does more than it must.
+        assert names(replanner.resolve()) == {"do0", "do1"}
+        replanner.remove_action("do0")
+        assert names(replanner.resolve()) == {"do1"}
+        replanner.remove_action("do1")
+        assert replanner.resolve().status == Status.UNSOLVABLE_PROVEN
+        replanner.add_action(problem.action("do1"))
+        assert names(replanner.resolve()) == {"do1"}
+        with pytest.raises(up.exceptions.UPUsageError, match="do7 is none of"):
+            replanner.remove_action("do7")
+        with pytest.raises(up.exceptions.UPUsageError, match="is none of"):
+            replanner.remove_goal(done[0])
+    # What was given has not changed.
+    assert len(problem.actions) == 2 and len(problem.goals) == 1
 
 
 def test_a_plan_is_executed() -> None:

@@ -33,6 +33,7 @@ from ._answers import (
 from ._errors import (
     BugError,
     CampaignError,
+    DamagedWarning,
     Diagnostic,
     ElbowroomError,
     InterruptedWarning,
@@ -44,6 +45,7 @@ from ._errors import (
     WorldError,
 )
 from ._execution import Cancel, Look, Over, Start, Stepped, Wait
+from ._odds import ActionShare, FactShare, Happening, Loss, Odds, Sampled
 from ._problem import Problem, read
 from ._tables import Progress
 from ._world import Action, AsyncWorld, Observation, World, ended, fact, started, value
@@ -86,23 +88,29 @@ def envelope(problem: Any, plan: Any, **options: Any) -> Envelope:
 
 __all__ = [
     "Action",
+    "ActionShare",
     "AsyncWorld",
     "BugError",
     "CampaignError",
     "Cancel",
     "Comparison",
     "Constraint",
+    "DamagedWarning",
     "Diagnostic",
     "ElbowroomError",
     "Envelope",
     "Execution",
     "ExecutorInfo",
     "Experiment",
+    "FactShare",
+    "Happening",
     "InterruptedWarning",
     "Look",
+    "Loss",
     "Margin",
     "NoPlan",
     "Observation",
+    "Odds",
     "Over",
     "Plan",
     "PlannerError",
@@ -112,6 +120,7 @@ __all__ = [
     "RequestError",
     "Room",
     "Run",
+    "Sampled",
     "Start",
     "Step",
     "Stepped",

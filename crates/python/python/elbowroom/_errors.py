@@ -105,3 +105,7 @@ class BugError(ElbowroomError, RuntimeError):
 
 class InterruptedWarning(UserWarning):
     """Ctrl-C has ended a search or a run early; what was found until then is the answer."""
+
+
+class DamagedWarning(UserWarning):
+    """A part of a campaign that was kept is no longer what was written; it is made again."""

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ._answers import Envelope, Plan, Run
+    from ._odds import Odds
     from .campaign import Comparison
 
 _BAR = "#4878a8"
@@ -81,6 +82,18 @@ def executed(run: Run, ax: Axes | None) -> Axes:
         ax.barh(lane, length, left=float(row.start), height=0.5, color=_COLOURS.get(row.outcome))
     ax.set_title(f"{run.verdict} at {float(run.time):g}")
     return _lanes(ax, [row.action for row in rows], "time")
+
+
+def falling(odds: Odds, ax: Axes | None) -> Axes:
+    """A lane for each happening: the probability that everything has gone well so far."""
+    happenings = odds.happenings
+    ax = axes(ax, len(happenings) + 1)
+    lanes = range(len(happenings) + 1)
+    shares = [*(it.probability_so_far for it in happenings), odds.probability]
+    ax.barh(lanes, [100 * share for share in shares], 0.6, color=_BAR)
+    ax.set_xlim(0, 100)
+    labels = [*(it.what for it in happenings), "the goal"]
+    return _lanes(ax, labels, "everything has gone well so far, %")
 
 
 def rates(comparison: Comparison, ax: Axes | None) -> Axes:

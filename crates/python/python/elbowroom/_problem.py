@@ -14,6 +14,7 @@ from ._answers import Envelope, NoPlan, Plan, Run, Step, Stn, Verdict
 from ._errors import Diagnostic, InterruptedWarning, RequestError, WorldError, diagnostics
 from ._execution import Stepped, drive, run_options
 from ._numbers import Number, document, text
+from ._odds import Odds
 from ._tables import ProgressCallback, listener
 from ._world import Adapter, AsyncWorld, World
 
@@ -226,7 +227,7 @@ class Problem:
         controllable: str | Sequence[str] = (),
         guarantee: str = "dynamic",
         method: str = "irr",
-        precision: Number = 1,
+        precision: Number | None = None,
         growth: str = "doubling",
         sharpen: bool = False,
         enforce: bool = False,
@@ -244,7 +245,8 @@ class Problem:
             controllable: actions whose durations the executor chooses.
             guarantee: ``"weak"``, ``"dynamic"`` or ``"strong"``.
             method: ``"irr"``, or ``"best"``: the box whose least deviation is greatest.
-            precision: how close each end comes to its limit, in the quantity's own unit.
+            precision: how close each end comes to its limit, in the quantity's own unit; without
+                it, a hundredth of the planned value.
             growth: ``"doubling"`` or ``"constant"`` steps.
             sharpen: whether each end is moved onto its limit when the search has ended.
             enforce: whether the dispatcher keeps to obligations that are bounds on differences.
@@ -275,7 +277,7 @@ class Problem:
             "vary": wanted,
             "guarantee": guarantee,
             "method": method,
-            "precision": text(precision),
+            "precision": None if precision is None else text(precision),
             "growth": growth,
             "sharpen": sharpen,
             "enforce": enforce,
@@ -289,6 +291,78 @@ class Problem:
         found = document(answer)
         _warn(is_interrupted, found["answer"] != "none")
         return Envelope(found, None if makespans is None else document(makespans))
+
+    def odds(
+        self,
+        plan: AnyPlan | None = None,
+        *,
+        likelihoods: Text,
+        world: Text | None = None,
+        best: bool = False,
+        semantics: str = "paper",
+        executors: Sequence[str] | None = None,
+        samples: int = 1000,
+        seed: int = 0,
+        most_sequences: int = 50_000,
+        lattice: bool = False,
+        time_limit: float | None = None,
+        progress: ProgressCallback | bool | None = None,
+    ) -> Odds:
+        """How likely a plan is to succeed, where that is lost, and what would help.
+
+        Args:
+            plan: a plan with fixed times; without one, one is made, and its likeliest order taken.
+            likelihoods: how likely facts and actions are: a path or a text
+                (``docs/formats/likelihoods.md``).
+            world: a world file, for executing the plan in samples of it.
+            best: whether the answer is about the likeliest order, not that of the plan's times.
+            semantics: what a failed effect leaves behind: ``"paper"``, the opposite of what it should,
+                or ``"world"``, the fact as it was.
+            executors: who executes the plan in the samples; ``live`` and ``adaptable`` by default.
+            samples: how many samples.
+            seed: of the first sample; the others follow.
+            most_sequences: so many beginnings of orders are looked at for the likeliest one.
+            lattice: whether to list and draw all orders.
+            time_limit: in seconds; what was found until then is the answer.
+            progress: is told how far it has come; ``True`` shows a bar.
+
+        Returns:
+            The :class:`Odds`; also if the plan fails, or has no order, which it says.
+
+        Raises:
+            ReadError: if a text cannot be read.
+            UnsupportedError: if the likelihoods say nothing of something in the plan, or too many
+                facts hang together.
+
+        >>> likely = '''format = "elbowroom-likelihoods"
+        ... version = 1
+        ... defaults = { becomes_true = 0, becomes_false = 0, start = 0.9, effect = 1 }
+        ... '''
+        >>> odds = problem.odds(PLAN, likelihoods=likely)
+        >>> round(odds.probability, 4), odds.rows()[0].reason
+        (0.5905, 'start')
+        """
+        options: dict[str, Any] = {
+            "semantics": semantics,
+            "best": best,
+            "most_sequences": most_sequences,
+            "lattice": lattice,
+            "executors": None if executors is None else list(executors),
+            "samples": samples,
+            "seed": seed,
+        }
+        answer, svg, is_interrupted = _native.odds(
+            self._native,
+            None if plan is None else self._plan_text(plan),
+            named_text(likelihoods, "likelihoods"),
+            None if world is None else named_text(world, "world"),
+            json.dumps(options),
+            _seconds(time_limit),
+            listener(progress),
+        )
+        found = document(answer)
+        _warn(is_interrupted, found["answer"] != "none")
+        return Odds(found, svg)
 
     def run(
         self,

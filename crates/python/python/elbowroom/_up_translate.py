@@ -6,7 +6,6 @@ same. What has no counterpart is refused by name.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any
@@ -17,7 +16,6 @@ from unified_planning.model import (
     DurativeAction,
     FNode,
     InstantaneousAction,
-    OperatorKind,
     Problem as UPProblem,
     TimeInterval,
     Timing,
@@ -26,16 +24,7 @@ from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, STN
 
 from ._errors import UnsupportedError
 from ._problem import Problem, read
-
-# Words that may not be names of anything.
-_TAKEN = frozenset(
-    "define domain problem requirements types constants predicates functions action process event "
-    "durative-action derived parameters precondition condition effect duration vars init goal "
-    "metric objects and or not imply exists forall when at over start end all increase decrease "
-    "assign scale-up scale-down minimize maximize total-time object number either constraints "
-    "always sometime within at-most-once preference is-violated undefined".split()
-)
-_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a"}
+from ._up_expressions import Expressions, first_of, variable
 
 COST = "action-costs"
 """The fluent that is added where actions have costs."""
@@ -57,44 +46,20 @@ class Translation:
         if problem.kind.has_bounded_types():
             problem = _without_bounds(problem)
         self.source = problem
-        self._names: dict[tuple[str, Any], str] = {}
-        self._used = {COST, *_TAKEN}
-        self._simplify = problem.environment.simplifier.simplify
+        self._say = Expressions(problem, [COST])
         self._refuse_what_has_no_counterpart()
         self.domain_text = "\n".join(self._domain())
         self.problem_text = "\n".join(self._problem())
         self.actions: dict[str, Any] = {
-            self.name("action", action): action for action in self.original.actions
+            self._say.name("action", action): action for action in self.original.actions
         }
         self.objects: dict[str, Any] = {
-            self.name("object", it): it for it in problem.all_objects
+            self._say.name("object", it): it for it in problem.all_objects
         }
         epsilon = problem.epsilon
         self.problem: Problem = read(
             self.domain_text, self.problem_text, epsilon="0.001" if not epsilon else epsilon
         )
-
-    # Names.
-
-    def name(self, kind: str, thing: Any) -> str:
-        """The name of something, the same each time."""
-        key = (kind, thing.name if hasattr(thing, "name") else str(thing))
-        if key not in self._names:
-            clean = re.sub(r"[^a-z0-9_-]", "_", key[1].lower())
-            if not clean[:1].isalpha():
-                clean = _INITIAL[kind] + "_" + clean
-            name, number = clean, 1
-            while name in self._used:
-                number += 1
-                name = f"{clean}_{number}"
-            self._used.add(name)
-            self._names[key] = name
-        return self._names[key]
-
-    def _type(self, of: Any) -> str:
-        if not of.is_user_type():
-            raise UnsupportedError(f"a parameter of type {of}; only user types are supported")
-        return self.name("type", of)
 
     # Refusals.
 
@@ -116,70 +81,6 @@ class Translation:
             if not of.is_bool_type() and (of.lower_bound, of.upper_bound) != (None, None):
                 raise UnsupportedError(f"the bounds of {fluent.name} are not supported")
 
-    # Expressions.
-
-    def condition(self, expression: FNode, variables: dict[str, str] | None = None) -> str:
-        """A condition, or a number, in PDDL."""
-        return self._walk(self._simplify(expression), variables or {})
-
-    def _walk(self, e: FNode, scope: dict[str, str]) -> str:
-        args = [self._walk(arg, scope) for arg in e.args]
-        if e.is_bool_constant():
-            return "(and)" if e.is_true() else "(or)"
-        if e.is_int_constant() or e.is_real_constant():
-            return str(Fraction(e.constant_value()))
-        if e.is_object_exp():
-            return self.name("object", e.object())
-        if e.is_parameter_exp():
-            return "?" + _variable(e.parameter().name)
-        if e.is_variable_exp():
-            return "?" + _variable(e.variable().name)
-        if e.is_fluent_exp():
-            return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
-        if e.is_iff():
-            return f"(and (imply {args[0]} {args[1]}) (imply {args[1]} {args[0]}))"
-        if e.is_exists() or e.is_forall():
-            bound = " ".join(f"?{_variable(v.name)} - {self._type(v.type)}" for v in e.variables())
-            return f"({'exists' if e.is_exists() else 'forall'} ({bound}) {args[0]})"
-        if e.is_equals() and any(arg.type.is_bool_type() for arg in e.args):
-            raise UnsupportedError(f"an equality of truth values: {e}")
-        operator = _OPERATORS.get(e.node_type)
-        if operator is None:
-            raise UnsupportedError(f"the expression {e} is not supported")
-        if operator in ("+", "*"):
-            folded = args[0]
-            for arg in args[1:]:
-                folded = f"({operator} {folded} {arg})"
-            return folded
-        return f"({operator} {' '.join(args)})"
-
-    def effect(self, effect: Any) -> str:
-        """An effect, with its condition and its forall."""
-        target = self._walk(effect.fluent, {})
-        made: list[str]
-        if effect.is_increase() or effect.is_decrease():
-            word = "increase" if effect.is_increase() else "decrease"
-            made = [f"({word} {target} {self.condition(effect.value)})"]
-        elif not effect.is_assignment():
-            raise UnsupportedError(f"the effect {effect} is not supported")
-        elif effect.fluent.type.is_bool_type():
-            value = self._simplify(effect.value)
-            if value.is_bool_constant():
-                made = [target if value.is_true() else f"(not {target})"]
-            else:
-                truth = self._walk(value, {})
-                made = [f"(when {truth} {target})", f"(when (not {truth}) (not {target}))"]
-        else:
-            made = [f"(assign {target} {self.condition(effect.value)})"]
-        condition = self._simplify(effect.condition)
-        if not condition.is_true():
-            guard = self._walk(condition, {})
-            made = [_when(guard, it) for it in made]
-        if effect.forall:
-            bound = " ".join(f"?{_variable(v.name)} - {self._type(v.type)}" for v in effect.forall)
-            made = [f"(forall ({bound}) {it})" for it in made]
-        return " ".join(made)
-
     # The domain.
 
     def _domain(self) -> Iterator[str]:
@@ -190,12 +91,12 @@ class Translation:
             ":duration-inequalities :timed-initial-literals :conditional-effects)"
         )
         types = [
-            f"{self.name('type', it)} - {self.name('type', it.father) if it.father else 'object'}"
+            f"{self._say.name('type', it)} - {self._say.name('type', it.father) if it.father else 'object'}"
             for it in problem.user_types
         ]
         yield f"  (:types {' '.join(types)})"
         constants = [
-            f"{self.name('object', it)} - {self._type(it.type)}" for it in problem.all_objects
+            f"{self._say.name('object', it)} - {self._say.type_name(it.type)}" for it in problem.all_objects
         ]
         yield f"  (:constants {' '.join(constants)})"
         is_fact = [fluent for fluent in problem.fluents if fluent.type.is_bool_type()]
@@ -210,20 +111,20 @@ class Translation:
         yield ")"
 
     def _signature(self, fluent: Any) -> str:
-        parameters = [f"?{_variable(it.name)} - {self._type(it.type)}" for it in fluent.signature]
-        return f"({' '.join([self.name('fluent', fluent), *parameters])})"
+        parameters = [f"?{variable(it.name)} - {self._say.type_name(it.type)}" for it in fluent.signature]
+        return f"({' '.join([self._say.name('fluent', fluent), *parameters])})"
 
     def _action(self, action: Any) -> Iterator[str]:
-        name = self.name("action", action)
+        name = self._say.name("action", action)
         parameters = " ".join(
-            f"?{_variable(it.name)} - {self._type(it.type)}" for it in action.parameters
+            f"?{variable(it.name)} - {self._say.type_name(it.type)}" for it in action.parameters
         )
         if getattr(action, "simulated_effect", None) or getattr(action, "simulated_effects", None):
             raise UnsupportedError(f"the simulated effect of {action.name} is not supported")
         cost = self._cost(action)
         if isinstance(action, InstantaneousAction):
-            conditions = " ".join(self.condition(it) for it in action.preconditions)
-            effects = " ".join([*(self.effect(it) for it in action.effects), *cost])
+            conditions = " ".join(self._say.condition(it) for it in action.preconditions)
+            effects = " ".join([*(self._say.effect(it) for it in action.effects), *cost])
             yield f"  (:action {name} :parameters ({parameters})"
             yield f"    :precondition (and {conditions})"
             yield f"    :effect (and {effects}))"
@@ -235,7 +136,7 @@ class Translation:
             yield f"  (:durative-action {name} :parameters ({parameters})"
             yield f"    :duration {self._duration(action.duration)}"
             conditions = " ".join(
-                f"({when} {self.condition(it)})"
+                f"({when} {self._say.condition(it)})"
                 for interval, found in action.conditions.items()
                 for when in _whens(interval, action)
                 for it in found
@@ -245,7 +146,7 @@ class Translation:
                 f"({_when_of(timing, action)} {part})"
                 for timing, found in action.effects.items()
                 for it in found
-                for part in _split(self.effect(it))
+                for part in _split(self._say.effect(it))
             )
             at_end = " ".join(f"(at end {it})" for it in cost)
             yield f"    :effect (and {effects} {at_end}))"
@@ -253,7 +154,7 @@ class Translation:
             raise UnsupportedError(f"the {type(action).__name__} {action.name} is not supported")
 
     def _duration(self, duration: Any) -> str:
-        lower, upper = self.condition(duration.lower), self.condition(duration.upper)
+        lower, upper = self._say.condition(duration.lower), self._say.condition(duration.upper)
         is_open = duration.is_left_open(), duration.is_right_open()
         if lower == upper and not any(is_open):
             return f"(= ?duration {lower})"
@@ -277,7 +178,7 @@ class Translation:
         cost = (self._costs() or {}).get(action)
         if cost is None or (cost.is_constant() and cost.constant_value() == 0):
             return []
-        return [f"(increase ({COST}) {self.condition(cost)})"]
+        return [f"(increase ({COST}) {self._say.condition(cost)})"]
 
     # The problem.
 
@@ -288,12 +189,12 @@ class Translation:
         for fluent, value in problem.initial_values.items():
             if value is None:
                 continue
-            target = self._walk(fluent, {})
+            target = self._say.walk(fluent)
             if fluent.type.is_bool_type():
                 if value.is_true():
                     yield f"    {target}"
             else:
-                yield f"    (= {target} {self.condition(value)})"
+                yield f"    (= {target} {self._say.condition(value)})"
         if self._costs() is not None:
             yield f"    (= ({COST}) 0)"
         for timing, effects in problem.timed_effects.items():
@@ -301,7 +202,7 @@ class Translation:
             for effect in effects:
                 yield f"    {self._timed(time, effect)}"
         yield "  )"
-        goals = [self.condition(goal) for goal in problem.goals]
+        goals = [self._say.condition(goal) for goal in problem.goals]
         yield f"  (:goal (and {' '.join(goals)}))"
         metric = self._metric()
         if metric is not None:
@@ -313,11 +214,11 @@ class Translation:
             raise UnsupportedError(
                 f"the timed effect {effect} is not supported; only plain assignments are"
             )
-        target, value = self._walk(effect.fluent, {}), self._simplify(effect.value)
+        target, value = self._say.walk(effect.fluent), self._say.simplify(effect.value)
         if not value.is_constant():
             raise UnsupportedError(f"the timed effect {effect} does not assign a constant")
         if not value.is_bool_constant():
-            return f"(at {time} (= {target} {self._walk(value, {})}))"
+            return f"(at {time} (= {target} {self._say.walk(value)}))"
         return f"(at {time} {target if value.is_true() else f'(not {target})'})"
 
     def _metric(self) -> str | None:
@@ -330,9 +231,9 @@ class Translation:
         if metric.is_minimize_makespan():
             return "minimize (total-time)"
         if metric.is_minimize_expression_on_final_state():
-            return f"minimize {self.condition(metric.expression)}"
+            return f"minimize {self._say.condition(metric.expression)}"
         if metric.is_maximize_expression_on_final_state():
-            return f"maximize {self.condition(metric.expression)}"
+            return f"maximize {self._say.condition(metric.expression)}"
         # The others say which plan is best, not which is one.
         return None
 
@@ -347,10 +248,10 @@ class Translation:
         if isinstance(plan, SequentialPlan):
             # One after the other, further apart than any ε.
             gap = max(Fraction(1), 2 * Fraction(self.original.epsilon or 0))
-            return [(gap * (i + 1), self._instance(it), None) for i, it in enumerate(plan.actions)]
+            return [(gap * (i + 1), self.name_of(it), None) for i, it in enumerate(plan.actions)]
         if isinstance(plan, TimeTriggeredPlan):
             return [
-                (Fraction(start), self._instance(it), None if d is None else Fraction(d))
+                (Fraction(start), self.name_of(it), None if d is None else Fraction(d))
                 for start, it, d in plan.timed_actions
             ]
         if isinstance(plan, STNPlan):
@@ -360,9 +261,10 @@ class Translation:
             f"a {type(plan).__name__} is not supported; give a sequential or time-triggered plan"
         )
 
-    def _instance(self, instance: ActionInstance) -> str:
-        words = [self.name("action", instance.action)]
-        words += [self._walk(it, {}) for it in instance.actual_parameters]
+    def name_of(self, instance: ActionInstance) -> str:
+        """An action of the original problem as one of ours."""
+        words = [self._say.name("action", instance.action)]
+        words += [self._say.walk(it) for it in instance.actual_parameters]
         return f"({' '.join(words)})"
 
     def instance(self, action: str) -> ActionInstance:
@@ -382,30 +284,10 @@ class Translation:
         return SequentialPlan([it for _, it, _ in ordered], environment)
 
 
-def _when(guard: str, change: str) -> str:
-    """A change under one more condition."""
-    inner = re.fullmatch(r"\(when (.*)\)", change)
-    if inner is None:
-        return f"(when {guard} {change})"
-    # `(when A x)` under B: A is the first expression.
-    first, rest = _first(inner.group(1))
-    return f"(when (and {guard} {first}) {rest})"
-
-
-def _first(text: str) -> tuple[str, str]:
-    """The first expression of a text, and the rest."""
-    depth = 0
-    for index, letter in enumerate(text):
-        depth += {"(": 1, ")": -1}.get(letter, 0)
-        if depth == 0 and letter in ") ":
-            return text[: index + 1].strip(), text[index + 1 :].strip()
-    return text, ""
-
-
 def _split(text: str) -> Iterator[str]:
     """The expressions of a text, one by one."""
     while text:
-        first, text = _first(text)
+        first, text = first_of(text)
         yield first
 
 
@@ -418,25 +300,6 @@ def _without_bounds(problem: UPProblem) -> UPProblem:
         raise UnsupportedError(
             f"bounds of numbers are not supported where unified-planning cannot take them away: {error}"
         ) from error
-
-
-_OPERATORS = {
-    OperatorKind.AND: "and",
-    OperatorKind.OR: "or",
-    OperatorKind.NOT: "not",
-    OperatorKind.IMPLIES: "imply",
-    OperatorKind.PLUS: "+",
-    OperatorKind.MINUS: "-",
-    OperatorKind.TIMES: "*",
-    OperatorKind.DIV: "/",
-    OperatorKind.LE: "<=",
-    OperatorKind.LT: "<",
-    OperatorKind.EQUALS: "=",
-}
-
-
-def _variable(name: str) -> str:
-    return re.sub(r"[^a-zA-Z0-9_-]", "_", name) if name[:1].isalpha() else f"v_{name}"
 
 
 def _point(timing: Timing, action: Any) -> str:

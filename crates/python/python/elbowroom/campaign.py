@@ -6,17 +6,19 @@ trials are numbered, each has its own seed, and what is kept are counts.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shlex
 import subprocess
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _native, _plots
-from ._errors import CampaignError, InterruptedWarning
+from ._errors import CampaignError, DamagedWarning, InterruptedWarning
 from ._problem import Text, named_text
 from ._tables import Progress, ProgressCallback, Table, html_table, listener
 
@@ -196,7 +198,8 @@ def compare(
         shards: into how many parts to split; 1 locally, otherwise 8.
         jobs: how many threads; as many as there are processors by default (with Ray and Slurm, 1).
         folder: where parts are kept, and the results written. Parts that are there are not made
-            again. Slurm needs one that all nodes share.
+            again, unless their bytes are no longer those that were written, which a
+            :class:`DamagedWarning` says. Slurm needs a folder that all nodes share.
         address: of the Ray cluster; by default one that is running, or one on this machine.
         retries: how often a part is made again when its worker dies.
         sbatch: further options of ``sbatch``, such as ``["--partition=short"]``.
@@ -247,14 +250,19 @@ class _Parts:
         return self.folder / f"part-{shard}-of-{self.shards}.json"
 
     def collect(self) -> None:
-        """Takes the parts that are there."""
+        """Takes the parts that are there; those that are damaged are named, and are to be made again."""
         for shard in range(self.shards):
             path = self.path(shard)
-            if path.exists():
+            if shard in self.made or not path.exists():
+                continue
+            damage = _damage(path)
+            if damage is None:
                 self.made[shard] = self._checked(path)
+            else:
+                warnings.warn(f"{path} is damaged ({damage}); it is made again", DamagedWarning, 4)
 
     def _checked(self, path: Path) -> str:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_bytes().decode("utf-8")
         wanted = self.experiment.trials if self.trials is None else self.trials
         try:
             self.experiment.merge([text])
@@ -269,7 +277,11 @@ class _Parts:
     def keep(self, shard: int, results: str) -> None:
         self.made[shard] = results
         if self.folder is not None:
-            _keep(self.path(shard), results)
+            path = self.path(shard)
+            _keep(path, results)
+            # As `sha256sum` writes and checks it. It comes last: a part that was left with an older
+            # sum is made again.
+            _keep(_sum_of(path), f"{hashlib.sha256(results.encode()).hexdigest()}  {path.name}\n")
 
     def missing(self) -> list[int]:
         return [shard for shard in range(self.shards) if shard not in self.made]
@@ -290,6 +302,27 @@ class _Parts:
         return Comparison(self.experiment, results)
 
 
+def _sum_of(path: Path) -> Path:
+    return path.with_name(f"{path.name}.sha256")
+
+
+def _damage(path: Path) -> str | None:
+    """What is wrong with the bytes of a part; nothing is known of one that came without a sum."""
+    found = path.read_bytes()
+    beside = _sum_of(path)
+    if beside.exists():
+        if beside.read_text(encoding="utf-8", errors="replace").split()[:1] != [
+            hashlib.sha256(found).hexdigest()
+        ]:
+            return f"its bytes are not those of {beside.name}"
+        return None
+    try:
+        json.loads(found)
+    except ValueError:
+        return "it is no JSON document"
+    return None
+
+
 def _keep(path: Path, text: str) -> None:
     """Writes a file whole or not at all."""
     unfinished = path.with_name(f"{path.name}.{os.getpid()}.unfinished")
@@ -303,8 +336,6 @@ def _local(parts: _Parts, jobs: int, progress: ProgressCallback | bool | None) -
             parts.trials, (shard, parts.shards), jobs, progress
         )
         if is_interrupted:
-            import warnings
-
             warnings.warn("ended by Ctrl-C; these are the trials until then", InterruptedWarning, 3)
             whole = [*parts.made.values(), made]
             merged = made if len(whole) == 1 else parts.experiment.merge(whole)

@@ -21,7 +21,7 @@ mod table;
 mod words;
 mod wrap;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 use clap::Parser;
 
@@ -29,9 +29,13 @@ use args::{Command, CommandLine};
 use exit::Exit;
 use output::Output;
 
-fn main() -> ExitCode {
+/// Runs the command with a command line, the program's name first, and returns the exit code.
+///
+/// This is for programs that are nothing but the command: a command line that is wrong, `--help`, a
+/// panic and a second Ctrl-C end the process, and what is asked for is printed.
+pub fn run(line: Vec<OsString>) -> u8 {
     bug::install_hook();
-    let CommandLine { color, command } = CommandLine::parse_from(args::spoken());
+    let CommandLine { color, command } = CommandLine::parse_from(args::spoken(line));
     anstream::ColorChoice::from(color).write_global();
     let as_json = command.is_json();
     let mut output = Output::default();
@@ -54,5 +58,5 @@ fn main() -> ExitCode {
         output.fail(&failure, as_json);
         Exit::BadInput
     });
-    exit.into()
+    exit as u8
 }

@@ -1,0 +1,22 @@
+"""The command ``elbowroom``, also as ``python -m elbowroom``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from . import _native
+
+
+def main() -> int:
+    """Runs the command with this program's arguments; the exit code."""
+    # Python only takes note of Ctrl-C, and looks at the note when native code has ended.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    program, *arguments = sys.argv
+    if program.endswith("__main__.py"):
+        program = "elbowroom"
+    return _native.command([program, *arguments])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""How likely a plan is to succeed: what :meth:`elbowroom.Problem.odds` gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from . import _plots
+from ._tables import Table, html_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Loss(NamedTuple):
+    """A share of all worlds that is lost at one place; they and the probability add up to 1."""
+
+    at: str
+    """The happening, in words; ``"the beginning"`` before the first."""
+    reason: str
+    """``"start"`` (the attempt fails), ``"condition"``, ``"throughout"`` or ``"goal"``."""
+    condition: str | None
+    """What does not hold; ``None`` for a start that fails."""
+    since: str | None
+    """The happening that last had an effect on it; ``None``: the initial state."""
+    action: str | None
+    """With ``"throughout"``: the action under way that needs the condition."""
+    mass: float
+    """The share."""
+
+
+class Happening(NamedTuple):
+    """A start or an end of an action, an instantaneous action, or a timed initial."""
+
+    kind: str
+    """``"start"``, ``"end"``, ``"instant"`` or ``"timed"``."""
+    action: str | None
+    """The action; ``None`` for a timed initial."""
+    what: str
+    """In words."""
+    earliest: Fraction | None
+    """The earliest time; ``None`` where there is no time for the order."""
+    latest: Fraction | None
+    """The latest time; ``None`` where there is no bound, or no time for the order."""
+    probability_so_far: float
+    """That everything up to here succeeds."""
+
+
+class ActionShare(NamedTuple):
+    """The part of an action in an order."""
+
+    action: str
+    """Its name."""
+    happening: int
+    """The position of its start in the order, from 0."""
+    if_certain: float
+    """The probability if it never failed."""
+    if_retried: float | None
+    """The probability if failed attempts to start it were repeated; ``None``: too long to say."""
+
+
+class FactShare(NamedTuple):
+    """The part of a fact that may change by itself."""
+
+    fact: str
+    """Its name."""
+    if_steady: float
+    """The probability if it never changed by itself."""
+
+
+class Sampled(NamedTuple):
+    """What came of executing the plan in samples of a world."""
+
+    executor: str
+    """By whom."""
+    replans: bool
+    """Whether new plans were made."""
+    samples: int
+    """How many there were."""
+    reached: int
+    """In how many the goal was reached."""
+    interval: tuple[float, float] | None
+    """Wilson's 95 % interval of the probability."""
+
+
+class Odds(Table):
+    """How likely a plan is to succeed; true in conditions if that is possible at all.
+
+    Its rows are the losses: where and why the rest of the probability goes.
+    """
+
+    def __init__(self, document: dict[str, Any], lattice_svg: str | None) -> None:
+        self.document: dict[str, Any] = document
+        """The answer as the command has it (``docs/formats/odds-json.md``)."""
+        self.lattice_svg: str | None = lattice_svg
+        """All orders as a picture, if they were asked for and are not too many."""
+
+    @property
+    def answer(self) -> str:
+        """``"odds"``, ``"no order"``, ``"no plan"``, ``"none"`` or ``"invalid"``."""
+        return str(self.document["answer"])
+
+    @property
+    def why_not(self) -> str | None:
+        """Why there are no odds."""
+        if "violation" in self.document:
+            return str(self.document["violation"]["message"])
+        reason: str | None = self.document.get("reason")
+        return reason
+
+    @property
+    def _order(self) -> dict[str, Any]:
+        order: dict[str, Any] = self.document.get("order", {})
+        return order
+
+    @property
+    def probability(self) -> float:
+        """P(A and G): all actions succeed, and the goal holds after them; 0 without an order."""
+        return float(self._order.get("probability", 0.0))
+
+    @property
+    def actions_probability(self) -> float:
+        """P(A): all actions succeed; 0 without an order."""
+        return float(self._order.get("actions_probability", 0.0))
+
+    @property
+    def is_best(self) -> bool:
+        """Whether this is about the likeliest order that was found, not that of the plan's times."""
+        return bool(self._order.get("is_best"))
+
+    @property
+    def is_proven(self) -> bool | None:
+        """Whether no order of the plan is likelier; ``None`` if that was not asked."""
+        proven: bool | None = self._order.get("is_proven")
+        return proven
+
+    @property
+    def happenings(self) -> list[Happening]:
+        """The order."""
+        return [
+            Happening(*(it.get(field) for field in Happening._fields))
+            for it in self._order.get("happenings", [])
+        ]
+
+    @property
+    def actions(self) -> list[ActionShare]:
+        """The part of each action, in the order in which they begin."""
+        return [ActionShare(**it) for it in self._order.get("actions", [])]
+
+    @property
+    def facts(self) -> list[FactShare]:
+        """The facts that may change by themselves to the order's harm, the worst first."""
+        return [FactShare(**it) for it in self._order.get("facts", [])]
+
+    @property
+    def gains(self) -> dict[str, float | None]:
+        """The probability with another order, another plan, or actions chosen as the state asks.
+
+        ``None`` where it cannot be calculated; ``.document["gains"]`` says why.
+        """
+        found: dict[str, dict[str, Any] | None] = self.document.get("gains", {})
+        return {name: (it or {}).get("probability") for name, it in found.items()}
+
+    @property
+    def executed(self) -> list[Sampled]:
+        """What came of executing the plan in samples of the world, if one was given."""
+        return [
+            Sampled(
+                it["executor"],
+                it["replans"],
+                it["samples"],
+                it["reached"],
+                tuple(it["interval"]) if it["interval"] else None,
+            )
+            for it in self.document.get("executed", [])
+        ]
+
+    def rows(self) -> list[Loss]:
+        """Where the probability is lost."""
+        return [
+            Loss(*(it.get(field) for field in Loss._fields)) for it in self._order.get("losses", [])
+        ]
+
+    def _fields(self) -> Sequence[str]:
+        return Loss._fields
+
+    def __bool__(self) -> bool:
+        return self.probability > 0
+
+    def __repr__(self) -> str:
+        if self.answer != "odds":
+            return f"<Odds: {self.answer}{': ' + self.why_not if self.why_not else ''}>"
+        return f"<Odds: {self.probability:.4f}, all actions succeed {self.actions_probability:.4f}>"
+
+    def _repr_html_(self) -> str:
+        if self.answer != "odds":
+            return html_table((self.answer,), [(self.why_not or "",)], "no odds")
+        rows = [
+            (f"{loss.mass:.4f}", loss.at, loss.condition or "its start fails", loss.since or "")
+            for loss in sorted(self.rows(), key=lambda loss: -loss.mass)
+        ]
+        caption = f"the plan succeeds with probability {self.probability:.4f}; where the rest goes"
+        return html_table(("share", "at", "what does not hold", "since"), rows, caption)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """How the probability falls, happening by happening.
+
+        Raises:
+            ImportError: if matplotlib is not installed.
+        """
+        return _plots.falling(self, ax)

@@ -1,0 +1,318 @@
+"""The engines for unified-planning: :mod:`elbowroom.up` registers them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from typing import IO, Any
+
+from unified_planning.engines import (
+    Credits,
+    Engine,
+    LogLevel,
+    LogMessage,
+    PlanGenerationResult,
+    PlanGenerationResultStatus,
+    ValidationResult,
+    ValidationResultStatus,
+)
+from unified_planning.engines.mixins import (
+    AnytimePlannerMixin,
+    OneshotPlannerMixin,
+    PlanValidatorMixin,
+    ReplannerMixin,
+)
+from unified_planning.engines.mixins.oneshot_planner import OptimalityGuarantee
+from unified_planning.engines.results import FailedValidationReason
+from unified_planning.exceptions import UPUsageError
+from unified_planning.model import ProblemKind
+from unified_planning.plans import PlanKind, STNPlan
+
+from ._answers import NoPlan
+from ._errors import UnsupportedError
+from ._up_stn import stn_plan, stn_text
+from ._up_translate import Translation
+
+CREDITS = Credits(
+    "Elbowroom",
+    "the authors of Elbowroom",
+    "https://github.com/elbowroom/elbowroom",
+    "https://github.com/elbowroom/elbowroom",
+    "MIT OR Apache-2.0",
+    "Temporal planning, exact validation, robustness envelopes",
+    "Finds and judges temporal and numeric plans exactly, computes how far durations, rates and "
+    "deadlines may deviate, and executes plans.",
+)
+
+
+def _common_kind() -> ProblemKind:
+    kind = ProblemKind(version=2)
+    kind.set_problem_class("ACTION_BASED")
+    for feature in ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"):
+        kind.set_problem_type(feature)
+    for feature in ("CONTINUOUS_TIME", "DISCRETE_TIME", "TIMED_EFFECTS", "DURATION_INEQUALITIES",
+                    "SELF_OVERLAPPING"):  # fmt: skip
+        kind.set_time(feature)
+    for feature in ("STATIC_FLUENTS_IN_DURATIONS", "FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS",
+                    "REAL_TYPE_DURATIONS"):  # fmt: skip
+        kind.set_expression_duration(feature)
+    for feature in ("NEGATIVE_CONDITIONS", "DISJUNCTIVE_CONDITIONS", "EQUALITIES",
+                    "EXISTENTIAL_CONDITIONS", "UNIVERSAL_CONDITIONS"):  # fmt: skip
+        kind.set_conditions_kind(feature)
+    for feature in ("CONDITIONAL_EFFECTS", "INCREASE_EFFECTS", "DECREASE_EFFECTS", "FORALL_EFFECTS",
+                    "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS", "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
+                    "STATIC_FLUENTS_IN_NUMERIC_ASSIGNMENTS",
+                    "FLUENTS_IN_NUMERIC_ASSIGNMENTS"):  # fmt: skip
+        kind.set_effects_kind(feature)
+    for feature in ("FLAT_TYPING", "HIERARCHICAL_TYPING"):
+        kind.set_typing(feature)
+    for feature in ("INT_FLUENTS", "REAL_FLUENTS"):
+        kind.set_fluents_type(feature)
+    kind.set_numbers("BOUNDED_TYPES")
+    kind.set_initial_state("UNDEFINED_INITIAL_NUMERIC")
+    for feature in ("ACTIONS_COST", "FINAL_VALUE", "MAKESPAN", "PLAN_LENGTH"):
+        kind.set_quality_metrics(feature)
+    for feature in ("STATIC_FLUENTS_IN_ACTIONS_COST", "FLUENTS_IN_ACTIONS_COST",
+                    "INT_NUMBERS_IN_ACTIONS_COST", "REAL_NUMBERS_IN_ACTIONS_COST"):  # fmt: skip
+        kind.set_actions_cost_kind(feature)
+    return kind
+
+
+class ElbowroomPlanner(
+    Engine, OneshotPlannerMixin, AnytimePlannerMixin, ReplannerMixin
+):  # type: ignore[misc, unused-ignore]
+    """Elbowroom's embedded planner.
+
+    Plans of temporal problems come back as time-triggered plans or, with ``params={"plan": "stn"}``, as
+    STN plans. As a replanner it keeps its last plan for as long as that works.
+    """
+
+    def __init__(
+        self,
+        problem: Any = None,
+        error_on_failed_checks: bool = True,
+        *,
+        plan: str = "time-triggered",
+        **options: Any,
+    ) -> None:
+        Engine.__init__(self)
+        OneshotPlannerMixin.__init__(self)
+        AnytimePlannerMixin.__init__(self)
+        if plan not in ("time-triggered", "stn"):
+            raise UPUsageError(f"there are no plans of kind {plan!r}; there are time-triggered and stn")
+        self._plan_kind = plan
+        self._last: Any = None
+        self.options = options
+        if problem is not None:
+            ReplannerMixin.__init__(self, problem, error_on_failed_checks)
+
+    @property
+    def name(self) -> str:
+        return "elbowroom"
+
+    @staticmethod
+    def supported_kind() -> ProblemKind:
+        return _common_kind()
+
+    @staticmethod
+    def supports(problem_kind: ProblemKind) -> bool:
+        return bool(problem_kind <= ElbowroomPlanner.supported_kind())
+
+    @staticmethod
+    def satisfies(optimality_guarantee: OptimalityGuarantee) -> bool:
+        return bool(optimality_guarantee == OptimalityGuarantee.SATISFICING)
+
+    @staticmethod
+    def ensures(anytime_guarantee: Any) -> bool:
+        return False
+
+    @staticmethod
+    def get_credits(**kwargs: Any) -> Credits:
+        return CREDITS
+
+    def _solve(
+        self,
+        problem: Any,
+        heuristic: Callable[[Any], float | None] | None = None,
+        timeout: float | None = None,
+        output_stream: IO[str] | None = None,
+    ) -> PlanGenerationResult:
+        if heuristic is not None:
+            warnings.warn("elbowroom has its own heuristic; the one given is not used", stacklevel=3)
+        return self._result(problem, timeout, first=True)
+
+    def _get_solutions(
+        self, problem: Any, timeout: float | None = None, output_stream: IO[str] | None = None
+    ) -> Iterator[PlanGenerationResult]:
+        """The first plan; then, if there is time, the best until the time limit."""
+        first = self._result(problem, timeout, first=True)
+        is_solved = first.status in (
+            PlanGenerationResultStatus.SOLVED_SATISFICING,
+            PlanGenerationResultStatus.SOLVED_OPTIMALLY,
+        )
+        if not is_solved or timeout is None:
+            yield first
+            return
+        yield PlanGenerationResult(
+            PlanGenerationResultStatus.INTERMEDIATE, first.plan, self.name, first.metrics
+        )
+        yield self._result(problem, timeout, first=False)
+
+    def _result(self, problem: Any, timeout: float | None, first: bool) -> PlanGenerationResult:
+        status = PlanGenerationResultStatus
+        try:
+            translated = Translation(problem)
+            found = translated.problem.plan(time_limit=timeout, first=first)
+        except UnsupportedError as error:
+            message = LogMessage(LogLevel.ERROR, str(error))
+            return PlanGenerationResult(
+                status.UNSUPPORTED_PROBLEM, None, self.name, log_messages=[message]
+            )
+        if isinstance(found, NoPlan):
+            stop = found.document["stop"]
+            outcome = {"time limit": status.TIMEOUT, "memory limit": status.MEMOUT}.get(
+                stop, status.UNSOLVABLE_INCOMPLETELY
+            )
+            if found.is_proved:
+                outcome = status.UNSOLVABLE_PROVEN
+            message = LogMessage(LogLevel.INFO, found.reason)
+            return PlanGenerationResult(outcome, None, self.name, log_messages=[message])
+        metrics = {"makespan": str(found.makespan)}
+        plan: Any = translated.plan_back(found.steps)
+        if self._plan_kind == "stn" and plan.kind == PlanKind.TIME_TRIGGERED_PLAN:
+            plan = stn_plan(translated, found)
+        return PlanGenerationResult(status.SOLVED_SATISFICING, plan, self.name, metrics)
+
+    # The protocol of replanners: the problem is a copy that changes.
+
+    def _resolve(
+        self, timeout: float | None = None, output_stream: IO[str] | None = None
+    ) -> PlanGenerationResult:
+        if self._last is not None and self._still_works(self._last.plan):
+            return self._last
+        found = self._result(self._problem, timeout, first=True)
+        self._last = found if found.plan is not None else None
+        return found
+
+    def _still_works(self, plan: Any) -> bool:
+        """Whether the problem, as it has become, is solved by a plan that was made for it earlier."""
+        known = {action.name: action for action in self._problem.actions}
+        used = getattr(plan, "timed_actions", None)
+        if used is not None:
+            used = [instance for _, instance, _ in used]
+        elif hasattr(plan, "actions"):
+            used = plan.actions
+        else:
+            # All schedules of an STN plan would have to be judged; a new one is found sooner.
+            return False
+        if any(known.get(it.action.name) != it.action for it in used):
+            return False
+        try:
+            translated = Translation(self._problem)
+            return bool(translated.problem.check(translated.steps(plan)))
+        except UnsupportedError:
+            return False
+
+    def _update_initial_value(self, fluent: Any, value: Any) -> None:
+        self._problem.set_initial_value(fluent, value)
+
+    def _add_goal(self, goal: Any) -> None:
+        self._problem.add_goal(goal)
+
+    def _remove_goal(self, goal: Any) -> None:
+        (goal,) = self._problem.environment.expression_manager.auto_promote(goal)
+        goals = self._problem.goals
+        self._complain_unless(goal in goals, f"the goal {goal} is none of {goals}")
+        self._problem.clear_goals()
+        for other in goals:
+            if other != goal:
+                self._problem.add_goal(other)
+
+    def _add_action(self, action: Any) -> None:
+        self._problem.add_action(action)
+
+    def _remove_action(self, name: str) -> None:
+        actions = self._problem.actions
+        names = [action.name for action in actions]
+        self._complain_unless(name in names, f"the action {name} is none of {names}")
+        self._problem.clear_actions()
+        for action in actions:
+            if action.name != name:
+                self._problem.add_action(action)
+
+    def _complain_unless(self, is_there: bool, message: str) -> None:
+        if is_there or self.skip_checks:
+            return
+        if self.error_on_failed_checks:
+            raise UPUsageError(message)
+        warnings.warn(message, stacklevel=4)
+
+
+class ElbowroomValidator(Engine, PlanValidatorMixin):  # type: ignore[misc, unused-ignore]
+    """Elbowroom's judge, with the rules of unified-planning.
+
+    Without an ε in the problem, what happens at one time reads the state before, and nothing needs
+    to be apart; with one, interfering happenings keep it. The goal holds after all timed effects.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        Engine.__init__(self)
+        PlanValidatorMixin.__init__(self)
+        self.options = options
+
+    @property
+    def name(self) -> str:
+        return "elbowroom-val"
+
+    @staticmethod
+    def supported_kind() -> ProblemKind:
+        kind = _common_kind()
+        # Metrics say which plan is best, not which is valid.
+        for feature in ("OVERSUBSCRIPTION", "TEMPORAL_OVERSUBSCRIPTION"):
+            kind.set_quality_metrics(feature)
+        for feature in ("INT_NUMBERS_IN_OVERSUBSCRIPTION", "REAL_NUMBERS_IN_OVERSUBSCRIPTION"):
+            kind.set_oversubscription_kind(feature)
+        return kind
+
+    @staticmethod
+    def supports(problem_kind: ProblemKind) -> bool:
+        return bool(problem_kind <= ElbowroomValidator.supported_kind())
+
+    @staticmethod
+    def supports_plan(plan_kind: PlanKind) -> bool:
+        return plan_kind in (
+            PlanKind.SEQUENTIAL_PLAN, PlanKind.TIME_TRIGGERED_PLAN, PlanKind.STN_PLAN
+        )  # fmt: skip
+
+    @staticmethod
+    def get_credits(**kwargs: Any) -> Credits:
+        return CREDITS
+
+    def _validate(self, problem: Any, plan: Any) -> ValidationResult:
+        translated = Translation(problem)
+        if isinstance(plan, STNPlan):
+            return self._validate_network(translated, plan)
+        rules = "pddl" if problem.epsilon else "unified-planning"
+        verdict = translated.problem.check(translated.steps(plan), rules=rules)
+        if verdict.violation is None:
+            return ValidationResult(ValidationResultStatus.VALID, self.name, [])
+        violation = verdict.violation
+        is_goal = violation.action is None
+        reason = FailedValidationReason
+        message = LogMessage(LogLevel.INFO, violation.message)
+        instance = None if is_goal else translated.instance(str(violation.action))
+        return ValidationResult(
+            ValidationResultStatus.INVALID,
+            self.name,
+            [message],
+            reason=reason.UNSATISFIED_GOALS if is_goal else reason.INAPPLICABLE_ACTION,
+            inapplicable_action=instance,
+        )
+
+    def _validate_network(self, translated: Translation, plan: STNPlan) -> ValidationResult:
+        """Whether the network has schedules, and each of them is a valid plan, with ε."""
+        found = translated.problem.envelope(stn_text(translated, plan), most_checks=1)
+        if found:
+            return ValidationResult(ValidationResultStatus.VALID, self.name, [])
+        message = LogMessage(LogLevel.INFO, found.why_not or found.answer)
+        return ValidationResult(ValidationResultStatus.INVALID, self.name, [message])

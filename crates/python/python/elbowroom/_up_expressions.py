@@ -1,0 +1,155 @@
+"""Names and expressions of unified-planning's problems in PDDL, exactly."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+from unified_planning.model import FNode, OperatorKind, Problem as UPProblem
+
+from ._errors import UnsupportedError
+
+# Words that may not be names of anything.
+_TAKEN = frozenset(
+    "define domain problem requirements types constants predicates functions action process event "
+    "durative-action derived parameters precondition condition effect duration vars init goal "
+    "metric objects and or not imply exists forall when at over start end all increase decrease "
+    "assign scale-up scale-down minimize maximize total-time object number either constraints "
+    "always sometime within at-most-once preference is-violated undefined".split()
+)
+_INITIAL = {"type": "t", "object": "o", "fluent": "f", "action": "a"}
+
+
+class Expressions:
+    """The names of a problem's things in PDDL, and its conditions, numbers and effects."""
+
+    def __init__(self, problem: UPProblem, taken: Iterable[str]) -> None:
+        self._names: dict[tuple[str, Any], str] = {}
+        self._used = {*_TAKEN, *taken}
+        self.simplify = problem.environment.simplifier.simplify
+
+    def name(self, kind: str, thing: Any) -> str:
+        """The name of something, the same each time."""
+        key = (kind, thing.name if hasattr(thing, "name") else str(thing))
+        if key not in self._names:
+            clean = re.sub(r"[^a-z0-9_-]", "_", key[1].lower())
+            if not clean[:1].isalpha():
+                clean = _INITIAL[kind] + "_" + clean
+            name, number = clean, 1
+            while name in self._used:
+                number += 1
+                name = f"{clean}_{number}"
+            self._used.add(name)
+            self._names[key] = name
+        return self._names[key]
+
+    def type_name(self, of: Any) -> str:
+        """The name of a user type."""
+        if not of.is_user_type():
+            raise UnsupportedError(f"a parameter of type {of}; only user types are supported")
+        return self.name("type", of)
+
+    def condition(self, expression: FNode) -> str:
+        """A condition, or a number, in PDDL."""
+        return self.walk(self.simplify(expression))
+
+    def walk(self, e: FNode) -> str:
+        """An expression as it stands, in PDDL."""
+        args = [self.walk(arg) for arg in e.args]
+        if e.is_bool_constant():
+            return "(and)" if e.is_true() else "(or)"
+        if e.is_int_constant() or e.is_real_constant():
+            return str(Fraction(e.constant_value()))
+        if e.is_object_exp():
+            return self.name("object", e.object())
+        if e.is_parameter_exp():
+            return "?" + variable(e.parameter().name)
+        if e.is_variable_exp():
+            return "?" + variable(e.variable().name)
+        if e.is_fluent_exp():
+            return f"({' '.join([self.name('fluent', e.fluent()), *args])})"
+        if e.is_iff():
+            return f"(and (imply {args[0]} {args[1]}) (imply {args[1]} {args[0]}))"
+        if e.is_exists() or e.is_forall():
+            bound = " ".join(f"?{variable(v.name)} - {self.type_name(v.type)}" for v in e.variables())
+            return f"({'exists' if e.is_exists() else 'forall'} ({bound}) {args[0]})"
+        if e.is_equals() and any(arg.type.is_bool_type() for arg in e.args):
+            raise UnsupportedError(f"an equality of truth values: {e}")
+        operator = _OPERATORS.get(e.node_type)
+        if operator is None:
+            raise UnsupportedError(f"the expression {e} is not supported")
+        if operator in ("+", "*"):
+            folded = args[0]
+            for arg in args[1:]:
+                folded = f"({operator} {folded} {arg})"
+            return folded
+        return f"({operator} {' '.join(args)})"
+
+    def effect(self, effect: Any) -> str:
+        """An effect, with its condition and its forall."""
+        target = self.walk(effect.fluent)
+        made: list[str]
+        if effect.is_increase() or effect.is_decrease():
+            word = "increase" if effect.is_increase() else "decrease"
+            made = [f"({word} {target} {self.condition(effect.value)})"]
+        elif not effect.is_assignment():
+            raise UnsupportedError(f"the effect {effect} is not supported")
+        elif effect.fluent.type.is_bool_type():
+            value = self.simplify(effect.value)
+            if value.is_bool_constant():
+                made = [target if value.is_true() else f"(not {target})"]
+            else:
+                truth = self.walk(value)
+                made = [f"(when {truth} {target})", f"(when (not {truth}) (not {target}))"]
+        else:
+            made = [f"(assign {target} {self.condition(effect.value)})"]
+        condition = self.simplify(effect.condition)
+        if not condition.is_true():
+            guard = self.walk(condition)
+            made = [_when(guard, it) for it in made]
+        if effect.forall:
+            bound = " ".join(f"?{variable(v.name)} - {self.type_name(v.type)}" for v in effect.forall)
+            made = [f"(forall ({bound}) {it})" for it in made]
+        return " ".join(made)
+
+
+def _when(guard: str, change: str) -> str:
+    """A change under one more condition."""
+    inner = re.fullmatch(r"\(when (.*)\)", change)
+    if inner is None:
+        return f"(when {guard} {change})"
+    # `(when A x)` under B: A is the first expression.
+    first, rest = first_of(inner.group(1))
+    return f"(when (and {guard} {first}) {rest})"
+
+
+def first_of(text: str) -> tuple[str, str]:
+    """The first expression of a text, and the rest."""
+    depth = 0
+    for index, letter in enumerate(text):
+        depth += {"(": 1, ")": -1}.get(letter, 0)
+        if depth == 0 and letter in ") ":
+            return text[: index + 1].strip(), text[index + 1 :].strip()
+    return text, ""
+
+
+_OPERATORS = {
+    OperatorKind.AND: "and",
+    OperatorKind.OR: "or",
+    OperatorKind.NOT: "not",
+    OperatorKind.IMPLIES: "imply",
+    OperatorKind.PLUS: "+",
+    OperatorKind.MINUS: "-",
+    OperatorKind.TIMES: "*",
+    OperatorKind.DIV: "/",
+    OperatorKind.LE: "<=",
+    OperatorKind.LT: "<",
+    OperatorKind.EQUALS: "=",
+}
+
+
+def variable(name: str) -> str:
+    """The name of a variable, without its question mark."""
+    return re.sub(r"[^a-zA-Z0-9_-]", "_", name) if name[:1].isalpha() else f"v_{name}"
