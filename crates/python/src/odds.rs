@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use elbowroom::answers;
 use elbowroom::answers::odds::{
-    self, LatticeFinding, OddsFinding, OddsRequest, OddsSemantics, OddsSettings,
+    LatticeFinding, OddsFinding, OddsRequest, OddsSemantics, OddsSettings,
 };
 use elbowroom::execution::executors::ExecutorSpec;
 use elbowroom::probability::likelihoods;
@@ -113,7 +114,7 @@ pub(crate) fn odds(
             world: world.as_ref(),
             settings,
         };
-        let answer = odds::odds(&request, &mut watch)?;
+        let answer = answers::odds::odds(&request, &mut watch)?;
         let svg = match &answer.finding {
             OddsFinding::Odds(odds) => match &odds.lattice {
                 Some(LatticeFinding::Lattice(lattice)) => {
