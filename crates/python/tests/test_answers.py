@@ -19,12 +19,14 @@ from elbowroom import _native
 def test_numbers_are_fractions_and_infinity(problem: elbowroom.Problem, plan: Path) -> None:
     envelope = problem.envelope(plan)
     assert [(r.name, r.lower, r.upper) for r in envelope.rows()] == [
-        ("dur_0", Fraction(5, 8), 20),
-        ("dur_1", 0, 54),
-        ("dur_2", Fraction(1, 2), 5),
-        ("dur_3", Fraction(15, 16), 30),
-        ("dur_4", Fraction(3, 4), Fraction(9, 2)),
+        ("dur_0", Fraction(5, 64), 20),
+        ("dur_1", 0, Fraction(879, 16)),
+        ("dur_2", Fraction(1, 64), 5),
+        ("dur_3", Fraction(15, 128), 30),
+        ("dur_4", Fraction(3, 128), Fraction(639, 128)),
     ]
+    # In steps of the quantity's own unit.
+    assert problem.envelope(plan, precision=1)["dur_1"].upper == 54
     assert all(type(r.lower) is Fraction for r in envelope.rows())
     assert envelope.stop == "converged"
     assert envelope.makespans is not None
@@ -208,7 +210,7 @@ def test_data_frames_have_a_row_for_each_quantity(problem: elbowroom.Problem, pl
     pandas = pytest.importorskip("pandas")
     frame = envelope.to_pandas()
     assert isinstance(frame, pandas.DataFrame)
-    assert list(frame["upper"]) == [20.0, 54.0, 5.0, 30.0, 4.5]
+    assert list(frame["upper"]) == [20.0, 54.9375, 5.0, 30.0, 4.9921875]
     pytest.importorskip("polars")
     assert envelope.to_polars()["name"].to_list()[0] == "dur_0"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -91,6 +92,15 @@ def test_what_has_no_odds_says_why(lamp: elbowroom.Problem) -> None:
 def test_the_command_of_the_package_gives_the_same_answer(lamp: elbowroom.Problem) -> None:
     program = shutil.which("elbowroom", path=Path(sys.executable).parent)
     command = [program] if program else [sys.executable, "-m", "elbowroom"]
+    # Also where the package is not installed.
+    environment = {**os.environ, "PYTHONPATH": str(Path(elbowroom.__file__).parents[1])}
+
+    def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+        line = [*command, *arguments]
+        return subprocess.run(
+            line, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         texts = {
@@ -100,11 +110,10 @@ def test_the_command_of_the_package_gives_the_same_answer(lamp: elbowroom.Proble
         for file, text in texts.items():
             (folder / file).write_text(text)
         asked = ["odds", "d.pddl", "p.pddl", "p.plan", "--likelihoods", "l.toml", "--json"]
-        done = subprocess.run([*command, *asked], cwd=folder, capture_output=True, text=True, check=True)
+        done = run(asked, folder)
+        assert done.returncode == 0, done.stderr
         assert json.loads(done.stdout)["order"]["probability"] == pytest.approx(
             lamp.odds("0: (screw) [5]", likelihoods=LIKELY).probability
         )
-        wrong = subprocess.run(
-            [*command, "check", "d.pddl", "none.pddl"], cwd=folder, capture_output=True, text=True, check=False
-        )
+        wrong = run(["check", "d.pddl", "none.pddl"], folder)
     assert wrong.returncode == 2 and "none.pddl" in wrong.stderr

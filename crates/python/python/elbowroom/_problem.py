@@ -266,7 +266,7 @@ class Problem:
 
         >>> envelope = problem.envelope(PLAN, sharpen=True)
         >>> [str(room.upper) for room in envelope.rows()][:2]
-        ['2562/125', '27749/500']
+        ['320061/16000', '880093/16000']
         >>> bool(problem.envelope(PLAN, contains={"dur_0": (10, 12)}))
         True
         """

@@ -78,9 +78,9 @@ def _common_kind() -> ProblemKind:
     return kind
 
 
-class ElbowroomPlanner(
+class ElbowroomPlanner(  # type: ignore[misc, unused-ignore]
     Engine, OneshotPlannerMixin, AnytimePlannerMixin, ReplannerMixin
-):  # type: ignore[misc, unused-ignore]
+):
     """Elbowroom's embedded planner.
 
     Plans of temporal problems come back as time-triggered plans or, with ``params={"plan": "stn"}``, as
