@@ -78,8 +78,8 @@ def _common_kind() -> ProblemKind:
     return kind
 
 
-class ElbowroomPlanner(  # type: ignore[misc, unused-ignore]
-    Engine, OneshotPlannerMixin, AnytimePlannerMixin, ReplannerMixin
+class ElbowroomPlanner(
+    Engine, OneshotPlannerMixin, AnytimePlannerMixin, ReplannerMixin  # type: ignore[misc, unused-ignore]
 ):
     """Elbowroom's embedded planner.
 
