@@ -2,13 +2,17 @@
 
     python crates/python/tests/conformance.py [SECONDS]
 
-It needs unified-planning; Aries is beside it where `up-aries` is installed. A planner has SECONDS (20) for
+It needs unified-planning; Aries is beside it where `up-aries` is installed, and the cases of `up_test_cases`
+where that can be imported (it is in unified-planning's source package, `pip download --no-binary`). A planner has SECONDS (20) for
 each case, and its plans are judged by unified-planning's own validators, by the rule "one that supports the
 problem and the plan".
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import pkgutil
 import sys
 import warnings
 from collections import Counter, defaultdict
@@ -28,6 +32,28 @@ JUDGES = ["elbowroom-val", "sequential_plan_validator", "up_time_triggered_valid
 OWN = ["sequential_plan_validator", "up_time_triggered_validator"]
 PLANNERS = ["elbowroom", "aries"]
 SOLVED = (Status.SOLVED_SATISFICING, Status.SOLVED_OPTIMALLY)
+
+
+def more_cases() -> dict[str, Any]:
+    """Those of `up_test_cases`, some of which read files that the source package lacks."""
+    found: dict[str, Any] = {}
+    there = importlib.util.find_spec("up_test_cases")
+    if there is None:
+        return found
+    # Its modules are those of a script beside them.
+    sys.path.extend(there.submodule_search_locations or [])
+    package = importlib.import_module("builtin")
+    for module in pkgutil.walk_packages(package.__path__, "builtin.", onerror=lambda _: None):
+        try:
+            cases = importlib.import_module(module.name).get_test_cases()
+        except AttributeError:
+            continue
+        except Exception as error:
+            print(f"{module.name} cannot be read: {type(error).__name__}", file=sys.stderr)
+            continue
+        for name, case in cases.items():
+            found.setdefault(f"{module.name.rpartition('.')[2]}:{name}", case)
+    return found
 
 
 def engine_class(name: str) -> Any:
@@ -64,7 +90,7 @@ def by_own(problem: Any, plan: Any) -> str:
 
 def main(seconds: float) -> None:
     get_environment().credits_stream = None
-    cases = get_example_problems()
+    cases = {**get_example_problems(), **more_cases()}
     plans = [
         (name, case.problem, plan, expected)
         for name, case in cases.items()

@@ -128,31 +128,9 @@ impl Compiler<'_> {
                 }
             }
         }
-        self.forbid_conflicts(run, node, &updates, obligations);
+        forbid_conflicts(run, node, &updates, obligations);
         recorded.append(&mut additions);
         Ok(recorded)
-    }
-
-    /// Several updates of one fluent by one happening must all be increases and decreases.
-    pub(super) fn forbid_conflicts(
-        &self,
-        run: &Run,
-        node: NodeId,
-        updates: &BTreeMap<FluentId, Vec<UpdateOperator>>,
-        obligations: &mut Obligations,
-    ) {
-        for (&fluent, operators) in updates {
-            if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
-                continue;
-            }
-            obligations.direct.push(Obligation {
-                requirement: Requirement::OneUpdate { node, fluent },
-                bad_cases: vec![BadCase {
-                    differences: Vec::new(),
-                    inequalities: run.timeline.assumptions.clone(),
-                }],
-            });
-        }
     }
 
     /// A continuous change without a value or a rate breaks the plan, unless its action takes no
@@ -179,6 +157,27 @@ impl Compiler<'_> {
 pub(super) enum Recorded {
     Fact(FactId, bool),
     Fluent(FluentId, FluentChange),
+}
+
+/// Several updates of one fluent by one happening must all be increases and decreases.
+fn forbid_conflicts(
+    run: &Run,
+    node: NodeId,
+    updates: &BTreeMap<FluentId, Vec<UpdateOperator>>,
+    obligations: &mut Obligations,
+) {
+    for (&fluent, operators) in updates {
+        if operators.len() == 1 || operators.iter().all(|operator| operator.is_additive()) {
+            continue;
+        }
+        obligations.direct.push(Obligation {
+            requirement: Requirement::OneUpdate { node, fluent },
+            bad_cases: vec![BadCase {
+                differences: Vec::new(),
+                inequalities: run.timeline.assumptions.clone(),
+            }],
+        });
+    }
 }
 
 pub(super) fn record(run: &mut Run, node: NodeId, changes: Vec<Recorded>) {
