@@ -1,0 +1,458 @@
+"""Worlds for `elbowroom run --world-process`, in Python, with nothing but the standard library.
+
+A whole world:
+
+    from elbowroom_world import Failed, World
+
+    world = World("rover")
+
+    @world.action("drive")
+    def drive(action):
+        rover, start, goal = action.arguments
+        for _ in robot.drive(goal):         # the robot's own way to do it
+            if action.is_cancelled:
+                return robot.stop()
+        if not robot.is_at(goal):
+            raise Failed("the wheels slip")
+
+    @world.look
+    def look(what):                         # ["at", "rover", "shelf"]
+        return robot.believes(what)         # True, False, a number, or None: cannot tell
+
+    world.run()
+
+Three kinds of actions, told apart by how they are registered:
+
+- ``@world.action(NAME)``: the function does the action and returns when it is done. Each call has a
+  thread of its own. Returning is success, ``raise Failed(why)`` failure; an action that returns
+  after it was cancelled is cancelled.
+- ``@world.starter(NAME)``: the function only begins the action, and must not block. What comes of
+  it is told later, from any thread: ``action.started()``, ``action.succeeded()``,
+  ``action.failed(why)``, ``action.was_cancelled()``. For robots that call back. ``@world.canceller``
+  names the function that asks such an action to stop.
+- ``@world.lasts(NAME)``, of a :class:`Simulation`: the function returns how many seconds the action
+  takes, and time jumps.
+
+NAME ``"*"`` stands for every action that has no function of its own.
+
+Whatever a program prints goes to standard error, so that ``print`` does not disturb the
+conversation. `docs/formats/world-protocol.md` describes the messages.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import sys
+import threading
+import time as _time
+import traceback
+from typing import Any, Callable, TextIO
+
+__all__ = ["Action", "Failed", "Simulation", "World"]
+
+# So many reports are told in one answer, however many more are coming.
+MOST_NEWS = 1000
+
+
+class Failed(Exception):
+    """An action has failed; the text says why."""
+
+
+class Action:
+    """An action that is to be done."""
+
+    def __init__(self, world: World, ticket: int, name: str, duration: float | None) -> None:
+        self.ticket = ticket
+        """The number of the start, which never comes again within a run."""
+        self.text = name
+        """As the plan has it: ``(drive rover depot shelf)``."""
+        words = name.strip("() ").split()
+        self.name = words[0] if words else ""
+        """``drive``."""
+        self.arguments = words[1:]
+        """``["rover", "depot", "shelf"]``."""
+        self.duration = duration
+        """How long the plan has it take, in seconds; ``None`` for an instantaneous action."""
+        self.start: float | None = None
+        """When it started, by the world's clock."""
+        self._world = world
+        self._cancelled = threading.Event()
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether it is to stop."""
+        return self._cancelled.is_set()
+
+    def sleep(self, seconds: float) -> bool:
+        """Waits so many seconds of the world's time; ends early, with ``False``, when cancelled."""
+        return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
+
+    def started(self, measured: dict[str, float] | None = None) -> None:
+        """It has started now."""
+        self._tell(type="started", **({"measured": measured} if measured else {}))
+
+    def succeeded(self, measured: dict[str, float] | None = None) -> None:
+        """It has ended now, as the domain says. ``measured``: by how much it really changed fluents."""
+        self._end("succeeded", **({"measured": measured} if measured else {}))
+
+    def failed(self, why: str) -> None:
+        """It has ended now without its effects."""
+        self._end("failed", why=why)
+
+    def was_cancelled(self) -> None:
+        """It has stopped, as it was told to."""
+        self._end("cancelled")
+
+    def _end(self, outcome: str, **more: Any) -> None:
+        self._tell(type="ended", outcome=outcome, **more)
+
+    def _tell(self, **message: Any) -> None:
+        # What is sent is decided by the thread that speaks: it knows what was told before.
+        self._world._inbox.put(("report", dict(message, ticket=self.ticket), self._world.now()))
+
+    def __repr__(self) -> str:
+        return f"Action(#{self.ticket} {self.text})"
+
+
+Does = Callable[[Action], Any]
+
+
+class World:
+    """A world on the wall clock. ``speed`` is how many of its seconds pass in one real second."""
+
+    def __init__(self, name: str = "world", *, speed: float = 1.0) -> None:
+        if not speed > 0:
+            raise ValueError(f"speed must be above 0, not {speed!r}")
+        self.name, self.speed = name, speed
+        self._does: dict[str, tuple[str, Does]] = {}
+        self._canceller: Does | None = None
+        self._look: Callable[[list[str]], Any] | None = None
+        self._inbox: queue.Queue[tuple[Any, ...]] = queue.Queue()
+        self._actions: dict[int, Action] = {}
+        self._begun: set[int] = set()
+        self._ended: dict[int, dict[str, Any]] = {}
+        self._news: list[dict[str, Any]] = []
+        self._out: TextIO | None = None
+        # The clock's time at the world's time 0, which begins with the first thing to do: what
+        # is prepared before that takes no time.
+        self._zero: float | None = None
+
+    # What a program registers.
+
+    def action(self, *names: str) -> Callable[[Does], Does]:
+        """The function does these actions, each call in a thread of its own."""
+        return self._register(names, "blocking")
+
+    def starter(self, *names: str) -> Callable[[Does], Does]:
+        """The function begins these actions and returns at once; the end is told later."""
+        return self._register(names, "starter")
+
+    def canceller(self, function: Does) -> Does:
+        """The function asks an action of :meth:`starter` to stop, and returns at once."""
+        self._canceller = function
+        return function
+
+    def look(self, function: Callable[[list[str]], Any]) -> Callable[[list[str]], Any]:
+        """The function says what is so: it gets the words of a fact or fluent, and returns whether
+        the fact is true, the fluent's value, or ``None`` where it cannot tell."""
+        self._look = function
+        return function
+
+    def _register(self, names: tuple[str, ...], kind: str) -> Callable[[Does], Does]:
+        if not names or not all(isinstance(name, str) for name in names):
+            raise TypeError('name the actions: @world.action("drive")')
+
+        def register(function: Does) -> Does:
+            for name in names:
+                self._does[name.lower()] = (kind, function)
+            return function
+
+        return register
+
+    # What a program reports by itself, from any thread.
+
+    def fact(self, name: str, becomes: bool) -> None:
+        """A fact was seen to be so: ``world.fact("(open door)", False)``."""
+        report = {"type": "fact", "fact": name, "becomes": bool(becomes)}
+        self._inbox.put(("report", report, self.now()))
+
+    def value(self, fluent: str, value: float) -> None:
+        """A value was seen: ``world.value("(charge rover)", 17.5)``."""
+        report = {"type": "value", "fluent": fluent, "value": value}
+        self._inbox.put(("report", report, self.now()))
+
+    def now(self) -> float:
+        """What time it is: seconds since the run began."""
+        return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
+
+    # The conversation.
+
+    def run(self, input: TextIO | None = None, output: TextIO | None = None) -> None:
+        """Talks to Elbowroom until it says ``stop``, or is gone. Only the calling thread speaks."""
+        source, self._out = input or sys.stdin, output or sys.stdout
+        if output is None:
+            # What the program prints must not get into the conversation.
+            sys.stdout = sys.stderr
+        threading.Thread(target=self._listen, args=(source,), daemon=True).start()
+        question: dict[str, Any] | None = None
+        while True:
+            kind, *rest = self._next(question)
+            if kind == "report":
+                self._take(*rest)
+            elif kind == "message":
+                (message,) = rest
+                what = message.get("type")
+                if what in ("wait", "look"):
+                    self._begin_time()
+                    question = message
+                    if what == "look":
+                        self._see(message)
+                elif what == "stop":
+                    break
+                else:
+                    self._obey(what, message)
+            elif kind == "end":
+                break
+            is_all = self._inbox.empty() or len(self._news) >= MOST_NEWS
+            if question is not None and is_all and self._is_due(question):
+                self._answer(question)
+                question = None
+        self._leave()
+
+    def _listen(self, source: TextIO) -> None:
+        for line in source:
+            try:
+                message = json.loads(line)
+            except ValueError:
+                print(f"{self.name}: not understood: {line.rstrip()}", file=sys.stderr)
+                continue
+            if isinstance(message, dict):
+                self._inbox.put(("message", message))
+        self._inbox.put(("end",))
+
+    def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
+        """What comes next: a message, a report, or that time is up."""
+        if question is None:
+            return self._inbox.get()
+        left = max(0.0, (_number(question.get("until")) or 0.0) - self.now()) / self.speed
+        try:
+            return self._inbox.get(timeout=min(left, threading.TIMEOUT_MAX))
+        except queue.Empty:
+            return ("time",)
+
+    def _is_due(self, question: dict[str, Any]) -> bool:
+        until = _number(question.get("until"))
+        return bool(self._news) or until is None or self.now() >= until
+
+    def _answer(self, question: dict[str, Any]) -> None:
+        for report in self._news:
+            self._say(report)
+        self._news.clear()
+        self._say({"type": "time", "now": self._time(question)})
+
+    def _time(self, question: dict[str, Any]) -> float:
+        return self.now()
+
+    def _say(self, message: dict[str, Any]) -> None:
+        assert self._out is not None
+        try:
+            self._out.write(json.dumps(message) + "\n")
+            self._out.flush()
+        except (BrokenPipeError, ValueError):
+            # Nobody listens any more; the end of the input says so, too.
+            pass
+
+    def _obey(self, what: Any, message: dict[str, Any]) -> None:
+        if what == "hello":
+            return
+        self._begin_time()
+        if what == "start":
+            self._start(message)
+        elif what == "cancel":
+            action = self._actions.get(message.get("ticket", -1))
+            if action is not None and action.ticket not in self._ended:
+                action._cancelled.set()
+                self._cancel(action)
+
+    def _begin_time(self) -> None:
+        if self._zero is None:
+            self._zero = _time.monotonic()
+
+    def _start(self, message: dict[str, Any]) -> None:
+        ticket = message["ticket"]
+        if ticket in self._actions:
+            return  # said twice, done once
+        action = Action(self, ticket, message["action"], _number(message.get("duration")))
+        self._actions[ticket] = action
+        found = self._does.get(action.name.lower()) or self._does.get("*")
+        if found is None:
+            self._take({"type": "ended", "ticket": ticket, "outcome": "failed",
+                        "why": f"this world has no action {action.name}"}, self.now())  # fmt: skip
+            return
+        self._launch(found, action)
+
+    def _launch(self, found: tuple[str, Does], action: Action) -> None:
+        kind, function = found
+        if kind == "starter":
+            self._call(function, action)
+        else:
+            # What takes no time has started when it is done.
+            if action.duration is not None:
+                self._take({"type": "started", "ticket": action.ticket}, self.now())
+            threading.Thread(target=self._do, args=(function, action), daemon=True).start()
+
+    def _do(self, function: Does, action: Action) -> None:
+        """Does an action, in its own thread."""
+        if self._call(function, action):
+            if action.is_cancelled:
+                action.was_cancelled()
+            elif action.duration is None:
+                action.started()
+            else:
+                action.succeeded()
+
+    def _call(self, function: Does, action: Action) -> bool:
+        try:
+            function(action)
+            return True
+        except Failed as failure:
+            action.failed(str(failure))
+        except Exception as error:  # a robot's slip is that action's, not the world's
+            traceback.print_exc()
+            action.failed(f"{type(error).__name__}: {error}")
+        return False
+
+    def _cancel(self, action: Action) -> None:
+        kind, _ = self._does.get(action.name.lower()) or self._does.get("*") or ("", None)
+        if kind == "starter" and self._canceller is not None:
+            self._call(self._canceller, action)
+
+    def _take(self, report: dict[str, Any], at: float) -> None:
+        """Notes what is to be reported; each start and each end once, and in this order."""
+        report = dict(report, time=max(0.0, at))
+        ticket, what = report.get("ticket"), report["type"]
+        if ticket is not None:
+            if ticket in self._ended or (what == "started" and ticket in self._begun):
+                return
+            action = self._actions[ticket]
+            if what == "started":
+                self._begun.add(ticket)
+                action.start = at
+            elif what == "ended":
+                if ticket not in self._begun and report["outcome"] == "succeeded":
+                    self._take({"type": "started", "ticket": ticket}, at)
+                self._ended[ticket] = report
+            if what == "started" and action.duration is None:
+                # An instantaneous action is over when it has started.
+                self._ended[ticket] = report
+        self._news.append(report)
+
+    def _see(self, question: dict[str, Any]) -> None:
+        """Looks at what is asked for."""
+        now = self.now()
+        if self._look is None:
+            return
+        for kind, key, name in (
+            *(("fact", "becomes", name) for name in question.get("facts", [])),
+            *(("value", "value", name) for name in question.get("fluents", [])),
+        ):
+            try:
+                seen = self._look(name.strip("() ").split())
+            except Exception:
+                traceback.print_exc()
+                continue
+            if seen is not None:
+                what = "fact" if kind == "fact" else "fluent"
+                self._news.append({"type": kind, what: name, key: seen, "time": now})
+
+    def _leave(self) -> None:
+        """The run is over, or Elbowroom is gone: what runs is to stop."""
+        for action in self._actions.values():
+            if action.ticket not in self._ended:
+                action._cancelled.set()
+                self._cancel(action)
+
+
+class Simulation(World):
+    """A world in which time jumps from one thing to the next.
+
+        world = Simulation()
+
+        @world.lasts("*")
+        def lasts(action):
+            return 1.1 * action.duration
+
+        world.run()
+    """
+
+    def __init__(self, name: str = "simulation") -> None:
+        super().__init__(name)
+        self._clock = 0.0
+        self._coming: list[tuple[float, int, dict[str, Any]]] = []
+
+    def lasts(self, *names: str) -> Callable[[Callable[[Action], float]], Callable[[Action], float]]:
+        """The function says how many seconds these actions take. It may ``raise Failed(why)``: then
+        the action does not start. What it says of an instantaneous action does not count."""
+        return self._register(names, "lasts")
+
+    def now(self) -> float:
+        return self._clock
+
+    def fact_at(self, time: float, name: str, becomes: bool) -> None:
+        """A fact that becomes so at that time, by itself."""
+        self._coming.append((time, -1, {"type": "fact", "fact": name, "becomes": becomes}))
+
+    def _launch(self, found: tuple[str, Does], action: Action) -> None:
+        kind, function = found
+        if kind != "lasts":
+            raise TypeError(f"a simulation has @world.lasts({action.name!r}), and no threads")
+        try:
+            # Whoever multiplies the planned duration need not think of those that have none.
+            is_instantaneous = action.duration is None
+            action.duration = action.duration or 0.0
+            seconds = function(action)
+        except Failed as failure:
+            self._take({"type": "ended", "ticket": action.ticket, "outcome": "failed",
+                        "why": str(failure)}, self._clock)  # fmt: skip
+            return
+        finally:
+            action.duration = None if is_instantaneous else action.duration
+        self._take({"type": "started", "ticket": action.ticket}, self._clock)
+        if not is_instantaneous:
+            end = {"type": "ended", "ticket": action.ticket, "outcome": "succeeded"}
+            self._coming.append((self._clock + max(0.0, float(seconds)), action.ticket, end))
+
+    def _cancel(self, action: Action) -> None:
+        self._coming = [it for it in self._coming if it[1] != action.ticket]
+        self._take({"type": "ended", "ticket": action.ticket, "outcome": "cancelled"}, self._clock)
+
+    def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
+        if question is None or not self._inbox.empty():
+            return self._inbox.get()
+        return ("time",)
+
+    def _is_due(self, question: dict[str, Any]) -> bool:
+        until = _number(question.get("until"))
+        if self._news or until is None:
+            return True
+        self._coming.sort(key=lambda it: it[:2])
+        if self._coming and self._coming[0][0] <= until:
+            self._clock = max(self._clock, self._coming[0][0])
+            # What happens at one time is told in one answer.
+            while self._coming and self._coming[0][0] <= self._clock:
+                _, _, report = self._coming.pop(0)
+                self._take(report, self._clock)
+        else:
+            self._clock = max(self._clock, until)
+        return True
+
+    def _time(self, question: dict[str, Any]) -> float:
+        return self._clock
+
+
+def _number(value: Any) -> float | None:
+    """A number as Elbowroom writes it."""
+    if isinstance(value, dict):
+        value = value.get("decimal")
+    return None if value is None else float(value)

@@ -1,0 +1,226 @@
+"""What the library makes of what it is told. `python3 -m unittest discover -s clients/python`"""
+
+import json
+import os
+import threading
+import unittest
+
+from elbowroom_world import Failed, Simulation, World
+
+
+PIPES = []
+
+
+def tearDownModule():
+    for pipe in PIPES:
+        pipe.close()
+
+
+class Peer:
+    """The other side: Elbowroom, line by line."""
+
+    def __init__(self, world):
+        self.world = world
+        there, self._said = os.pipe(), os.pipe()
+        self._mouth = os.fdopen(there[1], "w")
+        self._ears = os.fdopen(self._said[0], encoding="utf-8")
+        self._ends = (os.fdopen(there[0]), os.fdopen(self._said[1], "w"))
+        PIPES.extend([self._mouth, self._ears, *self._ends])
+        self._thread = threading.Thread(target=world.run, args=self._ends, daemon=True)
+        self._thread.start()
+        self.tell(type="hello", protocol="elbowroom-world", version=1)
+
+    def tell(self, **message):
+        self._mouth.write(json.dumps(message) + "\n")
+        self._mouth.flush()
+
+    def hear(self):
+        return json.loads(self._ears.readline())
+
+    def start(self, ticket, action="(drive rover depot shelf)", duration=1.0):
+        lasts = None if duration is None else {"exact": str(duration), "decimal": duration}
+        self.tell(type="start", ticket=ticket, action=action, duration=lasts)
+
+    def ask(self, **question):
+        """The reports up to `time`, and what time it is."""
+        self.tell(**question)
+        reports = []
+        while True:
+            message = self.hear()
+            if message["type"] == "time":
+                return reports, message["now"]
+            reports.append(message)
+
+    def wait(self, until):
+        return self.ask(type="wait", until={"exact": str(until), "decimal": until})
+
+    def reports(self, until, enough):
+        """Reports from several answers, until there are enough."""
+        reports = []
+        while len(reports) < enough:
+            more, now = self.wait(until)
+            reports += more
+            if now >= until:
+                break
+        return reports
+
+    def stop(self):
+        self.tell(type="stop")
+        self._thread.join(5)
+        return not self._thread.is_alive()
+
+    def hang_up(self):
+        self._mouth.close()
+        self._thread.join(5)
+        return not self._thread.is_alive()
+
+
+def kinds(reports):
+    return [(it["type"], it.get("outcome")) for it in reports]
+
+
+class OnTheWallClock(unittest.TestCase):
+    def test_an_action_runs_beside_the_conversation_and_succeeds(self):
+        world = World(speed=100)
+
+        @world.action("drive")
+        def drive(action):
+            self.assertEqual(action.arguments, ["rover", "depot", "shelf"])
+            action.sleep(action.duration)
+
+        peer = Peer(world)
+        peer.start(0)
+        reports = peer.reports(50, 2)
+        self.assertEqual(kinds(reports), [("started", None), ("ended", "succeeded")])
+        took = reports[-1]["time"] - reports[0]["time"]
+        self.assertGreaterEqual(took, 1.0)
+        self.assertTrue(peer.stop())
+
+    def test_a_wait_ends_at_its_time_when_nothing_happens(self):
+        peer = Peer(World(speed=100))
+        reports, now = peer.wait(3)
+        self.assertEqual(reports, [])
+        self.assertGreaterEqual(now, 3)
+
+    def test_failures_and_slips_are_told_with_their_reason(self):
+        world = World(speed=100)
+
+        @world.action("drive")
+        def drive(action):
+            raise Failed("the wheels slip")
+
+        @world.action("pick")
+        def pick(action):
+            return {}["gripper"]
+
+        peer = Peer(world)
+        peer.start(0)
+        peer.start(1, "(pick rover parcel)")
+        peer.start(2, "(fly rover)")
+        reports = peer.reports(20, 5)
+        why = {it["ticket"]: it["why"] for it in reports if it["type"] == "ended"}
+        self.assertEqual(why[0], "the wheels slip")
+        self.assertEqual(why[1], "KeyError: 'gripper'")
+        self.assertEqual(why[2], "this world has no action fly")
+
+    def test_a_cancelled_action_stops_and_says_so_once(self):
+        world = World(speed=10)
+
+        @world.action("*")
+        def work(action):
+            if not action.sleep(1000):
+                return
+
+        peer = Peer(world)
+        peer.start(0)
+        self.assertEqual(kinds(peer.reports(5, 1)), [("started", None)])
+        peer.tell(type="cancel", ticket=0)
+        peer.tell(type="cancel", ticket=0)
+        self.assertEqual(kinds(peer.reports(20, 1)), [("ended", "cancelled")])
+        self.assertEqual(peer.wait(world.now() + 2)[0], [])
+
+    def test_what_a_robot_calls_back_is_told_once_and_in_order(self):
+        world, begun = World(speed=100), []
+        world.starter("drive")(begun.append)
+        world.canceller(lambda action: action.was_cancelled())
+        peer = Peer(world)
+        peer.start(0)
+        peer.start(0)
+        peer.wait(world.now() + 1)
+        (action,) = begun
+        action.succeeded()
+        action.succeeded()
+        action.failed("after all")
+        reports = peer.reports(world.now() + 5, 3)
+        self.assertEqual(kinds(reports), [("started", None), ("ended", "succeeded")])
+        peer.start(1)
+        peer.wait(world.now() + 1)
+        peer.tell(type="cancel", ticket=1)
+        self.assertEqual(kinds(peer.reports(world.now() + 5, 1)), [("ended", "cancelled")])
+
+    def test_an_instantaneous_action_has_started_when_it_is_done(self):
+        world = World(speed=100)
+        world.action("beep")(lambda action: None)
+
+        @world.action("burst")
+        def burst(action):
+            raise Failed("no air")
+
+        peer = Peer(world)
+        peer.start(0, "(beep)", None)
+        self.assertEqual(kinds(peer.reports(10, 1)), [("started", None)])
+        peer.start(1, "(burst)", None)
+        self.assertEqual(kinds(peer.reports(world.now() + 10, 1)), [("ended", "failed")])
+
+    def test_facts_and_values_are_pushed_and_looked_at(self):
+        world = World(speed=10)
+        world.look(lambda words: {"at": True, "charge": 17.5}.get(words[0]))
+        peer = Peer(world)
+        threading.Timer(0.05, lambda: world.fact("(open door)", False)).start()
+        ((report,), now) = peer.wait(1000)
+        self.assertEqual((report["fact"], report["becomes"]), ("(open door)", False))
+        self.assertLess(now, 900)
+        seen, _ = peer.ask(type="look", facts=["(at r b)", "(lies p)"], fluents=["(charge r)"])
+        self.assertEqual([it["type"] for it in seen], ["fact", "value"])
+        self.assertEqual(seen[1]["value"], 17.5)
+
+    def test_when_elbowroom_is_gone_what_runs_is_told_to_stop(self):
+        world, stopped = World(speed=1), threading.Event()
+
+        @world.action("*")
+        def work(action):
+            if not action.sleep(1000):
+                stopped.set()
+
+        peer = Peer(world)
+        peer.start(0)
+        peer.wait(0.2)
+        self.assertTrue(peer.hang_up())
+        self.assertTrue(stopped.wait(5))
+
+    def test_lines_that_are_no_messages_are_passed_over(self):
+        world = World(speed=100)
+        peer = Peer(world)
+        peer._mouth.write("hello\n[]\n")
+        peer.tell(type="from-a-later-version")
+        self.assertEqual(peer.wait(1)[0], [])
+
+
+class Simulated(unittest.TestCase):
+    def test_time_jumps_to_the_next_end(self):
+        world = Simulation()
+        world.lasts("*")(lambda action: 2 * action.duration)
+        world.fact_at(7, "(open door)", True)
+        peer = Peer(world)
+        peer.start(0, duration=5.0)
+        self.assertEqual(peer.wait(100), ([{"type": "started", "ticket": 0, "time": 0.0}], 0.0))
+        reports, now = peer.wait(100)
+        self.assertEqual((reports[0]["type"], now), ("fact", 7))
+        reports, now = peer.wait(100)
+        self.assertEqual((reports[0]["outcome"], now), ("succeeded", 10))
+        self.assertEqual(peer.wait(100), ([], 100))
+        self.assertTrue(peer.stop())
+
+
+if __name__ == "__main__":
+    unittest.main()

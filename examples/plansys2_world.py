@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+"""A world for `elbowroom run … --world-process "python3 plansys2_world.py"`: the action performers of PlanSys2.
+
+Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS 2 and your `plansys2_msgs` are set up.
+PlanSys2's own executor must be off: two of them would both answer. docs/plansys2.md says more.
+
+`Hub` is the conversation of PlanSys2's topic `actions_hub`, without ROS, so that it can be tested anywhere; `main`
+connects it with rclpy.
+"""
+
+import os
+import sys
+import threading
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "clients", "python"))
+from elbowroom_world import World  # noqa: E402
+
+# plansys2_msgs/msg/ActionExecution
+REQUEST, RESPONSE, CONFIRM, REJECT, FEEDBACK, FINISH, CANCEL = range(1, 8)
+# plansys2_msgs/msg/ActionPerformerStatus
+NOT_READY, READY, RUNNING, FAILURE = 0, 1, 2, 4
+
+ASK_EVERY = 1.0
+"""A request may be lost while nodes find each other; it is repeated after so many seconds."""
+GIVE_UP_ASKING = 30.0
+LOST_AFTER = 5.0
+"""A performer whose status came every second, and has not come for so long, is lost."""
+
+
+class Deal:
+    """One action, and the performer that does it."""
+
+    def __init__(self, action, now):
+        self.action, self.key = action, (action.name, tuple(action.arguments))
+        self.asked = None
+        self.since = now
+        self.performer = None
+        self.cancelled = None
+
+
+class Hub:
+    """The executor's side of `actions_hub`. `send(type, node, action, arguments)` publishes."""
+
+    def __init__(self, send, clock=time.monotonic):
+        self._send, self._clock = send, clock
+        self._deals = {}
+        self._heard = {}
+        self._lock = threading.RLock()
+
+    def begin(self, action):
+        """Looks for a performer. Messages carry no number of the execution, so that a second one of the
+        same action could not be told from the first."""
+        with self._lock:
+            deal = Deal(action, self._clock())
+            there = self._deals.get(deal.key)
+            if there is None:
+                self._deals[deal.key] = deal
+                self.tick()
+            elif there.cancelled is None:
+                action.failed(f"{there.performer or 'a performer'} is still busy with the same action")
+            else:
+                action.failed(f"{there.performer} has not confirmed that it has stopped the same action")
+
+    def cancel(self, action):
+        """Has the performer stop. It does not answer: that it is ready again shows that it has."""
+        with self._lock:
+            deal = self._deals.get((action.name, tuple(action.arguments)))
+            if deal is None or deal.action is not action or deal.cancelled is not None:
+                return
+            if deal.performer is None:
+                del self._deals[deal.key]
+                action.was_cancelled()
+                return
+            deal.cancelled = self._clock()
+            self._tell(CANCEL, deal, deal.performer)
+
+    def message(self, message):
+        """Takes what came on `actions_hub`, its own messages included."""
+        arguments = tuple(it.lower() for it in message.arguments)
+        name = message.action.lower()
+        if arguments == (name,):
+            arguments = ()  # PlanSys2 2.0 sends an action without arguments as its own argument
+        with self._lock:
+            deal, node = self._deals.get((name, arguments)), message.node_id
+            if message.type == RESPONSE:
+                if deal is None or deal.performer not in (None, node):
+                    # Whoever has answered waits for a word, also when we have given up.
+                    self._send(REJECT, node, message.action, list(message.arguments))
+                elif deal.performer is None:
+                    deal.performer, deal.since = node, self._clock()
+                    self._tell(CONFIRM, deal, node)
+                    if deal.action.duration is not None:
+                        deal.action.started()
+            elif deal is None or node != deal.performer:
+                return
+            elif message.type == FEEDBACK:
+                deal.since = self._clock()
+            elif message.type == FINISH:
+                del self._deals[deal.key]
+                if not message.success:
+                    deal.action.failed(message.status or f"{node} has not said why")
+                elif deal.action.duration is None:
+                    deal.action.started()
+                else:
+                    deal.action.succeeded()
+
+    def status(self, status):
+        """Takes what came on `performers_status`."""
+        with self._lock:
+            self._heard[status.node_name] = self._clock()
+            for deal in list(self._deals.values()):
+                if deal.performer != status.node_name:
+                    continue
+                if deal.cancelled is not None and status.state != RUNNING:
+                    del self._deals[deal.key]
+                    deal.action.was_cancelled()
+                elif deal.cancelled is None and status.state == FAILURE:
+                    self._lose(deal, f"{deal.performer} reports a failure")
+
+    def performers(self):
+        """Those that were heard of lately."""
+        with self._lock:
+            now = self._clock()
+            return sorted(name for name, at in self._heard.items() if now - at <= LOST_AFTER)
+
+    def tick(self):
+        """Asks again, and notices who is lost. To be called a few times a second."""
+        with self._lock:
+            now = self._clock()
+            for deal in list(self._deals.values()):
+                if deal.performer is None:
+                    if now - deal.since > GIVE_UP_ASKING:
+                        others = ", ".join(self.performers()) or "none"
+                        why = f"no performer answered within {GIVE_UP_ASKING:g} s; performers that were heard: {others}"
+                        self._lose(deal, why)
+                    elif deal.asked is None or now - deal.asked >= ASK_EVERY:
+                        deal.asked = now
+                        self._tell(REQUEST, deal, "elbowroom")
+                    continue
+                heard = self._heard.get(deal.performer)
+                if heard is not None and now - max(heard, deal.since) > LOST_AFTER:
+                    self._lose(deal, f"{deal.performer} is lost: nothing was heard of it for {LOST_AFTER:g} s")
+
+    def _lose(self, deal, why):
+        del self._deals[deal.key]
+        if deal.performer is not None:
+            # In case it is there all the same.
+            self._tell(CANCEL, deal, deal.performer)
+        deal.action.failed(why)
+
+    def _tell(self, kind, deal, node):
+        self._send(kind, node, deal.action.name, list(deal.action.arguments))
+
+
+def main():
+    import rclpy
+    from plansys2_msgs.msg import ActionExecution, ActionPerformerStatus
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+    rclpy.init()
+    node = rclpy.create_node("elbowroom")
+    qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+    publisher = node.create_publisher(ActionExecution, "actions_hub", qos)
+
+    def send(kind, who, action, arguments):
+        publisher.publish(ActionExecution(type=kind, node_id=who, action=action, arguments=arguments))
+
+    hub = Hub(send)
+    node.create_subscription(ActionExecution, "actions_hub", hub.message, qos)
+    node.create_subscription(ActionPerformerStatus, "performers_status", hub.status, qos)
+    node.create_timer(0.2, hub.tick)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    threading.Thread(target=executor.spin, daemon=True).start()
+
+    # Time begins when performers are there: what is asked for before that is lost to discovery.
+    patience = float(os.environ.get("ELBOWROOM_PERFORMERS_WITHIN", "10"))
+    begun = time.monotonic()
+    while not hub.performers() and time.monotonic() - begun < patience:
+        time.sleep(0.1)
+    print(f"performers: {', '.join(hub.performers()) or 'none has been heard'}", file=sys.stderr)
+
+    world = World("plansys2", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
+    world.starter("*")(hub.begin)
+    world.canceller(hub.cancel)
+    world.run()
+    # What was told to stop is to hear of it.
+    time.sleep(0.2)
+    executor.shutdown()
+    rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
