@@ -1,9 +1,9 @@
 """A world for `elbowroom run --world-process "python3 clients/python/example_world.py"`: on the wall clock,
-at 20 times its speed. In place of a robot, each action sleeps."""
+at ten times its speed. In place of a robot, each action sleeps."""
 
 from elbowroom_world import World
 
-world = World("sleeper", speed=20)
+world = World("sleeper", speed=10)
 
 
 @world.action("*")
