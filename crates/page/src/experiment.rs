@@ -40,21 +40,14 @@ pub(crate) fn timed(results: &Results) -> Document {
         .flatten()
         .map(|cell| cell.runs)
         .sum::<u64>();
-    Document {
-        title: results.title.clone(),
-        verdict: Verdict {
-            tone: Tone::Plain,
-            words: made(runs, "runs", results.is_interrupted),
-        },
-        facts: facts(
-            results.trials,
-            results.shards,
-            &results.parts,
-            &results.fingerprint,
-        ),
-        sections,
-        texts: Vec::new(),
-    }
+    let facts = facts(
+        results.trials,
+        results.shards,
+        &results.parts,
+        &results.fingerprint,
+    );
+    let made = made(runs, "runs", results.is_interrupted);
+    document(&results.title, made, facts, sections)
 }
 
 /// The page about an experiment in worlds without time.
@@ -118,18 +111,29 @@ pub(crate) fn untimed(results: &PerturbedResults) -> Document {
         .iter()
         .map(|row| row.success.count)
         .sum::<u64>();
+    let facts = facts(
+        results.trials,
+        results.shards,
+        &results.parts,
+        &results.fingerprint,
+    );
+    let made = made(trials, "trials", results.is_interrupted);
+    document(&results.title, made, facts, sections)
+}
+
+fn document(
+    title: &str,
+    made: String,
+    facts: Vec<(String, String)>,
+    sections: Vec<Section>,
+) -> Document {
     Document {
-        title: results.title.clone(),
+        title: title.to_owned(),
         verdict: Verdict {
             tone: Tone::Plain,
-            words: made(trials, "trials", results.is_interrupted),
+            words: made,
         },
-        facts: facts(
-            results.trials,
-            results.shards,
-            &results.parts,
-            &results.fingerprint,
-        ),
+        facts,
         sections,
         texts: Vec::new(),
     }

@@ -31,6 +31,7 @@
 //! ```
 
 mod belief;
+mod clock;
 pub mod document;
 mod experiment;
 mod html;

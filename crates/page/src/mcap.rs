@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
+use crate::clock::nanoseconds;
 use crate::document::{Chart, Document, Section, Text};
 
 /// The document of a run as an MCAP file; `None` if it has no run.
@@ -277,12 +278,3 @@ fn word(name: &str) -> String {
 }
 
 const NANOSECONDS: u64 = 1_000_000_000;
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "casts of floats saturate, and no run lasts for centuries"
-)]
-fn nanoseconds(seconds: f64) -> u64 {
-    (seconds * 1e9).round() as u64
-}

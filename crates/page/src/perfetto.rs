@@ -4,6 +4,7 @@
 //! track do not overlap, as the format asks. Numbers are counters, moments and decisions are instants,
 //! and what the plan orders is joined by flows. The field numbers are those of `perfetto_trace.proto`.
 
+use crate::clock::nanoseconds;
 use crate::document::{Bar, Chart, Document, Section, Series, Text};
 
 /// The document of a run as a Perfetto trace; `None` if it has no run.
@@ -248,15 +249,6 @@ fn flows(chart: &Chart) -> Vec<Flows> {
         }
     }
     flows
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "casts of floats saturate, and no run lasts for centuries"
-)]
-fn nanoseconds(seconds: f64) -> u64 {
-    (seconds * 1e9).round() as u64
 }
 
 /// A message of Protocol Buffers.

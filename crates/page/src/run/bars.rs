@@ -1,5 +1,7 @@
 //! Plans and what was done, action by action.
 
+mod drawn;
+
 use std::collections::{BTreeMap, VecDeque};
 
 use elbowroom::answers::envelope::timeline::WindowAnswer;
@@ -7,12 +9,9 @@ use elbowroom::num::Rational;
 use elbowroom::report::line::{
     BoundLine, DecisionLine, ExecutedLine, GivenLine, ObservationLine, PlanLine, WindowLine,
 };
-use elbowroom::report::short::nearest;
 use elbowroom::report::trace::Line;
 
 use super::windows::Windows;
-use crate::document::{Bar, Mark, Table, Text};
-use crate::plan::{band, window_words};
 
 /// What has been read of plans and starts so far.
 #[derive(Default)]
@@ -260,32 +259,6 @@ impl Bars {
         }
     }
 
-    /// What the plans order, by the positions of [`Bars::drawn`].
-    pub(super) fn drawn_orderings(&self) -> Vec<(usize, usize)> {
-        let mut bars = vec![None; self.steps.len()];
-        for (bar, start) in self.starts.values().enumerate() {
-            if let Some(step) = start.step {
-                bars[step] = Some(bar);
-            }
-        }
-        let waiting = self
-            .steps
-            .iter()
-            .enumerate()
-            .filter(|(_, step)| !step.is_ordered);
-        for (bar, (step, _)) in (self.starts.len()..).zip(waiting) {
-            bars[step] = Some(bar);
-        }
-        let mut drawn: Vec<(usize, usize)> = self
-            .orderings
-            .iter()
-            .filter_map(|&(from, to)| bars[from].zip(bars[to]))
-            .collect();
-        drawn.sort_unstable();
-        drawn.dedup();
-        drawn
-    }
-
     /// The step that a command carries out: commands come in the order of their decision.
     fn next_ordered(&mut self, action: &str) -> Option<usize> {
         let position = self
@@ -296,207 +269,9 @@ impl Bars {
         self.steps[step].is_ordered = true;
         Some(step)
     }
-
-    /// The names of the plans, if there are several.
-    pub(super) fn plan_names(&self) -> Vec<String> {
-        let names = self.plans.iter().enumerate().map(|(index, since)| {
-            let since = nearest(since);
-            match index {
-                0 => format!("first plan, from {since}"),
-                _ => format!("plan {}, from {since}", index + 1),
-            }
-        });
-        let names: Vec<String> = names.collect();
-        if names.len() > 1 { names } else { Vec::new() }
-    }
-
-    /// The moments at which a plan was given up.
-    pub(super) fn events(&self) -> impl Iterator<Item = Mark> + '_ {
-        self.given_up.iter().map(|(time, words)| Mark {
-            at: time.to_f64(),
-            name: format!("plan given up: {words}"),
-            is_event: true,
-        })
-    }
-
-    /// Everything as bars: starts in order, and then the steps that were not started.
-    pub(super) fn drawn(&self, now: &Rational) -> Vec<Bar> {
-        let starts = self.starts.values().map(|start| self.started(start, now));
-        let waiting = self.steps.iter().filter(|step| !step.is_ordered);
-        starts.chain(waiting.map(not_started)).collect()
-    }
-
-    fn started(&self, start: &Start, now: &Rational) -> Bar {
-        let step = start.step.map(|step| &self.steps[step]);
-        let begun = start.started.as_ref();
-        let end = start.ended.as_ref().or(begun.map(|_| now));
-        let outcome = match (&start.outcome, begun) {
-            (Some(outcome), _) => known(outcome),
-            (None, Some(_)) => "running",
-            (None, None) => "ordered",
-        };
-        let mut details: Vec<(&'static str, Text)> = Vec::new();
-        if let Some(step) = step {
-            details.push(("planned", step.words().into()));
-        }
-        if let Some(begun) = begun {
-            let until = start.ended.as_ref().map_or_else(|| "…".to_owned(), nearest);
-            details.push(("was done", format!("{} to {until}", nearest(begun)).into()));
-        }
-        if let (Some(begun), Some(ended)) = (begun, &start.ended) {
-            let took = nearest(&(ended - begun));
-            details.push((
-                "took",
-                match &start.planned {
-                    Some(planned) => format!("{took}, planned {}", nearest(planned)).into(),
-                    None => took.into(),
-                },
-            ));
-        }
-        let why = start.why.as_deref().unwrap_or_default();
-        let words = match (outcome, why) {
-            ("ordered", _) => format!("ordered at {}, nothing heard", nearest(&start.ordered)),
-            (outcome, "") => outcome.to_owned(),
-            (outcome, why) => format!("{outcome}: {why}"),
-        };
-        details.push(("outcome", words.into()));
-        for (label, due) in [
-            ("start was due", &start.due),
-            ("end was due", &start.end_due),
-        ] {
-            if let Some(words) = window_words(&answer(due)) {
-                details.push((label, words.into()));
-            }
-        }
-        Bar {
-            name: start.action.clone(),
-            planned: step.map(Step::span),
-            actual: begun
-                .zip(end)
-                .map(|(begun, end)| (begun.to_f64(), end.to_f64())),
-            outcome,
-            starts: limited(&start.due),
-            ends: limited(&start.end_due).or_else(|| step.and_then(|it| band(&it.end_window))),
-            plan: step.map_or(0, |step| step.plan),
-            details,
-            ..Bar::default()
-        }
-    }
-
-    /// What was planned beside what was done.
-    pub(super) fn table(&self) -> Table {
-        let columns = [
-            ("action", false),
-            ("planned start", true),
-            ("start", true),
-            ("planned end", true),
-            ("end", true),
-            ("outcome", false),
-        ];
-        let number =
-            |value: Option<&Rational>| -> Text { value.map(nearest).unwrap_or_default().into() };
-        let mut rows = Vec::new();
-        for start in self.starts.values() {
-            let step = start.step.map(|step| &self.steps[step]);
-            let outcome = start.outcome.as_deref();
-            let unknown = if start.started.is_some() {
-                "running"
-            } else {
-                "ordered"
-            };
-            rows.push(vec![
-                start.action.as_str().into(),
-                number(step.map(|step| &step.start)),
-                number(start.started.as_ref()),
-                number(step.and_then(|step| step.end.as_ref())),
-                number(start.ended.as_ref()),
-                match &start.why {
-                    Some(why) => format!("{}: {why}", outcome.unwrap_or(unknown)).into(),
-                    None => outcome.unwrap_or(unknown).into(),
-                },
-            ]);
-        }
-        for step in self.steps.iter().filter(|step| !step.is_ordered) {
-            rows.push(vec![
-                step.action.as_str().into(),
-                number(Some(&step.start)),
-                "".into(),
-                number(step.end.as_ref()),
-                "".into(),
-                "not started".into(),
-            ]);
-        }
-        let has_plan = !self.steps.is_empty();
-        Table {
-            heading: if has_plan {
-                "Planned and done"
-            } else {
-                "What was done"
-            }
-            .to_owned(),
-            columns: columns
-                .map(|(name, is_number)| (name.to_owned(), is_number))
-                .to_vec(),
-            bars: (0..rows.len()).collect(),
-            rows,
-            ..Table::default()
-        }
-    }
 }
 
-impl Step {
-    fn span(&self) -> (f64, f64) {
-        let end = self.end.as_ref().unwrap_or(&self.start);
-        (self.start.to_f64(), end.to_f64())
-    }
-
-    fn words(&self) -> String {
-        match &self.end {
-            Some(end) => format!("{} to {}", nearest(&self.start), nearest(end)),
-            None => nearest(&self.start),
-        }
-    }
-}
-
-fn not_started(step: &Step) -> Bar {
-    let mut details: Vec<(&'static str, Text)> = vec![("planned", step.words().into())];
-    let windows = [
-        ("may start at", &step.start_window),
-        ("may end at", &step.end_window),
-    ];
-    for (label, window) in windows {
-        if let Some(words) = window_words(window) {
-            details.push((label, words.into()));
-        }
-    }
-    details.push(("outcome", "not started".into()));
-    Bar {
-        name: step.action.clone(),
-        planned: Some(step.span()),
-        outcome: "not-started",
-        starts: band(&step.start_window),
-        ends: band(&step.end_window),
-        plan: step.plan,
-        details,
-        ..Bar::default()
-    }
-}
-
-/// A window for drawing, if there is a limit to it.
-fn limited(due: &WindowLine) -> Option<(Option<f64>, Option<f64>)> {
-    band(&answer(due)).filter(|(_, latest)| latest.is_some())
-}
-
-/// An outcome that traces can have.
-fn known(outcome: &str) -> &'static str {
-    match outcome {
-        "succeeded" => "succeeded",
-        "failed" => "failed",
-        "cancelled" => "cancelled",
-        _ => "unknown",
-    }
-}
-
+/// A window of the trace as one of an answer.
 pub(super) fn answer(window: &WindowLine) -> WindowAnswer {
     WindowAnswer {
         earliest: window.earliest.clone(),

@@ -1,32 +1,10 @@
 // Opens pages in a real browser, and compares what is on them with the documents they were made of.
-//
-//   node pages.cjs ELBOWROOM CASES WORK [CHROMIUM]
-//
-// ELBOWROOM is the command, CASES the folder of that name, WORK a folder for what is made here. Wants
-// `playwright-core` and `axe-core` from npm on NODE_PATH. With SCREENSHOTS=DIR it also writes pictures.
 
 "use strict";
 const assert = require("node:assert/strict");
-const { execFileSync, spawnSync } = require("node:child_process");
 const fs = require("node:fs");
 const path = require("node:path");
-const { pathToFileURL } = require("node:url");
-const { chromium } = require("playwright-core");
-
-const paths = process.argv.map((it, index) => (index > 1 ? path.resolve(it) : it));
-const [, , elbowroom, cases, work, executablePath = "/usr/bin/chromium"] = paths;
-const screenshots = process.env.SCREENSHOTS;
-fs.mkdirSync(work, { recursive: true });
-
-const file = (name) => path.join(work, name);
-const pddl = (name) => ["domain.pddl", "problem.pddl"].map((it) => path.join(cases, name, it));
-// Exit code 1 says that the answer is no, which is an answer.
-const run = (...args) => {
-  const done = spawnSync(elbowroom, args, { encoding: "utf8", maxBuffer: 1 << 28 });
-  assert.ok(done.status === 0 || done.status === 1, `${args.join(" ")}: ${done.stderr}`);
-  return done.stdout;
-};
-const page = (name, input) => { run("report", input, "-o", file(name)); return file(name); };
+const { accessible, cases, cellsOf, close, file, open, page, pddl, rowsOf, run, screenshots, start, test } = require("./harness.cjs");
 
 const delivery = pddl("delivery"), plan = path.join(cases, "delivery/plan.plan");
 const world = `format = "elbowroom-world"
@@ -39,29 +17,6 @@ relative = true
 action = "pick"
 probability = 0.1
 `;
-
-let browser;
-const tests = [];
-const test = (name, body) => tests.push([name, body]);
-
-// A tab in which nothing goes wrong unseen, and which reaches nothing.
-async function open(name, options = {}) {
-  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, offline: true, ...options });
-  const tab = await context.newPage();
-  tab.wrong = [];
-  tab.on("pageerror", (error) => tab.wrong.push(String(error)));
-  tab.on("console", (message) => { if (message.type() === "error") tab.wrong.push(message.text()); });
-  tab.on("request", (request) => { if (!request.url().startsWith("file:")) tab.wrong.push(`asks for ${request.url()}`); });
-  await tab.goto(pathToFileURL(name).href);
-  await tab.waitForFunction(() => document.documentElement.dataset.ready === "true");
-  return tab;
-}
-async function close(tab) {
-  assert.deepEqual(tab.wrong, []);
-  await tab.context().close();
-}
-const rowsOf = (tab, heading) => tab.locator("section", { has: tab.locator("h2", { hasText: heading }) }).locator("tbody tr");
-const cellsOf = (rows) => rows.evaluateAll((all) => all.map((row) => [...row.cells].map((cell) => cell.textContent)));
 
 test("the intervals on the page are those of the document", async () => {
   const text = run("envelope", ...delivery, plan, "--json");
@@ -252,16 +207,11 @@ test("hostile names and texts are shown as text", async () => {
 });
 
 test("no page is wider than a telephone, and none has what axe objects to", async () => {
-  const axe = fs.readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
   for (const name of ["envelope", "run", "experiment", "hostile"]) {
     for (const width of [1280, 400]) {
       for (const colorScheme of ["light", "dark"]) {
         const tab = await open(file(`${name}.html`), { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });
-        const over = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-        assert.ok(over <= 0, `${name} at ${width}: ${over} px too wide`);
-        await tab.evaluate(axe);
-        const { violations } = await tab.evaluate(() => axe.run());
-        assert.deepEqual(violations.map((it) => `${it.id}: ${it.nodes.map((node) => node.html.slice(0, 200)).join(" | ")}`), [], `${name} at ${width}, ${colorScheme}`);
+        await accessible(tab, `${name} at ${width}, ${colorScheme}`);
         if (screenshots) await tab.screenshot({ path: path.join(screenshots, `${name}-${width}-${colorScheme}.png`), fullPage: true });
         await close(tab);
       }
@@ -350,19 +300,4 @@ test("the same input gives the same bytes", async () => {
   assert.equal(run("report", file("run.jsonl")), fs.readFileSync(file("run.html"), "utf8"));
 });
 
-(async () => {
-  browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
-  let failed = 0;
-  for (const [name, body] of tests) {
-    try {
-      await body();
-      console.log(`ok  ${name}`);
-    } catch (error) {
-      failed += 1;
-      console.log(`NOT ${name}\n${error.stack}`);
-    }
-  }
-  await browser.close();
-  console.log(failed ? `${failed} of ${tests.length} failed` : `all ${tests.length} hold`);
-  process.exit(failed ? 1 : 0);
-})();
+start();
