@@ -20,8 +20,8 @@ use elbowroom_stn::{ConsistentNetwork, Constraint};
 /// Says in words what was found out about one plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Explainer<'a> {
-    task: &'a Task,
-    plan: &'a ParametrizedPlan,
+    pub(crate) task: &'a Task,
+    pub(crate) plan: &'a ParametrizedPlan,
 }
 
 /// Why a plan does not work somewhere.

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use elbowroom::answers::envelope::Inequalities;
 use serde::Serialize;
 
 /// A page.
@@ -100,6 +101,8 @@ pub enum Section {
     Rates(Rates),
     /// Numbers over time.
     Series(Series),
+    /// Quantities to change, and what comes of it.
+    Sliders(Sliders),
     /// Sentences.
     Prose(Prose),
 }
@@ -281,6 +284,45 @@ pub struct SeriesLine {
     pub points: Vec<(f64, f64)>,
     /// Its first, least, greatest and last value.
     pub words: String,
+}
+
+/// Quantities to change. Whether the plan works with the values chosen is worked out on the page, in whole
+/// numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Sliders {
+    /// The heading.
+    pub heading: String,
+    /// What there is to say about them.
+    pub note: String,
+    /// One for each quantity.
+    pub sliders: Vec<Slider>,
+    /// For each bar of the first chart, the time points of its start and end.
+    pub bars: Vec<(usize, usize)>,
+    /// What these bars are called.
+    pub names: Vec<Text>,
+    /// What every schedule has to satisfy.
+    pub system: Inequalities,
+}
+
+/// A quantity to change. Numbers are exact.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Slider {
+    /// The parameter's name.
+    pub name: String,
+    /// What it is.
+    pub quantity: String,
+    /// The value as planned.
+    pub nominal: String,
+    /// The lower end of its interval in the envelope, in words.
+    pub lower: String,
+    /// The upper end.
+    pub upper: String,
+    /// Where the slider begins.
+    pub from: String,
+    /// Where it ends.
+    pub to: String,
+    /// The least change.
+    pub step: String,
 }
 
 /// Sentences.

@@ -14,6 +14,8 @@ const SCRIPTS: &[&str] = &[
     include_str!("script/chart.js"),
     include_str!("script/scrub.js"),
     include_str!("script/plots.js"),
+    include_str!("script/points.js"),
+    include_str!("script/sliders.js"),
     include_str!("script/page.js"),
 ];
 

@@ -5,7 +5,8 @@
 //! mail. It knows no files, no clock and no command line, and the same input gives the same bytes.
 //!
 //! What is read on a page was worked out here, from exact numbers; the script in it draws, filters and
-//! moves through time, and computes nothing that somebody could rely on. Names and other texts that
+//! moves through time. The one thing that it decides is whether a plan works with the values of its
+//! sliders, and it does so in whole numbers (`script/points.js`). Names and other texts that
 //! come from outside are data: they reach the page in a block of JSON, and the script only ever shows
 //! them as text.
 //!

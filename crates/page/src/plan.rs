@@ -1,9 +1,11 @@
 //! A plan, with its envelope if there is one.
 
+mod sliders;
 mod tables;
 
 use std::collections::BTreeMap;
 
+use elbowroom::answers::Exact;
 use elbowroom::answers::envelope::timeline::{TimedAction, Timeline, WindowAnswer};
 use elbowroom::answers::envelope::{
     Counterexample, EnvelopeAnswer, EnvelopeFinding, Failing, Room, Stop,
@@ -15,6 +17,7 @@ use crate::document::{
     Bar, Chart, Document, Mark, Prose, Section, Table, Text, Texts, Tone, Verdict,
 };
 use crate::lanes::{Lanes, Occupant, lanes};
+use sliders::sliders;
 use tables::{ends, quantities, ranges, rooms, times};
 
 /// The page about an envelope.
@@ -34,11 +37,16 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
             stop,
             checks,
             timeline,
+            inequalities,
             ..
         } => {
             facts.push(("boxes checked".to_owned(), checks.to_string()));
             if let Some(timeline) = timeline {
                 sections.push(Section::Chart(chart(timeline, parameters, &mut texts)));
+                let sliders = inequalities
+                    .as_ref()
+                    .and_then(|it| sliders(timeline, parameters, it));
+                sections.extend(sliders.map(Section::Sliders));
             }
             sections.push(Section::Table(rooms(parameters, &mut texts)));
             sections.extend(timeline.as_ref().map(|it| Section::Table(times(it))));
@@ -112,22 +120,11 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
             if let Some(metric) = metric {
                 facts.push(("metric".to_owned(), nearest(metric)));
             }
-            let actions = steps.iter().map(|step| TimedAction {
-                instance: String::new(),
-                action: step.action.clone(),
-                start: step.start.clone(),
-                end: step
-                    .duration
-                    .as_ref()
-                    .map(|it| (&step.start.0 + &it.0).into()),
-                start_window: WindowAnswer::default(),
-                end_window: None,
-                parameter: None,
-            });
-            let timeline = Timeline {
-                actions: actions.collect(),
-                ..Timeline::default()
-            };
+            let timeline = fixed(steps.iter().map(|step| {
+                let duration = step.duration.as_ref();
+                let end = duration.map(|it| (&step.start.0 + &it.0).into());
+                ("", step.action.as_str(), step.start.clone(), end)
+            }));
             sections.push(Section::Chart(chart(&timeline, &[], &mut texts)));
             sections.push(Section::Table(times(&timeline)));
             if let Some(repaired) = repaired {
@@ -154,6 +151,23 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
     }
 }
 
+/// Actions with fixed times: label, name, start and end of each.
+fn fixed<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exact>)>) -> Timeline {
+    let actions = actions.map(|(instance, action, start, end)| TimedAction {
+        instance: instance.to_owned(),
+        action: action.to_owned(),
+        start,
+        end,
+        start_window: WindowAnswer::default(),
+        end_window: None,
+        parameter: None,
+    });
+    Timeline {
+        actions: actions.collect(),
+        ..Timeline::default()
+    }
+}
+
 /// What goes wrong, as sentences and as a schedule.
 fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     let mut paragraphs = vec![example.message.clone()];
@@ -164,27 +178,22 @@ fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     paragraphs.extend(example.plays.iter().cloned());
     let mut sections = vec![prose("What can go wrong", paragraphs)];
     if !example.schedule.is_empty() {
-        let actions = example.schedule.iter().map(|happening| TimedAction {
-            instance: happening.instance.clone(),
-            action: happening.action.clone(),
-            start: happening.start.clone(),
-            end: happening.end.clone(),
-            start_window: WindowAnswer::default(),
-            end_window: None,
-            parameter: None,
-        });
-        let timeline = Timeline {
-            actions: actions.collect(),
-            ..Timeline::default()
-        };
+        let timeline = fixed(example.schedule.iter().map(|happening| {
+            let (start, end) = (happening.start.clone(), happening.end.clone());
+            (
+                happening.instance.as_str(),
+                happening.action.as_str(),
+                start,
+                end,
+            )
+        }));
         let mut chart = chart(&timeline, &[], texts);
         "A schedule that fails".clone_into(&mut chart.heading);
         sections.push(Section::Chart(chart));
     }
     if !example.values.is_empty() {
-        let row = |(name, value): (&String, &elbowroom::answers::Exact)| {
-            vec![name.as_str().into(), nearest(&value.0).into()]
-        };
+        let row =
+            |(name, value): (&String, &Exact)| vec![name.as_str().into(), nearest(&value.0).into()];
         sections.push(Section::Table(Table {
             heading: "The values with which it fails".to_owned(),
             columns: vec![("parameter".to_owned(), false), ("value".to_owned(), true)],
@@ -277,7 +286,7 @@ pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
 
 /// A window for drawing; `None` if it has no end on either side.
 pub(crate) fn band(window: &WindowAnswer) -> Option<(Option<f64>, Option<f64>)> {
-    let decimal = |end: &Option<elbowroom::answers::Exact>| end.as_ref().map(|it| it.0.to_f64());
+    let decimal = |end: &Option<Exact>| end.as_ref().map(|it| it.0.to_f64());
     let band = (decimal(&window.earliest), decimal(&window.latest));
     (band != (None, None)).then_some(band)
 }

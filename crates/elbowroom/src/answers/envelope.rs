@@ -5,6 +5,7 @@ mod balance;
 mod best;
 mod conditions;
 mod foresight;
+mod inequalities;
 mod limits;
 mod search;
 pub mod timeline;
@@ -31,6 +32,7 @@ pub use balance::{Balance, Deviation};
 pub use best::Best;
 pub use conditions::Conditions;
 pub use foresight::Foresight;
+pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use timeline::Timeline;
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.

@@ -1,7 +1,7 @@
 //! Why a plan has no schedule: what takes too long, and what it must fit into.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Constraint, NodeId, Origin, Reason, StnPlan, Valuation};
+use elbowroom_plan::{Constraint, NodeId, Origin, Reason, Side, StnPlan, Valuation};
 
 use super::Explainer;
 
@@ -73,6 +73,20 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
         reason,
         excess: -cycle.total,
     })
+}
+
+impl Explainer<'_> {
+    /// What takes at least so long, or what it has to fit into, at the nominal values; `None` for mere
+    /// orderings.
+    pub(crate) fn bound_words(&self, constraint: &Constraint, side: Side) -> Option<String> {
+        let nominal = self.plan.nominal();
+        match side {
+            Side::Lower => need(self, constraint, &nominal),
+            Side::Upper => Some(match room(self, constraint, Edge::Beginning, &nominal) {
+                Room::Action(words) | Room::Limit(words) => words,
+            }),
+        }
+    }
 }
 
 /// The constraint that a chain of actions has to fit into.

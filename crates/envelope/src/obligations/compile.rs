@@ -35,7 +35,7 @@ impl Obligations {
     ///
     /// # Errors
     /// When something in the plan is beyond exact linear reasoning; the message names it.
-    pub(crate) fn compile(
+    pub fn compile(
         task: &Task,
         plan: &ParametrizedPlan,
         nominal: &Schedule,

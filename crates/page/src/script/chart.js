@@ -168,9 +168,20 @@ function chartView(chart, textOf, onPick) {
       element("button", { type: "button", "aria-label": "zoom in", onclick: () => zoomBy(1.6) }, "+"), " ",
       element("button", { type: "button", onclick: keys["0"] }, "fit")));
 
+  // Other times for the actions, and the planned ones again; what is described stays as planned.
+  const asPlanned = chart.bars.map(({ planned, starts, ends }) => ({ planned, starts, ends }));
+  const asPlannedEnd = chart.end;
+  const move = (spans) => {
+    const times = spans ?? asPlanned;
+    for (const [index, bar] of chart.bars.entries()) Object.assign(bar, times[index]);
+    chart.end = Math.max(asPlannedEnd, ...chart.bars.map((bar) => extent(bar)[1]));
+    layout = packed(chart.bars, chart.groupings, grouping, plan, spread);
+    repaint();
+  };
+
   describe();
   const node = element("section", {}, element("h2", {}, chart.heading), controls, legend(chart), scroll, panel, marksList(chart), guaranteeTable(chart));
-  return { node, pick: (index) => pick(index, true), paint, cursor: (time) => { cursor = time; repaint(); } };
+  return { node, pick: (index) => pick(index, true), paint, move, cursor: (time) => { cursor = time; repaint(); } };
 }
 
 // What the shapes mean; only those that occur.

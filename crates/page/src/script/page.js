@@ -28,6 +28,8 @@ for (const section of data.sections) {
     const view = seriesView(section);
     main.append(view.node);
     moving.push(view.at);
+  } else if (section.type === "sliders") {
+    main.append(slidersView(section, textOf, (spans) => firstChart?.view.move(spans)).node);
   } else {
     main.append(proseView(section));
   }

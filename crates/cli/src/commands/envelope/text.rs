@@ -110,6 +110,7 @@ fn envelope(
         parameters,
         makespans,
         timeline: _,
+        inequalities: _,
         stop,
         checks,
         widenings,

@@ -9,7 +9,7 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Subject, Timeline};
+use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Inequalities, Subject, Timeline};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
@@ -100,6 +100,9 @@ pub enum EnvelopeFinding {
         /// When each action happens, as planned and anywhere in the envelope.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         timeline: Option<Timeline>,
+        /// What every schedule has to satisfy, written out; only of plans that are not too large.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        inequalities: Option<Inequalities>,
         /// The makespan of the plan. Not in the document.
         #[serde(skip)]
         makespans: Option<Makespans>,

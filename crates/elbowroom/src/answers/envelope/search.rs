@@ -13,7 +13,7 @@ use super::conditions::Conditions;
 use super::foresight::foresight;
 use super::limits::what_limits;
 use super::timeline::Timeline;
-use super::{EnvelopeOutcome, Subject};
+use super::{EnvelopeOutcome, Inequalities, Subject};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher};
 use crate::flow::FlowError;
 
@@ -92,6 +92,7 @@ pub(super) fn search(
         conditions,
         foresight,
         timeline: Timeline::of(&subject.request.task, subject.plan, &envelope),
+        inequalities: Inequalities::of(&subject.explainer),
         makespans: Makespans::of(subject.plan, &envelope),
     });
     outcome.envelope = Some(envelope);

@@ -160,7 +160,7 @@ pub fn types<'a>(
 }
 
 /// The network with each parameter free within its interval.
-fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
+pub(super) fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
     let mut network = Network::with_nodes(plan.plan.nodes.len());
     let zero = network_node(NodeId::ZERO);
     for (node, _) in plan.plan.nodes().skip(1) {

@@ -1,0 +1,111 @@
+//! Quantities to change on the page of an envelope.
+
+use std::collections::BTreeMap;
+
+use elbowroom::answers::envelope::timeline::Timeline;
+use elbowroom::answers::envelope::{Inequalities, Room};
+use elbowroom::num::Rational;
+
+use super::tables::ends;
+use crate::document::{Slider, Sliders};
+
+/// More sliders than anybody would look through.
+const MOST: usize = 100;
+
+/// Sliders for the quantities of a plan; `None` if there are none, or too many.
+pub(super) fn sliders(
+    timeline: &Timeline,
+    rooms: &[Room],
+    inequalities: &Inequalities,
+) -> Option<Sliders> {
+    if rooms.is_empty() || rooms.len() > MOST {
+        return None;
+    }
+    let labels = inequalities.times.iter().enumerate();
+    let places: BTreeMap<&str, usize> = labels.map(|(place, it)| (it.as_str(), place)).collect();
+    let place = |label: String| places.get(label.as_str()).copied();
+    let bars = timeline.actions.iter().map(|action| match &action.end {
+        Some(_) => Some((
+            place(format!("{}.start", action.instance))?,
+            place(format!("{}.end", action.instance))?,
+        )),
+        None => {
+            let instant = place(action.instance.clone())?;
+            Some((instant, instant))
+        }
+    });
+    Some(Sliders {
+        heading: "What if?".to_owned(),
+        note: "Move a slider: the page works out exactly whether the plan still works when each quantity \
+               takes the value chosen here, and draws the plan at these values above."
+            .to_owned(),
+        sliders: rooms.iter().map(slider).collect(),
+        bars: bars.collect::<Option<_>>()?,
+        names: timeline
+            .actions
+            .iter()
+            .map(|action| action.action.as_str().into())
+            .collect(),
+        system: inequalities.clone(),
+    })
+}
+
+/// From half to five times the nominal value or, if the envelope reaches further, a bit further than that.
+fn slider(room: &Room) -> Slider {
+    let nominal = &room.range.quantity.nominal;
+    let half = Rational::new(1, 2);
+    let size = nominal.abs();
+    let size = if size.is_zero() { Rational::ONE } else { size };
+    let margin = &size * &Rational::new(1, 10);
+    let far = &size * &Rational::from(10);
+    let wider = |end: Option<&Rational>, side: Rational| {
+        let end = end.filter(|end| (*end - nominal).abs() <= far)?;
+        Some(end + &margin * side)
+    };
+    let from = nominal - &size * &half;
+    let from = match wider(room.range.lower.value(), Rational::from(-1)) {
+        Some(end) if end < from => end,
+        _ => from,
+    };
+    let from = if nominal.is_negative() || !from.is_negative() {
+        from
+    } else {
+        Rational::ZERO
+    };
+    let to = nominal + &size * &Rational::from(4);
+    let to = match wider(room.range.upper.value(), Rational::ONE) {
+        Some(end) if end > to => end,
+        _ => to,
+    };
+    let step = step(&((&to - &from) * Rational::new(1, 500)));
+    // Whole steps from zero, so that what is read is what is checked.
+    let down = |value: &Rational| (value / &step).floor() * &step;
+    let (lower, upper) = ends(&room.range);
+    Slider {
+        name: room.range.quantity.name.clone(),
+        quantity: room.range.quantity.quantity.clone(),
+        nominal: nominal.to_string(),
+        lower,
+        upper,
+        from: decimal(&down(&from)),
+        to: decimal(&(down(&to) + &step)),
+        step: decimal(&step),
+    }
+}
+
+/// The greatest of 1, 2 and 5 times a power of ten that is no greater, but not below a millionth.
+fn step(most: &Rational) -> Rational {
+    let ten = Rational::from(10);
+    let mut power = Rational::new(1, 1_000_000);
+    while &power * &ten <= *most {
+        power = &power * &ten;
+    }
+    let factors = [5, 2, 1].map(|factor| &power * Rational::from(factor));
+    let fitting = factors.into_iter().find(|step| step <= most);
+    fitting.unwrap_or(power)
+}
+
+/// A multiple of a millionth.
+fn decimal(value: &Rational) -> String {
+    value.to_decimal(6)
+}
