@@ -9,7 +9,9 @@ use elbowroom_plan::{
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Balance, Best, Conditions, EnvelopeRequest, Foresight, Inequalities, Subject, Timeline};
+use super::{
+    Balance, Best, Conditions, EnvelopeRequest, Foresight, Inequalities, Subject, Timeline,
+};
 use crate::answers::{Exact, Halt, Version, ViolationAnswer, exact};
 use crate::explain::{Explanation, Shortfall};
 use crate::makespan::earliest_end;
