@@ -141,6 +141,24 @@ def test_results_are_tables(whole: elbowroom.Comparison, tmp_path: Path) -> None
     assert table.num_rows == len(rows)
 
 
+@pytest.mark.parametrize("reader", ["pandas", "polars", "duckdb"])
+def test_the_parquet_of_a_campaign_is_read(
+    whole: elbowroom.Comparison, tmp_path: Path, reader: str
+) -> None:
+    pytest.importorskip("pyarrow")
+    library = pytest.importorskip(reader)
+    whole.write(tmp_path)
+    path = str(tmp_path / "results.parquet")
+    if reader == "duckdb":
+        asked = f"SELECT sum(runs), sum(successes) FROM '{path}'"
+        sums = library.connect().execute(asked).fetchone()
+    else:
+        frame = library.read_parquet(path)
+        sums = (frame["runs"].sum(), frame["successes"].sum())
+    rows = whole.rows()
+    assert tuple(sums) == (sum(row.runs for row in rows), sum(row.successes for row in rows))
+
+
 def test_progress_is_told() -> None:
     heard: list[elbowroom.Progress] = []
     elbowroom.compare(TABLE, trials=2, progress=heard.append)
