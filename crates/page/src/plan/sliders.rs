@@ -24,15 +24,13 @@ pub(super) fn sliders(
     let labels = inequalities.times.iter().enumerate();
     let places: BTreeMap<&str, usize> = labels.map(|(place, it)| (it.as_str(), place)).collect();
     let place = |label: String| places.get(label.as_str()).copied();
-    let bars = timeline.actions.iter().map(|action| match &action.end {
-        Some(_) => Some((
-            place(format!("{}.start", action.instance))?,
-            place(format!("{}.end", action.instance))?,
-        )),
-        None => {
+    let bars = timeline.actions.iter().map(|action| {
+        if action.end.is_none() {
             let instant = place(action.instance.clone())?;
-            Some((instant, instant))
+            return Some((instant, instant));
         }
+        let start = place(format!("{}.start", action.instance))?;
+        Some((start, place(format!("{}.end", action.instance))?))
     });
     Some(Sliders {
         heading: "What if?".to_owned(),
