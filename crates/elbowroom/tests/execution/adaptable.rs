@@ -170,3 +170,33 @@ fn a_failure_that_is_explained_by_what_was_seen_does_not_count() {
     assert_eq!(report.verdict, Verdict::Unsolvable);
     assert_eq!(report.reasons[0].cause, Cause::NoOrder, "{report:#?}");
 }
+
+#[test]
+fn what_is_not_certain_of_the_beginning_decides_what_is_tried_first() {
+    let domain = "
+        (define (domain house) (:requirements :durative-actions)
+          (:predicates (open-front) (open-back) (inside))
+          (:durative-action enter-front :parameters () :duration (= ?duration 1)
+            :condition (at start (open-front)) :effect (at end (inside)))
+          (:durative-action enter-back :parameters () :duration (= ?duration 1)
+            :condition (at start (open-back)) :effect (at end (inside))))";
+    let problem = "
+        (define (problem home) (:domain house) (:init (open-front) (open-back)) (:goal (inside)))";
+    let plan = "0: (enter-front) [1]\n2: (enter-back) [1]";
+    let first = |beliefs: &str| {
+        let chances = format!(
+            "defaults = {{ becomes_true = 0.0, becomes_false = 0.0, start = 1.0, effect = 1.0 }}\n{beliefs}"
+        );
+        let scene = Scene::new(domain, problem, Some(plan)).with_likelihoods(&chances);
+        let firsts = ["adaptable", "lookahead"].map(|executor| {
+            let report = scene.run(executor, &scene.world(""), 1);
+            assert_eq!(report.verdict, Verdict::GoalReached);
+            done(&report)[0].to_owned()
+        });
+        assert_eq!(firsts[0], firsts[1]);
+        firsts[0].clone()
+    };
+    assert_eq!(first(""), "enter-front");
+    assert_eq!(first("[beliefs]\nopen-front = 0.6\nopen-back = 0.9"), "enter-back");
+    assert_eq!(first("[beliefs]\nopen-front = 0.9\nopen-back = 0.6"), "enter-front");
+}

@@ -1,5 +1,6 @@
 //! `adaptable`: Olisipo, on a clock.
 
+mod initial;
 mod rest;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use crate::dispatch::replan;
 use crate::executor::{Decided, Executor, Mission, Moment, Planned, StepId};
 use crate::preparation::Need;
 use crate::reason::{About, Cause, Reason};
+use initial::Initial;
 use rest::Rest;
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -30,6 +32,7 @@ pub(super) const REGISTERED: Registered = Registered {
     need: Need::PartialOrder,
     make: |_, means| {
         Box::new(Adaptable {
+            initial: Initial::of(&means.likelihoods),
             likelihoods: means.likelihoods,
             foresight: None,
             state: None,
@@ -44,6 +47,8 @@ const SHORT: usize = 20;
 /// See [`REGISTERED`]. With foresight it is `lookahead`.
 pub(super) struct Adaptable {
     likelihoods: Arc<Likelihoods>,
+    /// What is not certain of the beginning; a new plan does not change that.
+    initial: Initial,
     foresight: Option<Foresight>,
     state: Option<Rest>,
 }
@@ -67,11 +72,15 @@ impl Executor for Adaptable {
             return super::without_plan();
         };
         for news in moment.news {
+            if !self.initial.is_empty() {
+                let task = moment.belief.task();
+                self.initial.learn(news, rest.action_of(news), task);
+            }
             if let Some(reason) = rest.learn(news, moment.belief, &self.likelihoods) {
                 return replan(reason);
             }
         }
-        rest.next(moment)
+        rest.next(moment, &self.initial)
     }
 
     fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
@@ -83,16 +92,19 @@ impl Adaptable {
     /// Looks ahead.
     pub(super) fn with_foresight(likelihoods: Arc<Likelihoods>, foresight: Foresight) -> Self {
         Self {
+            initial: Initial::of(&likelihoods),
             likelihoods,
             foresight: Some(foresight),
             state: None,
         }
     }
 
-    /// All that can be done in a small world, where nothing is under way; with the actions.
+    /// All that can be done in a small world, where nothing is under way and everything is known; with
+    /// the actions.
     fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
         let foresight = self.foresight.as_ref()?;
-        if !mission.running.is_empty() {
+        // A table is for who sees the state as it is.
+        if !mission.running.is_empty() || !self.initial.is_empty() {
             return None;
         }
         let table = foresight.table(&mission.task, &self.likelihoods)?;

@@ -12,6 +12,7 @@ use elbowroom_probability::search::Progress;
 use elbowroom_probability::{Choice, Circumstances, Likelihoods, NextHappening, Running};
 
 use super::super::chooser::Chooser;
+use super::initial::Initial;
 use crate::dispatch::replan;
 use crate::event::Ending;
 use crate::executor::{Decided, Decision, Mission, Moment, News, Order, Planned, StepId};
@@ -150,6 +151,15 @@ impl Rest {
         }
     }
 
+    /// The action that something new is about.
+    pub(super) fn action_of(&self, news: &News) -> Option<&Action> {
+        let (News::Started { step, .. } | News::Ended { step, .. }) = news else {
+            return None;
+        };
+        let (instance, _) = self.under_way.get(step)?;
+        Some(&self.steps[instance.index()].action)
+    }
+
     /// What is new, by name.
     fn named(&self, news: &News, belief: &Progression) -> Option<Behind> {
         let action = |step: &StepId| {
@@ -210,7 +220,7 @@ impl Rest {
     }
 
     /// The decision at this moment.
-    pub(super) fn next(&mut self, moment: &Moment<'_>) -> Decided {
+    pub(super) fn next(&mut self, moment: &Moment<'_>, initial: &Initial) -> Decided {
         if !self.let_go.is_empty() {
             return wait(None, About::EndOfCancelled);
         }
@@ -219,6 +229,7 @@ impl Rest {
         }
         let now = moment.now - &self.mission.origin;
         let mut circumstances = Circumstances::observed(now.clone(), &moment.belief.state());
+        initial.apply(moment.belief.task(), &mut circumstances.belief);
         let mut running: Vec<Running> = self
             .under_way
             .values()

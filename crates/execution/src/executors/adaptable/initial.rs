@@ -1,0 +1,171 @@
+//! What is not certain of the beginning, as long as nothing has told: [`Initial`].
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, Body, Change, Condition, FactId, SnapAction};
+use elbowroom_model::problem::{ObjectId, PredicateId};
+use elbowroom_probability::{Belief, Likelihoods};
+
+use crate::event::Ending;
+use crate::executor::News;
+
+/// How likely initial facts hold of which nothing has been heard since: the `[beliefs]` of a likelihood
+/// file. A fact is heard of when its change is reported, when an action has an effect on it, and when
+/// an action starts or ends that needs it then.
+#[derive(Clone, Debug)]
+pub(super) struct Initial(BTreeMap<(PredicateId, Vec<ObjectId>), f64>);
+
+impl Initial {
+    pub(super) fn of(likelihoods: &Likelihoods) -> Self {
+        Self(likelihoods.beliefs.clone())
+    }
+
+    /// Whether nothing is open.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Takes note of what is new; `action` is the one that it is about.
+    pub(super) fn learn(&mut self, news: &News, action: Option<&Action>, task: &Task) {
+        match (news, action) {
+            (News::Fact(fact), _) => self.is_known(task, *fact),
+            (News::Started { .. }, Some(action)) => match &action.body {
+                Body::Instantaneous(snap) => self.happened(task, snap),
+                Body::Durative(body) => self.happened(task, &body.start),
+            },
+            (News::Ended { ending, .. }, Some(action)) if *ending == Ending::Succeeded => {
+                if let Some(body) = action.durative() {
+                    self.needed(task, &body.over_all);
+                    self.happened(task, &body.end);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn happened(&mut self, task: &Task, snap: &SnapAction) {
+        self.needed(task, &snap.condition);
+        for effect in &snap.effects {
+            if let Change::Add(fact) | Change::Delete(fact) = effect.change {
+                self.is_known(task, fact);
+            }
+        }
+    }
+
+    /// What had to hold, held. Of a disjunction nobody knows which part.
+    fn needed(&mut self, task: &Task, condition: &Condition) {
+        for part in condition.conjuncts() {
+            match part {
+                Condition::Fact(fact) => self.held(task, *fact, true),
+                Condition::Not(part) => {
+                    if let Condition::Fact(fact) = **part {
+                        self.held(task, fact, false);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn held(&mut self, task: &Task, fact: FactId, truth: bool) {
+        let was = self.0.get_mut(&task.atom(fact));
+        if let Some(probability) = was {
+            *probability = f64::from(u8::from(truth));
+        }
+    }
+
+    /// From now on the fact is what reports and effects say.
+    fn is_known(&mut self, task: &Task, fact: FactId) {
+        self.0.remove(&task.atom(fact));
+    }
+
+    /// Brings in what is open still.
+    pub(super) fn apply(&self, task: &Task, belief: &mut Belief) {
+        for ((predicate, arguments), probability) in &self.0 {
+            if let Some(fact) = task.find_fact(*predicate, arguments) {
+                belief.set(fact, *probability);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use elbowroom_model::{Step, Task};
+    use elbowroom_num::Rational;
+    use elbowroom_pddl::{Source, read_plan, read_problem};
+    use elbowroom_probability::{Belief, Likelihoods, likelihoods};
+
+    use super::Initial;
+    use crate::event::Ending;
+    use crate::executor::{News, StepId};
+
+    /// Whoever lifts needs the crate closed throughout, and it is not on the floor afterwards.
+    fn scene() -> (Arc<Task>, Step, Likelihoods) {
+        let domain = Source::new(
+            "d",
+            "(define (domain d) (:requirements :negative-preconditions :durative-actions)
+               (:predicates (floor) (open) (here) (far))
+               (:durative-action lift :parameters () :duration (= ?duration 1)
+                 :condition (and (at start (here)) (over all (not (open))))
+                 :effect (at start (not (floor)))))",
+        );
+        let problem = Source::new(
+            "p",
+            "(define (problem p) (:domain d) (:init (floor) (here)) (:goal (and (not (floor)) (far))))",
+        );
+        let (problem, _) = read_problem(&domain, &problem).unwrap();
+        let task = Task::new(problem);
+        let (plan, _) = read_plan(&Source::new("x", "0: (lift) [1]"), &task).unwrap();
+        let text = "format = \"elbowroom-likelihoods\"\nversion = 1
+            defaults = { becomes_true = 0.0, becomes_false = 0.0, start = 1.0, effect = 1.0 }
+            beliefs = { floor = 0.9, here = 0.8, open = 0.3, far = 0.2 }";
+        let likelihoods = likelihoods::read(text, &task).unwrap();
+        (Arc::new(task), plan.steps[0].clone(), likelihoods)
+    }
+
+    fn believed(initial: &Initial, task: &Task) -> Vec<f64> {
+        let mut belief = Belief::certain(task.initial());
+        initial.apply(task, &mut belief);
+        let names = ["(floor)", "(here)", "(open)", "(far)"];
+        let facts = names.iter().map(|name| task.fact_named(name).unwrap());
+        facts.map(|fact| belief.probability(fact)).collect()
+    }
+
+    #[test]
+    fn a_fact_is_open_until_something_tells() {
+        let (task, step, likelihoods) = scene();
+        let mut initial = Initial::of(&likelihoods);
+        let close = |found: Vec<f64>, expected: [f64; 4]| {
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+            }
+        };
+        close(believed(&initial, &task), [0.9, 0.8, 0.3, 0.2]);
+        let started = News::Started {
+            step: StepId(0),
+            time: Rational::ZERO,
+            measured: Vec::new(),
+        };
+        initial.learn(&started, Some(&step.action), &task);
+        // It was here, and from now on its being on the floor is what effects and reports say: in the
+        // state of the beginning, it is.
+        close(believed(&initial, &task), [1.0, 1.0, 0.3, 0.2]);
+        let ended = |ending| News::Ended {
+            step: StepId(0),
+            time: Rational::ONE,
+            ending,
+            measured: Vec::new(),
+        };
+        initial.learn(&ended(Ending::Cancelled), Some(&step.action), &task);
+        close(believed(&initial, &task), [1.0, 1.0, 0.3, 0.2]);
+        initial.learn(&ended(Ending::Succeeded), Some(&step.action), &task);
+        close(believed(&initial, &task), [1.0, 1.0, 0.0, 0.2]);
+        let far = task.fact_named("(far)").unwrap();
+        initial.learn(&News::Fact(far), None, &task);
+        close(believed(&initial, &task), [1.0, 1.0, 0.0, 0.0]);
+    }
+}
