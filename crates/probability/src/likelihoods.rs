@@ -11,11 +11,26 @@ use elbowroom_model::Task;
 use elbowroom_model::ground::{Action, FactId};
 use elbowroom_model::problem::{ObjectId, PredicateId, Problem, SchemaId};
 
+use elbowroom_text::{Diagnostics, Source};
+
 use crate::belief::Belief;
 
 pub use authors::read as read_authors;
-pub use file::read;
 pub use write::write;
+
+/// Reads a likelihood file, in our own format or in that of Olisipo's authors: theirs has a line `-`
+/// between facts and actions, which ours cannot have.
+///
+/// # Errors
+/// All mistakes found: of syntax, of names, of numbers, and what is missing.
+pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
+    let source = source.into();
+    if source.text().lines().any(|line| line.trim() == "-") {
+        authors::read(source, task)
+    } else {
+        file::read(source, task)
+    }
+}
 
 /// The probabilities of a spontaneous change of a fact in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]

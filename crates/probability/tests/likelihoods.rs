@@ -62,6 +62,9 @@ fn the_more_specific_entry_counts() {
     let a = task.instantiate(shut, &[object("a")]).unwrap();
     let b = task.instantiate(shut, &[object("b")]).unwrap();
     assert_eq!(likelihoods.start(&a), Ok(0.75));
+    // Whoever asks for likelihoods need not know the format.
+    let known = elbowroom_probability::likelihoods::read(text.as_str(), &task);
+    assert_eq!(known.unwrap(), likelihoods);
     assert_eq!(likelihoods.start(&b), Ok(0.5));
     let fact = task.find_fact(open, &[object("b")]).unwrap();
     let flip = likelihoods.flip(&task, fact).unwrap();

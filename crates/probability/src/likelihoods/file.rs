@@ -19,7 +19,7 @@ pub(super) const VERSION: &str = "1";
 ///
 /// # Errors
 /// All mistakes found: of syntax, of names, of numbers, and what is missing.
-pub fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
+pub(super) fn read(source: impl Into<Source>, task: &Task) -> Result<Likelihoods, Diagnostics> {
     let source = source.into();
     let text = source.text();
     let (document, errors) = DeTable::parse_recoverable(text);
