@@ -127,6 +127,7 @@
 //! - [`flow`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
 //! - [`graph`]: networks as graphs for Graphviz.
+//! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches it.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
 //!   [`Shortfall`]).
 //! - [`parse_box`], [`write_box`]: boxes as text ([`BoxTextError`]).
@@ -163,6 +164,7 @@ mod makespan;
 pub mod network;
 mod plan_file;
 mod room;
+pub mod timed;
 
 pub use box_text::{BoxTextError, parse_box, write_box};
 pub use elbowroom_envelope as envelope;

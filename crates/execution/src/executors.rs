@@ -11,6 +11,7 @@ mod fixed;
 mod guarded;
 mod live;
 mod lookahead;
+mod policy;
 mod promise;
 mod stn;
 
@@ -25,6 +26,7 @@ pub use lookahead::Foresight;
 
 use crate::executor::{Decided, Decision, Executor};
 use crate::odds::Odds;
+use crate::outlook::Outlook;
 use crate::preparation::{Need, Region};
 use crate::reason::{About, Cause, Reason};
 
@@ -37,6 +39,7 @@ pub const EXECUTORS: &[Registered] = &[
     esterel::REGISTERED,
     adaptable::REGISTERED,
     lookahead::REGISTERED,
+    policy::REGISTERED,
 ];
 
 /// The registry entry of an executor: name, documentation and constructor.
@@ -69,6 +72,8 @@ pub struct Means {
     pub odds: Option<Box<dyn Odds>>,
     /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
     pub foresight: Foresight,
+    /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their plan.
+    pub outlook: Option<Arc<dyn Outlook>>,
 }
 
 impl Means {
@@ -87,6 +92,7 @@ impl<R: Region + 'static> From<Box<R>> for Means {
             likelihoods: Arc::new(Likelihoods::certain()),
             odds: None,
             foresight: Foresight::default(),
+            outlook: None,
         }
     }
 }
@@ -129,7 +135,12 @@ impl ExecutorSpec {
 
     /// Whether the executor looks for plans that are likelier to succeed.
     pub fn asks_odds(&self) -> bool {
-        self.registered.is_optional && self.argument.is_some()
+        self.asks_outlook() || (self.registered.is_optional && self.argument.is_some())
+    }
+
+    /// Whether the executor weighs each move, if somebody can tell it what it is worth.
+    pub fn asks_outlook(&self) -> bool {
+        self.registered.name == policy::REGISTERED.name
     }
 }
 
@@ -258,6 +269,7 @@ mod tests {
             "esterel",
             "adaptable",
             "lookahead",
+            "policy",
         ] {
             let spec: ExecutorSpec = text.parse().unwrap();
             assert_eq!(spec.to_string(), text);

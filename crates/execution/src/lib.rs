@@ -11,8 +11,8 @@
 //! - [`Recorder`]: records a run.
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
-//! [`Planner`], [`Preparer`], [`Region`] (what a plan survives) and [`Odds`] (how likely it is to
-//! succeed). It does not depend on their implementations; in particular it cannot reach a solver.
+//! [`Planner`], [`Preparer`], [`Region`] (what a plan survives), [`Odds`] (how likely it is to
+//! succeed) and [`Outlook`] (how likely the goal is by each move). It does not depend on their implementations; in particular it cannot reach a solver.
 //!
 //! ```
 //! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};
@@ -32,6 +32,7 @@ pub mod executors;
 mod forms;
 mod horizon;
 mod odds;
+mod outlook;
 mod planning;
 mod preparation;
 mod progression;
@@ -45,6 +46,7 @@ pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
 pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};
+pub use outlook::{Move, Outlook, Standing, Weighed};
 pub use planning::{NoPlanner, PlanAnswer, Planned as PlannerAnswer, Planner};
 pub use preparation::{Need, PrepareError, Prepared, Preparer, Region};
 pub use progression::{Progression, Underway, Unreadable};

@@ -29,9 +29,10 @@ pub mod answer;
 pub mod compare;
 pub mod perturbed;
 pub mod record;
-pub mod timed;
 pub mod untimed;
 pub mod worlds;
+
+pub use elbowroom::timed;
 
 /// Longer reading. Its code is compiled and run with the tests.
 pub mod tutorial {

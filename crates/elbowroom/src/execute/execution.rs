@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
 use elbowroom_execution::run::{Ports, Report, Run, RunSettings};
-use elbowroom_execution::{Executor, NoRecord, Odds, Planner, Preparer, Recorder, World};
+use elbowroom_execution::{Executor, NoRecord, Odds, Outlook, Planner, Preparer, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_probability::Likelihoods;
 
@@ -89,6 +89,7 @@ pub struct Execution<'a> {
     likelihoods: Arc<Likelihoods>,
     foresight: Foresight,
     odds: Option<Box<dyn Odds>>,
+    outlook: Option<Arc<dyn Outlook>>,
     planner: Option<Box<dyn Planner + 'a>>,
     preparer: Option<Box<dyn Preparer + 'a>>,
     recorder: Box<dyn Recorder + 'a>,
@@ -114,6 +115,7 @@ impl<'a> Execution<'a> {
             likelihoods: Arc::new(Likelihoods::certain()),
             foresight: Foresight::default(),
             odds: None,
+            outlook: None,
             planner: None,
             preparer: None,
             recorder: Box::new(NoRecord),
@@ -169,6 +171,11 @@ impl<'a> Execution<'a> {
         Self { odds, ..self }
     }
 
+    /// Goes by this outlook, in executors that weigh each move ([`ExecutorSpec::asks_outlook`]).
+    pub fn with_outlook(self, outlook: Option<Arc<dyn Outlook>>) -> Self {
+        Self { outlook, ..self }
+    }
+
     /// Has this planner make plans, not the embedded one with its usual limits
     /// ([`Embedded::default`]).
     pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
@@ -212,6 +219,7 @@ impl<'a> Execution<'a> {
                 likelihoods: self.likelihoods,
                 odds: self.odds,
                 foresight: self.foresight,
+                outlook: self.outlook,
             }),
         };
         let planner = self

@@ -197,6 +197,12 @@ fn what_is_not_certain_of_the_beginning_decides_what_is_tried_first() {
         firsts[0].clone()
     };
     assert_eq!(first(""), "enter-front");
-    assert_eq!(first("[beliefs]\nopen-front = 0.6\nopen-back = 0.9"), "enter-back");
-    assert_eq!(first("[beliefs]\nopen-front = 0.9\nopen-back = 0.6"), "enter-front");
+    assert_eq!(
+        first("[beliefs]\nopen-front = 0.6\nopen-back = 0.9"),
+        "enter-back"
+    );
+    assert_eq!(
+        first("[beliefs]\nopen-front = 0.9\nopen-back = 0.6"),
+        "enter-front"
+    );
 }

@@ -56,6 +56,8 @@ pub enum About {
     NextHappening,
     /// What is chosen is best of all that can be done; with the probability to succeed from here.
     BestOfAll(f64),
+    /// The next moment at which moves are weighed; with the probability to succeed from here.
+    NextDecision(f64),
     /// What is chosen is first of the order most likely to succeed; with that probability.
     FirstOfBestOrder(f64),
     /// What is chosen is next after the lattermost layer that fits.
@@ -129,6 +131,12 @@ impl fmt::Display for About {
                 return write!(
                     f,
                     "best of all that can be done (P = {probability:.4} from here)"
+                );
+            }
+            Self::NextDecision(probability) => {
+                return write!(
+                    f,
+                    "the next moment at which moves are weighed (P = {probability:.4} from here)"
                 );
             }
             Self::FirstOfBestOrder(probability) => {

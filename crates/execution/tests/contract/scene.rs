@@ -62,6 +62,7 @@ impl Scene {
             planner: Box::new(NoPlanner),
             preparer: Box::new(ByHand),
             executor: spec.build(Means {
+                outlook: None,
                 region: Box::new(Everywhere),
                 likelihoods: Arc::new(Likelihoods::certain()),
                 odds: None,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight};
 use elbowroom_execution::run::{PlanningTime, Report, Verdict};
-use elbowroom_execution::{PlanAnswer, Planner, Preparer};
+use elbowroom_execution::{Outlook, PlanAnswer, Planner, Preparer};
 use elbowroom_external as external;
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -20,6 +20,7 @@ use elbowroom::execute::{
     SharedLikeliest,
 };
 use elbowroom::flow;
+use elbowroom::timed::{Policy, Settings};
 
 use crate::record::{TrialRecord, TrialRecords};
 
@@ -56,6 +57,10 @@ struct Place {
     /// For executors that look for likelier plans: who makes them, and the same with a memory.
     odds: SharedLikeliest,
     likeliest: RememberingPlanner<SharedLikeliest>,
+    /// For executors that weigh each move.
+    outlook: Option<Arc<dyn Outlook>>,
+    /// The plan that they begin with: the likeliest.
+    likely: TimeTriggeredPlan,
 }
 
 impl Setting<'_> {
@@ -103,7 +108,7 @@ impl Setting<'_> {
         };
         let task = Arc::new(task);
         let columns = self.experiment.columns.iter();
-        let columns = columns.map(|column| self.place(column, &task, &first));
+        let columns = columns.map(|column| self.place(column, &task, &first, goes_on));
         Ok(Common {
             columns: columns.collect::<Result<_, _>>()?,
             planner: RememberingPlanner::new(planner, PLANS),
@@ -117,6 +122,7 @@ impl Setting<'_> {
         column: &Column,
         task: &Arc<Task>,
         first: &TimeTriggeredPlan,
+        goes_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<Place, ExperimentError> {
         let world = world(column, task)?;
         let likelihoods = match &column.likelihoods {
@@ -137,14 +143,31 @@ impl Setting<'_> {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
         };
+        let asks_outlook = self
+            .experiment
+            .executors
+            .iter()
+            .any(ExecutorSpec::asks_outlook);
+        let outlook = asks_outlook.then(|| {
+            let policy = Policy::new(task, &world, &Settings::default(), goes_on);
+            Some(Arc::new(policy.ok()??) as Arc<dyn Outlook>)
+        });
         let odds = Likeliest::new(world.clone(), self.embedded(), planning_time);
         let odds = SharedLikeliest::new(odds);
+        let mut likeliest = RememberingPlanner::new(odds.clone(), PLANS);
+        let likely =
+            match asks_outlook.then(|| likeliest.plan(task, &Situation::initial(task)).answer) {
+                Some(PlanAnswer::Plan(plan)) => plan,
+                _ => first.clone(),
+            };
         Ok(Place {
+            outlook: outlook.flatten(),
+            likely,
             world,
             likelihoods: Arc::new(likelihoods),
             foresight: Foresight::default(),
             preparer,
-            likeliest: RememberingPlanner::new(odds.clone(), PLANS),
+            likeliest,
             odds,
         })
     }
@@ -239,6 +262,8 @@ impl Setting<'_> {
             preparer,
             odds,
             likeliest,
+            outlook,
+            likely,
         } = &mut common.columns[column];
         let asks_odds = spec.asks_odds();
         let odds = asks_odds.then(|| Box::new(odds.clone()) as _);
@@ -248,12 +273,17 @@ impl Setting<'_> {
             &mut common.planner
         };
         Execution::of(&task)
-            .beginning_with(common.first.clone())
+            .beginning_with(if spec.asks_outlook() {
+                likely.clone()
+            } else {
+                common.first.clone()
+            })
             .by(spec.clone())
             .with_settings(settings.clone())
             .with_likelihoods(Arc::clone(likelihoods))
             .with_foresight(foresight.clone())
             .with_odds(odds)
+            .with_outlook(outlook.clone().filter(|_| spec.asks_outlook()))
             .planned_by(planner)
             .prepared_by(preparer)
             .run_in(&mut *world.world(&task, seed))

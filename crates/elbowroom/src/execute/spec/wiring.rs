@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use elbowroom_execution::executors::ExecutorSpec;
 use elbowroom_execution::run::PlanningTime;
-use elbowroom_execution::{Need, NoPlanner, Odds, Planner, PrepareError, Preparer, World};
+use elbowroom_execution::{Need, NoPlanner, Odds, Outlook, Planner, PrepareError, Preparer, World};
 use elbowroom_external::{self as external, PlannerError};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
@@ -14,6 +14,7 @@ use elbowroom_text::Diagnostics;
 
 use super::{EMBEDDED, NOBODY, RunSpec};
 use crate::execute::{Analyst, Embedded, Execution, External, Likeliest, Spoiling};
+use crate::timed::{Policy, Settings};
 use crate::{BoxTextError, parse_box};
 
 /// The time limit of another planner for its first plan.
@@ -173,7 +174,8 @@ impl RunSpec {
     /// When they do not.
     pub fn check(&self) -> Result<(), SpecError> {
         let whom = self.whom()?;
-        if !self.executor.asks_odds() {
+        // Who weighs moves goes by the plan where that cannot be done.
+        if !self.executor.asks_odds() || self.executor.asks_outlook() {
             return Ok(());
         }
         if self.world.is_none() && self.spoiler.is_none() {
@@ -213,6 +215,13 @@ impl RunSpec {
         self.check()?;
         let model = self.model(task.problem()).map_err(SpecError::World)?;
         let model = model.filter(|_| self.executor.asks_odds());
+        let outlook = model.as_ref().filter(|_| self.executor.asks_outlook());
+        let outlook = outlook.and_then(|model| {
+            let policy = Policy::new(task, model, &Settings::default(), &|| true);
+            Some(Arc::new(policy.ok()??) as Arc<dyn Outlook>)
+        });
+        let is_embedded = matches!(self.whom()?, Whom::Embedded);
+        let model = model.filter(|_| is_embedded);
         let odds = model.map(|model| {
             let time = self.expected_planning_time();
             Box::new(Likeliest::new(model, self.embedded(), time)) as Box<dyn Odds>
@@ -222,7 +231,8 @@ impl RunSpec {
             .with_settings(self.settings())
             .with_envelopes(self.envelopes())
             .with_likelihoods(self.likelihoods(task)?)
-            .with_odds(odds))
+            .with_odds(odds)
+            .with_outlook(outlook))
     }
 }
 

@@ -1,6 +1,7 @@
 //! From a task and a world file to facts as bits, actions and events.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use elbowroom_model::ground::{
     Action, Body, Change, Condition, DurativeBody, Effect, Expression, FactId, SnapAction,
@@ -231,6 +232,7 @@ impl Compiler<'_> {
         }
         Ok(Some(Act {
             name: name.clone(),
+            action: Arc::new(action.clone()),
             start,
             rest,
             planned,

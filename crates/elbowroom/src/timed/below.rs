@@ -11,7 +11,7 @@ use super::world::TimedWorld;
 const MOST_ORDERED: usize = 5;
 
 pub(super) struct Below<'a> {
-    world: &'a TimedWorld<'a>,
+    world: &'a TimedWorld,
     chances: &'a Chances,
 }
 
@@ -22,6 +22,32 @@ enum Happening {
     End(u8, bool),
     /// An event.
     Event(usize),
+}
+
+/// Something that the agent can do at a boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Move {
+    /// To start this action.
+    Start(usize),
+    /// To let the action at this place among those under way go.
+    Cancel(usize),
+    /// To do nothing until the next boundary.
+    Wait,
+}
+
+/// All that is worth looking at in a state in which the goal does not hold, and in which there is hope.
+pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
+    let startable = state.startable(world);
+    if state.must_start(world, &startable) {
+        return vec![Move::Start(startable[0])];
+    }
+    let running = state.running.iter().enumerate();
+    let cancelled = running.filter_map(|(place, running)| {
+        let act = &world.acts[usize::from(running.act)];
+        act.may_be_cancelled.then_some(Move::Cancel(place))
+    });
+    let started = startable.into_iter().map(Move::Start);
+    cancelled.chain(started).chain([Move::Wait]).collect()
 }
 
 /// What is being put together of one cell.
@@ -36,7 +62,7 @@ struct Cell<'c> {
 }
 
 impl<'a> Below<'a> {
-    pub(super) fn new(world: &'a TimedWorld<'a>, chances: &'a Chances) -> Self {
+    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances) -> Self {
         Self { world, chances }
     }
 
@@ -205,23 +231,30 @@ impl Cell<'_> {
         if !state.is_hopeful(world, self.hopes) {
             return Vec::new();
         }
-        let startable = state.startable(world);
-        if state.must_start(world, &startable) {
-            let after = state.started(world, startable[0], self.number, Phase::Goes);
-            return vec![vec![(1.0, vec![self.target(after)])]];
-        }
-        let mut choices = Vec::new();
-        for (place, running) in state.running.iter().enumerate() {
-            if world.acts[usize::from(running.act)].may_be_cancelled {
+        let moves = moves(world, state).into_iter();
+        moves.map(|choice| self.choice(state, choice)).collect()
+    }
+
+    /// What comes of a move.
+    fn choice(&mut self, state: &State, choice: Move) -> Choice {
+        let world = self.bound.world;
+        match choice {
+            Move::Cancel(place) => {
                 let mut after = state.clone();
                 after.running.remove(place);
-                choices.push(vec![(1.0, vec![self.target(after)])]);
+                vec![(1.0, vec![self.target(after)])]
             }
+            Move::Start(act) => {
+                let after = state.started(world, act, self.number, Phase::Goes);
+                vec![(1.0, vec![self.target(after)])]
+            }
+            Move::Wait => self.wait(state),
         }
-        for act in startable {
-            let after = state.started(world, act, self.number, Phase::Goes);
-            choices.push(vec![(1.0, vec![self.target(after)])]);
-        }
+    }
+
+    /// What comes of doing nothing until the next boundary.
+    fn wait(&mut self, state: &State) -> Choice {
+        let world = self.bound.world;
         let mut choice = Choice::new();
         for (p, happenings) in self.bound.happenings(self.number, state) {
             let outcomes = self.bound.outcomes(state, &happenings).unwrap_or_default();
@@ -236,7 +269,6 @@ impl Cell<'_> {
             });
             choice.push((p, targets.collect()));
         }
-        choices.push(choice);
-        choices
+        choice
     }
 }

@@ -87,7 +87,7 @@ impl State {
             .fold(0, |set, running| set | 1 << running.act)
     }
 
-    pub(super) fn is_hopeful(&self, world: &TimedWorld<'_>, hopes: &mut Hopes) -> bool {
+    pub(super) fn is_hopeful(&self, world: &TimedWorld, hopes: &mut Hopes) -> bool {
         let (facts, set, happened) = (self.facts, self.under_way(), self.happened);
         *hopes
             .entry((facts, set, happened))
@@ -95,7 +95,7 @@ impl State {
     }
 
     /// Actions whose condition over all no longer holds fail.
-    pub(super) fn settle(&mut self, world: &TimedWorld<'_>) {
+    pub(super) fn settle(&mut self, world: &TimedWorld) {
         let facts = self.facts;
         self.running.retain(|running| {
             let rest = world.acts[usize::from(running.act)].rest.as_ref();
@@ -106,7 +106,7 @@ impl State {
     /// An action starts, in that cell, with what is known of its end; an instantaneous one is over.
     pub(super) fn started(
         &self,
-        world: &TimedWorld<'_>,
+        world: &TimedWorld,
         act: usize,
         since: usize,
         phase: Phase,
@@ -128,7 +128,7 @@ impl State {
 
     /// The action at that place in the list ends, well or badly. It fails, too, if what its end needs
     /// does not hold; then nobody undoes what its start did, nor does anybody where it breaks off.
-    pub(super) fn ended(&self, world: &TimedWorld<'_>, place: usize, well: bool) -> Self {
+    pub(super) fn ended(&self, world: &TimedWorld, place: usize, well: bool) -> Self {
         let mut after = self.clone();
         let running = after.running.remove(place);
         let act = &world.acts[usize::from(running.act)];
@@ -146,7 +146,7 @@ impl State {
     }
 
     /// An event happens.
-    pub(super) fn changed(&self, world: &TimedWorld<'_>, event: usize) -> Self {
+    pub(super) fn changed(&self, world: &TimedWorld, event: usize) -> Self {
         let mut after = self.clone();
         after.happened |= 1 << event;
         after.facts = world.events[event].apply(after.facts);
@@ -156,7 +156,7 @@ impl State {
 
     /// The actions that can start and may do any good; the only one that needs looking at, where
     /// nothing is ever better than to start it at once.
-    pub(super) fn startable(&self, world: &TimedWorld<'_>) -> Vec<usize> {
+    pub(super) fn startable(&self, world: &TimedWorld) -> Vec<usize> {
         let under_way = self.under_way();
         let can_start = |act: &usize| {
             let is_idle = under_way & (1 << act) == 0;
@@ -179,7 +179,7 @@ impl State {
     }
 
     /// Whether the agent has nothing to think about but to start the first of these.
-    pub(super) fn must_start(&self, world: &TimedWorld<'_>, startable: &[usize]) -> bool {
+    pub(super) fn must_start(&self, world: &TimedWorld, startable: &[usize]) -> bool {
         matches!(startable, [only] if world.acts[*only].is_eager && {
             let facts = world.acts[*only].start.apply(self.facts);
             world.acts[*only].rest.as_ref().is_some_and(|(over_all, _)| over_all.hold(facts))
@@ -195,17 +195,7 @@ pub(super) fn value(
 ) -> Result<f64, Stop> {
     let mut hopes = Hopes::new();
     let initial = bound.initial();
-    let mut layers: Vec<IndexSet<State>> =
-        vec![initial.iter().map(|(_, state)| state.clone()).collect()];
-    for cell in 0..bound.cells() {
-        if !goes_on() {
-            return Err(Stop::Interrupted);
-        }
-        let mut next = IndexSet::new();
-        bound.expand(cell, &layers[cell], &mut next, &mut hopes);
-        *left = left.checked_sub(next.len()).ok_or(Stop::TooManyStates)?;
-        layers.push(next);
-    }
+    let mut layers = explored(bound, &mut hopes, left, goes_on)?;
     let last = layers.pop().unwrap_or_default();
     let mut values: Vec<f64> = last.iter().map(|state| bound.last(state)).collect();
     for (cell, states) in layers.iter().enumerate().rev() {
@@ -214,7 +204,7 @@ pub(super) fn value(
         }
         let mut next = IndexSet::new();
         let nodes = bound.expand(cell, states, &mut next, &mut hopes);
-        let mut here = settled(&nodes, &values);
+        let mut here = settled(&nodes, &values, Tolls::NONE);
         here.truncate(states.len());
         values = here;
     }
@@ -225,27 +215,55 @@ pub(super) fn value(
     Ok(value.sum())
 }
 
+/// The states at the beginning of each cell, and at the end of the last.
+pub(super) fn explored(
+    bound: &impl Expansion,
+    hopes: &mut Hopes,
+    left: &mut usize,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Vec<IndexSet<State>>, Stop> {
+    let initial = bound.initial();
+    let mut layers: Vec<IndexSet<State>> =
+        vec![initial.iter().map(|(_, state)| state.clone()).collect()];
+    for cell in 0..bound.cells() {
+        if !goes_on() {
+            return Err(Stop::Interrupted);
+        }
+        let mut next = IndexSet::new();
+        bound.expand(cell, &layers[cell], &mut next, hopes);
+        *left = left.checked_sub(next.len()).ok_or(Stop::TooManyStates)?;
+        layers.push(next);
+    }
+    Ok(layers)
+}
+
+/// By which factors a value shrinks on the way, so that of two ways that are equally likely to reach the
+/// goal the shorter one is worth more.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tolls {
+    /// From one cell to the next.
+    pub(super) cell: f64,
+    /// For each thing that the agent does.
+    pub(super) step: f64,
+}
+
+impl Tolls {
+    /// A value is a probability.
+    pub(super) const NONE: Self = Self {
+        cell: 1.0,
+        step: 1.0,
+    };
+}
+
 /// The values of a cell's nodes. Nodes lead to later ones, or back through instantaneous actions and
 /// such as take less than a cell; so they are gone through from the last to the first, until nothing
 /// changes any more.
-fn settled(nodes: &Nodes, next: &[f64]) -> Vec<f64> {
+pub(super) fn settled(nodes: &Nodes, next: &[f64], tolls: Tolls) -> Vec<f64> {
     let mut values = vec![0.0_f64; nodes.len()];
     loop {
         let mut greatest: f64 = 0.0;
         for (index, choices) in nodes.iter().enumerate().rev() {
-            let worth = |target: &Target| match target {
-                Target::Next(state) => next[*state],
-                Target::Here(node) => values[*node],
-                Target::Won => 1.0,
-                Target::Lost => 0.0,
-            };
-            let of = |choice: &Choice| {
-                let parts = choice.iter().map(|(p, targets)| {
-                    let worst = targets.iter().map(worth).fold(f64::INFINITY, f64::min);
-                    p * if worst.is_finite() { worst } else { 0.0 }
-                });
-                parts.sum::<f64>()
-            };
+            let of = |choice: &Choice| worth(choice, &values, next, tolls);
             let best = choices.iter().map(of).fold(0.0, f64::max);
             greatest = greatest.max(best - values[index]);
             values[index] = best;
@@ -254,4 +272,19 @@ fn settled(nodes: &Nodes, next: &[f64]) -> Vec<f64> {
             return values;
         }
     }
+}
+
+/// The value of a choice, given those of the cell's nodes and of the next cell's states.
+pub(super) fn worth(choice: &Choice, here: &[f64], next: &[f64], tolls: Tolls) -> f64 {
+    let of = |target: &Target| match target {
+        Target::Next(state) => next[*state] * tolls.cell,
+        Target::Here(node) => here[*node] * tolls.step,
+        Target::Won => 1.0,
+        Target::Lost => 0.0,
+    };
+    let parts = choice.iter().map(|(p, targets)| {
+        let worst = targets.iter().map(of).fold(f64::INFINITY, f64::min);
+        p * if worst.is_finite() { worst } else { 0.0 }
+    });
+    parts.sum()
 }

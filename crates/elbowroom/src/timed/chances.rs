@@ -25,7 +25,7 @@ impl Chances {
     /// Cells are closed at the left for a bound from above, and at the right for one from below:
     /// what happens at a boundary counts as before it where the agent decides at boundaries only.
     pub(super) fn new(
-        world: &TimedWorld<'_>,
+        world: &TimedWorld,
         step: f64,
         cells: usize,
         side: Side,
@@ -125,7 +125,7 @@ fn shares(resolution: f64, midway: f64) -> Vec<(f64, f64)> {
 /// How likely an action has ended well, or failed, on that side of a time after its start.
 fn ended(
     act: &Act,
-    world: &TimedWorld<'_>,
+    world: &TimedWorld,
     until: f64,
     part: Part,
     shares: &[(f64, f64)],

@@ -7,7 +7,7 @@ use super::graph::{Choice, Expansion, Hopes, Nodes, Phase, State, Target};
 use super::world::TimedWorld;
 
 pub(super) struct Above<'a> {
-    world: &'a TimedWorld<'a>,
+    world: &'a TimedWorld,
     chances: &'a Chances,
 }
 
@@ -27,7 +27,7 @@ struct Cell<'c> {
 }
 
 impl<'a> Above<'a> {
-    pub(super) fn new(world: &'a TimedWorld<'a>, chances: &'a Chances) -> Self {
+    pub(super) fn new(world: &'a TimedWorld, chances: &'a Chances) -> Self {
         Self { world, chances }
     }
 
@@ -236,7 +236,7 @@ impl Cell<'_> {
 }
 
 /// Where more facts are never worse, what only adds some is best done at once.
-fn forced(world: &TimedWorld<'_>, mut moment: Moment) -> Moment {
+fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
     if !world.is_monotone {
         return moment;
     }

@@ -1,6 +1,9 @@
 //! The world of the timed optimum: facts are bits, actions and events are numbered.
 
+use std::sync::Arc;
+
 use elbowroom_model::Task;
+use elbowroom_model::ground::{Action, FactId};
 use elbowroom_num::Rational;
 use elbowroom_sim::{Distribution, Rule, Side, WorldModel};
 
@@ -31,6 +34,7 @@ pub(super) struct Snap {
 #[derive(Clone, Debug)]
 pub(super) struct Act {
     pub(super) name: String,
+    pub(super) action: Arc<Action>,
     pub(super) start: Snap,
     /// What is needed over all, and its end; `None` for instantaneous actions.
     pub(super) rest: Option<(Needs, Snap)>,
@@ -58,8 +62,10 @@ pub(super) struct Event {
 
 /// See [`timed`](super).
 #[derive(Debug)]
-pub(super) struct TimedWorld<'w> {
-    pub(super) model: &'w WorldModel,
+pub(super) struct TimedWorld {
+    pub(super) model: WorldModel,
+    /// The facts that matter; the place of each is its bit.
+    pub(super) facts: Vec<FactId>,
     pub(super) acts: Vec<Act>,
     pub(super) events: Vec<Event>,
     pub(super) initial: Facts,
@@ -76,10 +82,10 @@ pub(super) struct TimedWorld<'w> {
 const MOST_ACTS: usize = 64;
 const MOST_EVENTS: usize = 32;
 
-impl<'w> TimedWorld<'w> {
+impl TimedWorld {
     pub(super) fn new(
         task: &Task,
-        model: &'w WorldModel,
+        model: &WorldModel,
         settings: &Settings,
     ) -> Result<Self, NotTabulated> {
         if !model.reports.is_perfect() {
@@ -123,11 +129,12 @@ impl<'w> TimedWorld<'w> {
         let initial = task.initial().facts.iter();
         let initial = initial.fold(0, |facts, fact| facts | compiler.bit(*fact));
         let mut world = Self {
+            facts: compiler.facts,
             horizon: horizon(&events, model, settings)?,
             is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
             deletable: acts.iter().fold(0, |all, act| all | act.deletes())
                 | events.iter().fold(0, |all, event| all | event.deletes),
-            model,
+            model: model.clone(),
             acts,
             events,
             initial,
@@ -184,7 +191,7 @@ impl<'w> TimedWorld<'w> {
     }
 }
 
-impl TimedWorld<'_> {
+impl TimedWorld {
     /// Whether it may do any good to do this: not if more facts are never worse, and all that it
     /// makes true is true and stays so.
     pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {

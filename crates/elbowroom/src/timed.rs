@@ -36,6 +36,7 @@ mod below;
 mod chances;
 mod compile;
 mod graph;
+mod policy;
 mod world;
 
 use elbowroom_model::Task;
@@ -44,6 +45,7 @@ use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
 use chances::Chances;
+pub use policy::Policy;
 use world::TimedWorld;
 
 /// How far to go.

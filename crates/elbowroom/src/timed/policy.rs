@@ -1,0 +1,289 @@
+//! The policy that reaches the bound from below: [`Policy`].
+
+use elbowroom_execution::{Move as Choice, Outlook, Standing, Weighed};
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_sim::{Side as Part, WorldModel};
+use indexmap::{IndexMap, IndexSet};
+
+use super::below::{Below, Move, moves};
+use super::chances::Chances;
+use super::graph::{Expansion, Hopes, Phase, Running, State, Tolls, explored, settled, worth};
+use super::world::{Facts, TimedWorld};
+use super::{NotTabulated, Settings, Side, TimedOptimum, optimum};
+
+/// The values of all states on the grid of the bound from below, by which each move can be weighed.
+///
+/// Whoever always makes the move of most worth at the boundaries of cells succeeds at least with the
+/// probability [`TimedOptimum::lower`], but for [`HASTE`] and for the ε that happenings are kept apart.
+#[derive(Debug)]
+pub struct Policy {
+    world: TimedWorld,
+    chances: Chances,
+    step: Rational,
+    /// By cell: what its states are worth.
+    values: Vec<IndexMap<State, f64>>,
+    tolls: Tolls,
+    optimum: TimedOptimum,
+}
+
+/// How much of a probability is given at most for being earlier.
+const HASTE: f64 = 1e-4;
+
+impl Policy {
+    /// The policy on the finest grid that [`optimum`] finishes; `None` if that is none, or `goes_on` says
+    /// so.
+    ///
+    /// # Errors
+    /// When there is something in the task or in the world that the process does not know.
+    pub fn new(
+        task: &Task,
+        model: &WorldModel,
+        settings: &Settings,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, NotTabulated> {
+        let optimum = optimum(task, model, settings, goes_on)?;
+        let finest = optimum.grids.len().checked_sub(1);
+        let Some(cells) = finest.map(|halvings| settings.first_cells.max(1) << halvings) else {
+            return Ok(None);
+        };
+        let world = TimedWorld::new(task, model, settings)?;
+        #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
+        let (step, count) = (world.horizon / cells as f64, cells as f64);
+        let chances = Chances::new(&world, step, cells, Side::Below)?;
+        // The horizon is a number that somebody wrote, or a multiple of the resolution.
+        let horizon = Rational::from_f64_as_written(world.horizon).unwrap_or_default();
+        let exact = horizon / Rational::from(i64::try_from(cells).unwrap_or(i64::MAX));
+        let mut policy = Self {
+            step: exact,
+            values: Vec::new(),
+            tolls: Tolls {
+                cell: 1.0 - HASTE / count,
+                step: 1.0 - HASTE / count,
+            },
+            optimum,
+            world,
+            chances,
+        };
+        let mut left = settings.most_states;
+        let Some(values) = policy.tabulated(&mut left, goes_on) else {
+            return Ok(None);
+        };
+        policy.values = values;
+        Ok(Some(policy))
+    }
+
+    /// The bounds between which the best of all executors lies, and the grids that were tried for them.
+    pub fn optimum(&self) -> &TimedOptimum {
+        &self.optimum
+    }
+
+    /// Backwards, from the end of the last cell.
+    fn tabulated(
+        &self,
+        left: &mut usize,
+        goes_on: &dyn Fn() -> bool,
+    ) -> Option<Vec<IndexMap<State, f64>>> {
+        let bound = Below::new(&self.world, &self.chances);
+        let mut hopes = Hopes::new();
+        let mut layers = explored(&bound, &mut hopes, left, goes_on).ok()?;
+        let last = layers.pop().unwrap_or_default().into_iter();
+        let mut tables: Vec<IndexMap<State, f64>> = vec![
+            last.map(|state| {
+                let value = bound.last(&state);
+                (state, value)
+            })
+            .collect(),
+        ];
+        while let Some(states) = layers.pop() {
+            if !goes_on() {
+                return None;
+            }
+            let mut next = IndexSet::new();
+            let nodes = bound.expand(layers.len(), &states, &mut next, &mut hopes);
+            let after = tables.last().map(|table| of(table, &next));
+            let values = settled(&nodes, &after.unwrap_or_default(), self.tolls);
+            tables.push(states.into_iter().zip(values).collect());
+        }
+        tables.reverse();
+        Some(tables)
+    }
+
+    /// What each move is worth in a state at the beginning of a cell.
+    fn values(&self, cell: usize, state: &State) -> Vec<(Move, f64)> {
+        let world = &self.world;
+        let mut hopes = Hopes::new();
+        if world.goal.hold(state.facts) || !state.is_hopeful(world, &mut hopes) {
+            return Vec::new();
+        }
+        let bound = Below::new(world, &self.chances);
+        let mut next = IndexSet::new();
+        let only = IndexSet::from([state.clone()]);
+        let nodes = bound.expand(cell, &only, &mut next, &mut hopes);
+        let after = of(&self.values[cell + 1], &next);
+        let here = settled(&nodes, &after, self.tolls);
+        let choices = nodes.first().into_iter().flatten();
+        let worths = choices.map(|choice| worth(choice, &here, &after, self.tolls));
+        moves(world, state).into_iter().zip(worths).collect()
+    }
+
+    /// The state that someone stands in, if those events have happened.
+    fn state(&self, standing: &Standing<'_>, facts: Facts, happened: u32) -> State {
+        let act_of = |name: &str| self.world.acts.iter().position(|act| act.name == name);
+        let mut running: Vec<Running> = Vec::new();
+        for (name, since) in &standing.running {
+            let Some(act) = act_of(name) else {
+                continue;
+            };
+            running.push(Running {
+                act: u8::try_from(act).unwrap_or(u8::MAX),
+                since: u16::try_from(*since).unwrap_or(u16::MAX),
+                phase: Phase::Goes,
+            });
+        }
+        running.sort_unstable();
+        let state = State {
+            facts,
+            happened,
+            running,
+        };
+        match standing.started.and_then(act_of) {
+            Some(act) => state.started(&self.world, act, standing.period, Phase::Goes),
+            None => state,
+        }
+    }
+
+    /// The events that have happened for certain, or as the changes that were seen tell.
+    fn happened(&self, standing: &Standing<'_>) -> u32 {
+        let now =
+            (&self.step * &Rational::from(i64::try_from(standing.period).unwrap_or(0))).to_f64();
+        let resolution = self.world.model.resolution.to_f64();
+        let share = |event: &super::world::Event| {
+            let share = event.time.share(now, Part::UpTo, 0.0, resolution);
+            share.unwrap_or(0.0) * event.probability
+        };
+        let mut happened = 0_u32;
+        for (index, event) in self.world.events.iter().enumerate() {
+            if share(event) >= 1.0 - 1e-12 {
+                happened |= 1 << index;
+            }
+        }
+        for (fact, truth) in standing.changed {
+            let Ok(place) = self.world.facts.binary_search(fact) else {
+                continue;
+            };
+            let bit: Facts = 1 << place;
+            let events = self.world.events.iter().enumerate();
+            let mut fitting = events.filter(|(index, event)| {
+                let changed = if *truth { event.adds } else { event.deletes };
+                happened & (1 << index) == 0 && changed & bit != 0
+            });
+            if let Some((index, _)) = fitting.next() {
+                happened |= 1 << index;
+            }
+        }
+        happened
+    }
+
+    /// Makes actions that should be over by now count as started later, as late as it takes for them
+    /// to be under way still. Whether there were any.
+    fn rejuvenate(&self, cell: usize, state: &mut State) -> bool {
+        let mut is_overdue = false;
+        for running in &mut state.running {
+            let ends = &self.chances.ends[usize::from(running.act)];
+            let is_alive = |since: u16| {
+                let age = cell.saturating_sub(usize::from(since));
+                ends.get(age)
+                    .is_some_and(|(well, badly)| well + badly > 0.0)
+                    || ends
+                        .iter()
+                        .skip(age)
+                        .any(|(well, badly)| well + badly > 0.0)
+            };
+            let here = u16::try_from(cell).unwrap_or(u16::MAX);
+            running.since = running.since.min(here);
+            while running.since < here && !is_alive(running.since) {
+                running.since += 1;
+                is_overdue = true;
+            }
+        }
+        state.running.sort_unstable();
+        is_overdue
+    }
+}
+
+/// What states are worth; those that nobody reckoned with, nothing.
+fn of(table: &IndexMap<State, f64>, states: &IndexSet<State>) -> Vec<f64> {
+    let value = |state| table.get(state).copied().unwrap_or(0.0);
+    states.iter().map(value).collect()
+}
+
+impl Outlook for Policy {
+    fn period(&self) -> &Rational {
+        &self.step
+    }
+
+    fn weigh(&self, standing: &Standing<'_>) -> Option<Weighed> {
+        let cell = standing.period;
+        if cell + 1 >= self.values.len() {
+            return None;
+        }
+        let facts = self.world.facts.iter().enumerate();
+        let facts = facts.fold(0, |all: Facts, (place, fact)| {
+            all | (Facts::from(standing.belief.fact(*fact)) << place)
+        });
+        let happened = self.happened(standing);
+        // Something may have happened that has changed nothing, and so was not seen.
+        let events = self.world.events.iter().enumerate();
+        let silent = events.fold(0_u32, |all, (index, event)| {
+            let is_so = event.adds & !facts == 0 && event.deletes & facts == 0;
+            all | (u32::from(is_so) << index)
+        });
+        let mut overdue = None;
+        for happened in [happened, happened | silent] {
+            let mut state = self.state(standing, facts, happened);
+            if self.world.goal.hold(state.facts) {
+                return Some(Weighed {
+                    moves: vec![(Choice::Wait, 1.0)],
+                    is_overdue: false,
+                });
+            }
+            let is_overdue = self.rejuvenate(cell, &mut state);
+            let mut values = self.values(cell, &state);
+            // The order of equals is that of the problem's actions.
+            values.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+            if values.first().is_some_and(|(_, value)| *value > 0.0) {
+                let choice = |(choice, value)| (self.choice(&state, choice), value);
+                return Some(Weighed {
+                    moves: values.into_iter().map(choice).collect(),
+                    is_overdue,
+                });
+            }
+            // Its end, a moment late, may be all that is missing.
+            if is_overdue {
+                overdue = Some(Weighed {
+                    moves: Vec::new(),
+                    is_overdue,
+                });
+            }
+        }
+        overdue
+    }
+}
+
+impl Policy {
+    fn choice(&self, state: &State, choice: Move) -> Choice {
+        match choice {
+            Move::Start(act) => {
+                let act = &self.world.acts[act];
+                let planned = act.rest.as_ref().map(|_| act.planned.clone());
+                Choice::Start(act.action.clone(), planned)
+            }
+            Move::Cancel(place) => {
+                let act = usize::from(state.running[place].act);
+                Choice::Cancel(self.world.acts[act].name.clone())
+            }
+            Move::Wait => Choice::Wait,
+        }
+    }
+}

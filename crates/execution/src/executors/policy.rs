@@ -1,0 +1,524 @@
+//! `policy`: the plan while its guarantee costs no probability, then the likeliest move, on a clock.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use elbowroom_model::ground::FactId;
+use elbowroom_num::Rational;
+
+use super::{Registered, live};
+use crate::dispatch::replan;
+use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
+use crate::outlook::{Move, Outlook, Standing, Weighed};
+use crate::preparation::Need;
+use crate::progression::Progression;
+use crate::reason::{About, Cause, Reason};
+
+pub(super) const REGISTERED: Registered = Registered {
+    name: "policy",
+    argument: None,
+    is_optional: false,
+    summary: "Follows the plan as `live` does while that costs next to no probability of reaching the \
+              goal in time, and from then on makes the move of which the goal is most likely: an action, \
+              letting one go, or waiting, whether or not it is in the plan. What moves are worth comes from \
+              what is known of the world's distributions of durations, failures and events, not from what \
+              will happen. Where the world is too large for that, it acts like `live:5`.",
+    paper: "the policy of a semi-Markov decision process (Howard, 1971); goes beyond both papers",
+    need: Need::OpenNetwork,
+    make: |_, means| {
+        let outlook = means.outlook.clone();
+        // Whoever weighs moves needs nobody to compare plans.
+        let compares = means.odds.is_some() && outlook.is_none();
+        let advantage = compares.then(|| Rational::from(5));
+        Box::new(Policy {
+            outlook,
+            plan: (live::REGISTERED.make)(advantage, means),
+            follows: false,
+            forgone: 0.0,
+            steps: BTreeMap::new(),
+            changed: Vec::new(),
+            last: None,
+            waited: None,
+            ordered: None,
+            next_step: 0,
+            lost: None,
+        })
+    },
+};
+
+/// How much probability is given away at most, all in all, for keeping to a plan with its guarantee.
+const MOST_FORGONE: f64 = 0.005;
+
+/// So often at one time something is started or let go; then the next period is waited for.
+const MOST_AT_ONCE: u32 = 50;
+
+/// See [`REGISTERED`].
+struct Policy {
+    outlook: Option<Arc<dyn Outlook>>,
+    /// Who executes the plan.
+    plan: Box<dyn Executor>,
+    /// Whether the plan is being followed.
+    follows: bool,
+    /// How much probability has been given away for that.
+    forgone: f64,
+    /// What was ordered and has not ended: its name, whether the plan ordered it, whether it has started.
+    steps: BTreeMap<StepId, Ordered>,
+    /// The facts that the world has changed by itself.
+    changed: Vec<(FactId, bool)>,
+    /// When something happened last.
+    last: Option<Rational>,
+    /// The last period at whose beginning it was decided to wait.
+    waited: Option<usize>,
+    /// When something was ordered last, and how often at that time.
+    ordered: Option<(Rational, u32)>,
+    /// The number of the next order.
+    next_step: u32,
+    /// Why the plan is not followed any more.
+    lost: Option<Reason>,
+}
+
+#[derive(Clone, Debug)]
+struct Ordered {
+    name: String,
+    is_of_plan: bool,
+    has_started: bool,
+    /// Whether it was told to stop.
+    is_let_go: bool,
+}
+
+/// When moves are weighed.
+enum Turn {
+    /// Now, in this period.
+    Now(usize),
+    /// At the beginning of this one.
+    At(usize),
+}
+
+impl Executor for Policy {
+    fn need(&self) -> Need {
+        REGISTERED.need
+    }
+
+    fn adopt(&mut self, mission: &Mission) -> Result<(), Box<Reason>> {
+        let adopted = self.plan.adopt(mission);
+        let instances = &mission.plan.plan.instances;
+        self.steps = mission
+            .running
+            .keys()
+            .filter_map(|step| {
+                let instance = instances.get(step.instance().index())?;
+                let ordered = Ordered {
+                    name: instance.action.name.clone(),
+                    is_of_plan: true,
+                    has_started: true,
+                    is_let_go: false,
+                };
+                Some((*step, ordered))
+            })
+            .collect();
+        self.next_step = u32::try_from(instances.len()).unwrap_or(u32::MAX);
+        self.follows = adopted.is_ok();
+        self.lost = adopted.as_ref().err().map(|reason| (**reason).clone());
+        if self.outlook.is_some() {
+            return Ok(());
+        }
+        adopted
+    }
+
+    fn decide(&mut self, moment: &Moment<'_>) -> Decided {
+        let (own, doubt) = self.learn(moment);
+        if let Some(doubt) = doubt.filter(|_| !self.follows) {
+            return replan(doubt);
+        }
+        let kept = self.follows.then(|| {
+            self.plan.decide(&Moment {
+                news: &own,
+                ..*moment
+            })
+        });
+        let outlook = self.outlook.clone();
+        let decided = match (kept, outlook) {
+            (Some(kept), None) => kept,
+            (kept, Some(outlook)) => self.weigh(moment, kept, outlook.as_ref()),
+            (None, None) => super::without_plan(),
+        };
+        self.note(&decided, moment.now);
+        decided
+    }
+
+    fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
+        let is_of_plan = self.steps.get(&step).is_some_and(|it| it.is_of_plan);
+        (self.follows && is_of_plan)
+            .then(|| self.plan.window(step, is_end))
+            .flatten()
+    }
+}
+
+impl Policy {
+    /// Takes note of what is new; what of it is about the plan, and why nobody knows how things stand, if
+    /// that is so.
+    fn learn(&mut self, moment: &Moment<'_>) -> (Vec<News>, Option<Reason>) {
+        let (mut own, mut doubt) = (Vec::new(), None);
+        for news in moment.news {
+            let is_own = match news {
+                News::Started { step, time, .. } => {
+                    self.last = self.last.take().max(Some(time.clone()));
+                    match self.steps.get_mut(step) {
+                        Some(ordered) => {
+                            ordered.has_started = true;
+                            ordered.is_of_plan
+                        }
+                        None => true,
+                    }
+                }
+                News::Ended { step, time, .. } => {
+                    self.last = self.last.take().max(Some(time.clone()));
+                    self.steps.remove(step).is_none_or(|it| it.is_of_plan)
+                }
+                News::Fact(fact) => {
+                    self.last = self.last.take().max(Some(moment.now.clone()));
+                    self.changed.push((*fact, moment.belief.fact(*fact)));
+                    true
+                }
+                News::Value(_) | News::Contradiction { .. } | News::Silence { .. } => true,
+            };
+            if is_own {
+                own.push(news.clone());
+            }
+            match news {
+                News::Contradiction { action } => {
+                    doubt = Some(Reason::new(Cause::Contradiction).of(action));
+                }
+                News::Silence { action, since } => {
+                    doubt = Some(Reason::new(Cause::Silence).of(action).since(since.clone()));
+                }
+                _ => {}
+            }
+        }
+        // An instantaneous action is over when it has started.
+        let running = moment.belief.running();
+        self.steps.retain(|_, ordered| {
+            let is_under_way = running.values().any(|it| it.action.name == ordered.name);
+            !ordered.has_started || is_under_way
+        });
+        (own, doubt)
+    }
+
+    /// Takes note of what is ordered.
+    fn note(&mut self, decided: &Decided, now: &Rational) {
+        let orders: &[Order] = match &decided.decision {
+            Decision::Start(orders) => orders,
+            Decision::Cancel(steps) => {
+                for step in steps {
+                    if let Some(ordered) = self.steps.get_mut(step) {
+                        ordered.is_let_go = true;
+                    }
+                }
+                &[]
+            }
+            _ => return,
+        };
+        for order in orders {
+            self.steps.entry(order.step).or_insert_with(|| Ordered {
+                name: order.action.name.clone(),
+                is_of_plan: true,
+                has_started: false,
+                is_let_go: false,
+            });
+        }
+        self.ordered = Some(match self.ordered.take() {
+            Some((time, count)) if time == *now => (time, count.saturating_add(1)),
+            _ => (now.clone(), 1),
+        });
+    }
+
+    /// The decision, if moves can be weighed; `kept` is what the plan says.
+    fn weigh(
+        &mut self,
+        moment: &Moment<'_>,
+        kept: Option<Decided>,
+        outlook: &dyn Outlook,
+    ) -> Decided {
+        let kept = self.still_kept(kept);
+        let starts = kept.as_ref().is_some_and(|kept| {
+            matches!(
+                kept.decision,
+                Decision::Start(_) | Decision::Cancel(_) | Decision::GoalReached
+            )
+        });
+        let is_goal = moment.belief.holds(moment.belief.task().goal(), None) == Ok(true);
+        if kept.is_none() && is_goal {
+            return self.finish();
+        }
+        let mut steps = self.steps.values();
+        let pending = steps.find(|ordered| !ordered.has_started || ordered.is_let_go);
+        if let Some(ordered) = pending
+            && !starts
+        {
+            let about = if ordered.is_let_go {
+                About::EndOfCancelled
+            } else {
+                About::StartOfOrdered
+            };
+            return kept.unwrap_or_else(|| wait(None, about));
+        }
+        let turn = self.turn(moment.now, outlook.period());
+        let period = match turn {
+            Turn::Now(period) | Turn::At(period) => period,
+        };
+        let Some(weighed) = outlook.weigh(&self.standing(moment.belief, period, outlook, None))
+        else {
+            return match (kept, turn) {
+                (Some(kept), _) => kept,
+                (None, Turn::Now(_)) => self.hopeless(moment.now),
+                // Before it begins, something may happen still.
+                (None, Turn::At(period)) => {
+                    let until = begins(period, outlook.period());
+                    wait(Some(until), About::NextDecision(0.0))
+                }
+            };
+        };
+        if let Some(kept) = kept {
+            let worth = self.worth(&kept, &weighed, moment.belief, period, outlook);
+            let forgone = (weighed.best() - worth).max(0.0);
+            let is_free = matches!(turn, Turn::At(_)) && !starts;
+            if is_free || self.forgone + forgone <= MOST_FORGONE {
+                if !is_free {
+                    self.forgone += forgone;
+                }
+                return self.until_next(kept, moment.now, &turn, outlook.period());
+            }
+            self.follows = false;
+            self.lost = Some(Reason::new(Cause::Likelier));
+        }
+        match turn {
+            Turn::At(period) => {
+                let until = begins(period, outlook.period());
+                wait(Some(until), About::NextDecision(weighed.best()))
+            }
+            Turn::Now(period) => self.best(moment, period, &weighed, outlook.period()),
+        }
+    }
+
+    /// The goal holds, and is not taken as reached while anything is under way.
+    fn finish(&self) -> Decided {
+        let open = self.steps.iter();
+        let open: Vec<StepId> = open
+            .filter(|(_, ordered)| !ordered.is_let_go)
+            .map(|(step, _)| *step)
+            .collect();
+        if open.is_empty() && !self.steps.is_empty() {
+            return wait(None, About::EndOfCancelled);
+        }
+        let decision = if open.is_empty() {
+            Decision::GoalReached
+        } else {
+            Decision::Cancel(open)
+        };
+        Decided {
+            decision,
+            reason: Reason::new(Cause::GoalReached),
+        }
+    }
+
+    /// What the plan says, unless it is to be given up.
+    fn still_kept(&mut self, kept: Option<Decided>) -> Option<Decided> {
+        let kept = kept?;
+        if kept.decision == Decision::Replan {
+            self.follows = false;
+            self.lost = Some(kept.reason);
+            return None;
+        }
+        Some(kept)
+    }
+
+    /// Nobody knows a way from here: another plan may.
+    fn hopeless(&self, now: &Rational) -> Decided {
+        let reason = self.lost.clone();
+        replan(reason.unwrap_or_else(|| Reason::new(Cause::NoOrder).since(now.clone())))
+    }
+
+    /// The period in which moves are weighed: the present one, if it has just begun.
+    fn turn(&self, now: &Rational, period: &Rational) -> Turn {
+        let number = count(&(now / period).floor());
+        let is_over = now - begins(number, period) > slack(period);
+        if is_over || self.waited == Some(number) {
+            Turn::At(number + 1)
+        } else {
+            Turn::Now(number)
+        }
+    }
+
+    fn standing<'a>(
+        &'a self,
+        belief: &'a Progression,
+        period: usize,
+        outlook: &dyn Outlook,
+        started: Option<&'a str>,
+    ) -> Standing<'a> {
+        let length = outlook.period();
+        let since = |start: &Rational| {
+            let from = (start - slack(length)).max(Rational::ZERO);
+            count(&(from / length).ceil()).min(period)
+        };
+        let running = belief.running().values();
+        Standing {
+            period,
+            belief,
+            running: running
+                .map(|it| (it.action.name.as_str(), since(&it.start)))
+                .collect(),
+            changed: &self.changed,
+            started,
+        }
+    }
+
+    /// What it is worth to do as the plan says.
+    fn worth(
+        &self,
+        kept: &Decided,
+        weighed: &Weighed,
+        belief: &Progression,
+        period: usize,
+        outlook: &dyn Outlook,
+    ) -> f64 {
+        let after = |order: &Order| {
+            let name = order.action.name.as_str();
+            let standing = self.standing(belief, period, outlook, Some(name));
+            outlook.weigh(&standing).map_or(0.0, |it| it.best())
+        };
+        match &kept.decision {
+            Decision::Start(orders) => orders.iter().map(after).fold(1.0, f64::min),
+            Decision::Wait { .. } => weighed.by_waiting(),
+            _ => weighed.best(),
+        }
+    }
+
+    /// What the plan says, but not past the next moment at which moves are weighed.
+    fn until_next(
+        &mut self,
+        kept: Decided,
+        now: &Rational,
+        turn: &Turn,
+        length: &Rational,
+    ) -> Decided {
+        let Decision::Wait { until } = &kept.decision else {
+            return kept;
+        };
+        let next = match turn {
+            Turn::Now(period) => {
+                self.waited = Some(*period);
+                period + 1
+            }
+            Turn::At(period) => *period,
+        };
+        let next = begins(next, length);
+        let until = until.clone().filter(|until| *until > *now);
+        let until = until.map_or_else(|| next.clone(), |until| until.min(next.clone()));
+        Decided {
+            decision: Decision::Wait { until: Some(until) },
+            ..kept
+        }
+    }
+
+    /// The best move.
+    fn best(
+        &mut self,
+        moment: &Moment<'_>,
+        period: usize,
+        weighed: &Weighed,
+        length: &Rational,
+    ) -> Decided {
+        let now = moment.now;
+        // What should be over may be a moment late, because it was begun a moment late.
+        let late = begins(period, length) + slack(length) / Rational::from(2);
+        if weighed.is_overdue && *now < late {
+            return wait(Some(late), About::EndOfRunning);
+        }
+        let Some((choice, value)) = weighed.moves.first() else {
+            return self.hopeless(now);
+        };
+        let is_often =
+            matches!(&self.ordered, Some((time, times)) if time == now && *times >= MOST_AT_ONCE);
+        let names = |name: &str| {
+            let steps = self
+                .steps
+                .iter()
+                .filter(|(_, ordered)| ordered.name == name);
+            steps.map(|(step, _)| *step).collect::<Vec<_>>()
+        };
+        match choice {
+            Move::Start(action, planned) if !is_often => {
+                if let Some(until) = self.apart(moment) {
+                    return wait(Some(until), About::Start(action.name.clone()));
+                }
+                let step = StepId(self.next_step);
+                self.next_step = self.next_step.saturating_add(1);
+                let ordered = Ordered {
+                    name: action.name.clone(),
+                    is_of_plan: false,
+                    has_started: false,
+                    is_let_go: false,
+                };
+                self.steps.insert(step, ordered);
+                let order = Order {
+                    step,
+                    action: Arc::clone(action),
+                    duration: planned.clone(),
+                    planned: Planned {
+                        earliest: Some(now.clone()),
+                        latest: None,
+                    },
+                };
+                Decided {
+                    reason: Reason::new(Cause::Due)
+                        .of(&action.name)
+                        .about(About::BestOfAll(*value)),
+                    decision: Decision::Start(vec![order]),
+                }
+            }
+            Move::Cancel(name) if !is_often && !names(name).is_empty() => Decided {
+                decision: Decision::Cancel(names(name)),
+                reason: Reason::new(Cause::Likelier)
+                    .of(name)
+                    .about(About::WithoutEndOf(name.clone())),
+            },
+            _ => {
+                self.waited = Some(period);
+                let until = begins(period + 1, length);
+                wait(Some(until), About::NextDecision(*value))
+            }
+        }
+    }
+
+    /// What may interfere with the last happening waits ε.
+    fn apart(&self, moment: &Moment<'_>) -> Option<Rational> {
+        let task = moment.belief.task();
+        let timed = task.timed().iter().map(|timed| &timed.time);
+        let last = timed.filter(|time| *time <= moment.now).chain(&self.last);
+        let until = last.max()? + task.epsilon();
+        (until > *moment.now).then_some(until)
+    }
+}
+
+/// When a period begins.
+fn begins(period: usize, length: &Rational) -> Rational {
+    length * &Rational::from(i64::try_from(period).unwrap_or(i64::MAX))
+}
+
+/// How long after its beginning moves are weighed in a period.
+fn slack(length: &Rational) -> Rational {
+    length / Rational::from(4)
+}
+
+fn count(whole: &Rational) -> usize {
+    let (number, _) = whole.as_small().unwrap_or_default();
+    usize::try_from(number).unwrap_or_default()
+}
+
+fn wait(until: Option<Rational>, why: About) -> Decided {
+    Decided {
+        decision: Decision::Wait { until },
+        reason: Reason::new(Cause::NothingDue).about(why),
+    }
+}

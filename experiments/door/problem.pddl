@@ -1,0 +1,5 @@
+(define (problem before-the-day-is-over)
+  (:domain door)
+  (:init (at hall) (open) (day) (at 42.5 (not (day))))
+  (:goal (key))
+  (:metric minimize (total-time)))

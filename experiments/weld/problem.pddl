@@ -1,0 +1,6 @@
+(define (problem before-the-shift-ends)
+  (:domain weld)
+  (:objects left right - seam)
+  (:init (torch-free) (shift) (open left) (open right) (at 20.5 (not (shift))))
+  (:goal (and (welded left) (welded right)))
+  (:metric minimize (total-time)))
