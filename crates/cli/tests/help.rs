@@ -1,15 +1,10 @@
 //! The help is laid out for a terminal of 80 columns.
 
-mod command;
-
 use std::process::Command;
-
-use command::root;
 
 /// The help of a subcommand, or of the whole command, on a terminal of so many columns.
 fn help(subcommand: Option<&str>, columns: u32) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
-        .current_dir(root())
         .args(subcommand)
         .arg("--help")
         .env("COLUMNS", columns.to_string())

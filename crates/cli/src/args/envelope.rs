@@ -99,7 +99,7 @@ impl EnvelopeArgs {
                     format!("leave out --method irr, or {flag}"),
                 ));
             }
-            (Some(Method::Irr), None) | (None, None) => library::Method::Irr,
+            (Some(Method::Irr) | None, None) => library::Method::Irr,
             (Some(Method::Best), _) | (None, Some(_)) => library::Method::Best,
         };
         let default = library::BestSettings::default();
