@@ -96,6 +96,8 @@ class Hub:
                 return
             elif message.type == FEEDBACK:
                 deal.since = self._clock()
+                if deal.cancelled is None:
+                    deal.action.feedback(message.completion, message.status)
             elif message.type == FINISH:
                 del self._deals[deal.key]
                 if not message.success:

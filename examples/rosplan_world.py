@@ -4,7 +4,7 @@ ROSPlan (ROS 1), in place of its plan dispatcher, which must be off.
 
 Put `clients/python/elbowroom_world.py` beside this file, and start it where ROS and `rosplan_dispatch_msgs` are set up. The
 domain says what the parameters of each action are called: ROSPlan wants their names. Its action interfaces have no agreed
-way to be cancelled, so a cancel is not passed on: what was started runs until it ends.
+way to be cancelled, so this world does not claim to cancel anything.
 
 `Dispatcher` is the conversation without ROS, so that it can be tested anywhere; `main` connects it with rospy.
 """
@@ -100,6 +100,7 @@ def main():
     while publisher.get_num_connections() == 0 and rospy.get_time() - begun < 10:
         rospy.sleep(0.1)
     world = World("rosplan", speed=float(os.environ.get("ELBOWROOM_SPEED", "1")))
+    world.capabilities = ("facts",)
     world.starter("*")(dispatcher.begin)
     world.run()
 

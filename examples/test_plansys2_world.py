@@ -18,6 +18,9 @@ class Asked:
     def started(self):
         self.told.append("started")
 
+    def feedback(self, completion, note):
+        self.told.append((completion, note))
+
     def succeeded(self):
         self.told.append("succeeded")
 
@@ -63,7 +66,7 @@ class Performers(unittest.TestCase):
         self.says(RESPONSE)
         self.says(FEEDBACK, completion=0.5, status="half-way")
         self.says(FINISH, success=True, completion=1.0)
-        self.assertEqual(action.told, ["started", "succeeded"])
+        self.assertEqual(action.told, ["started", (0.5, "half-way"), "succeeded"])
         self.assertEqual(self.kinds(), [(REQUEST, "elbowroom"), (CONFIRM, "robot1")])
 
     def test_a_request_that_is_lost_is_repeated(self):

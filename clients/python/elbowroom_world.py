@@ -9,7 +9,8 @@ A whole world:
     @world.action("drive")
     def drive(action):
         rover, start, goal = action.arguments
-        for _ in robot.drive(goal):         # the robot's own way to do it
+        for done in robot.drive(goal):      # the robot's own way to do it
+            action.feedback(done)           # 0 to 1
             if action.is_cancelled:
                 return robot.stop()
         if not robot.is_at(goal):
@@ -42,14 +43,17 @@ conversation. `docs/formats/world-protocol.md` describes the messages.
 from __future__ import annotations
 
 import json
+import os
 import queue
 import sys
 import threading
 import time as _time
 import traceback
-from typing import Any, Callable, TextIO
+from typing import Any, Callable, Iterable, TextIO
 
 __all__ = ["Action", "Failed", "Simulation", "World"]
+
+VERSION = 2
 
 # So many reports are told in one answer, however many more are coming.
 MOST_NEWS = 1000
@@ -76,6 +80,8 @@ class Action:
         """How long the plan has it take, in seconds; ``None`` for an instantaneous action."""
         self.start: float | None = None
         """When it started, by the world's clock."""
+        self.is_resumed = False
+        """Whether it was running before this program was started again."""
         self._world = world
         self._cancelled = threading.Event()
 
@@ -87,6 +93,11 @@ class Action:
     def sleep(self, seconds: float) -> bool:
         """Waits so many seconds of the world's time; ends early, with ``False``, when cancelled."""
         return not self._cancelled.wait(max(0.0, seconds) / self._world.speed)
+
+    def feedback(self, completion: float | None = None, note: str = "") -> None:
+        """Says how far it has come, from 0 to 1, and what there is to say about it."""
+        part = None if completion is None else min(1.0, max(0.0, float(completion)))
+        self._tell(type="feedback", completion=part, note=note)
 
     def started(self, measured: dict[str, float] | None = None) -> None:
         """It has started now."""
@@ -119,34 +130,48 @@ Does = Callable[[Action], Any]
 
 
 class World:
-    """A world on the wall clock. ``speed`` is how many of its seconds pass in one real second."""
+    """A world on the wall clock. ``speed`` is how many of its seconds pass in one real second.
 
-    def __init__(self, name: str = "world", *, speed: float = 1.0) -> None:
+    With a ``ledger``, a file, it can be started again after a crash, its own or Elbowroom's: it
+    writes down each start before the action begins, and each end, and answers from that what
+    became of them (``elbowroom run --resume``).
+    """
+
+    capabilities: Iterable[str] = ("cancel", "feedback", "facts")
+
+    def __init__(
+        self, name: str = "world", *, speed: float = 1.0, ledger: str | os.PathLike[str] | None = None
+    ) -> None:
         if not speed > 0:
             raise ValueError(f"speed must be above 0, not {speed!r}")
         self.name, self.speed = name, speed
+        self._ledger = _Ledger(ledger) if ledger is not None else None
         self._does: dict[str, tuple[str, Does]] = {}
+        self._resumes: dict[str, Does] = {}
         self._canceller: Does | None = None
         self._look: Callable[[list[str]], Any] | None = None
+        self._resumed: Callable[[list[Action]], Any] | None = None
         self._inbox: queue.Queue[tuple[Any, ...]] = queue.Queue()
         self._actions: dict[int, Action] = {}
         self._begun: set[int] = set()
         self._ended: dict[int, dict[str, Any]] = {}
         self._news: list[dict[str, Any]] = []
         self._out: TextIO | None = None
-        # The clock's time at the world's time 0, which begins with the first thing to do: what
+        self._version = 1
+        # The wall clock's time at the world's time 0, which begins with the first thing to do: what
         # is prepared before that takes no time.
         self._zero: float | None = None
 
     # What a program registers.
 
-    def action(self, *names: str) -> Callable[[Does], Does]:
-        """The function does these actions, each call in a thread of its own."""
-        return self._register(names, "blocking")
+    def action(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
+        """The function does these actions, each call in a thread of its own. ``resumes``: it can
+        also be called for one that was running before a restart (``action.is_resumed``)."""
+        return self._register(names, "blocking", resumes)
 
-    def starter(self, *names: str) -> Callable[[Does], Does]:
+    def starter(self, *names: str, resumes: bool = False) -> Callable[[Does], Does]:
         """The function begins these actions and returns at once; the end is told later."""
-        return self._register(names, "starter")
+        return self._register(names, "starter", resumes)
 
     def canceller(self, function: Does) -> Does:
         """The function asks an action of :meth:`starter` to stop, and returns at once."""
@@ -159,13 +184,21 @@ class World:
         self._look = function
         return function
 
-    def _register(self, names: tuple[str, ...], kind: str) -> Callable[[Does], Does]:
+    def resumed(self, function: Callable[[list[Action]], Any]) -> Callable[[list[Action]], Any]:
+        """The function is called once when a run goes on after a crash, with the actions that go on. It
+        reports what is otherwise than actions say, such as what a cancelled one left behind."""
+        self._resumed = function
+        return function
+
+    def _register(self, names: tuple[str, ...], kind: str, resumes: bool) -> Callable[[Does], Does]:
         if not names or not all(isinstance(name, str) for name in names):
             raise TypeError('name the actions: @world.action("drive")')
 
         def register(function: Does) -> Does:
             for name in names:
                 self._does[name.lower()] = (kind, function)
+                if resumes:
+                    self._resumes[name.lower()] = function
             return function
 
         return register
@@ -184,7 +217,7 @@ class World:
 
     def now(self) -> float:
         """What time it is: seconds since the run began."""
-        return 0.0 if self._zero is None else (_time.monotonic() - self._zero) * self.speed
+        return 0.0 if self._zero is None else (_time.time() - self._zero) * self.speed
 
     # The conversation.
 
@@ -249,7 +282,10 @@ class World:
         for report in self._news:
             self._say(report)
         self._news.clear()
-        self._say({"type": "time", "now": self._time(question)})
+        time = {"type": "time", "now": self._time(question)}
+        if "question" in question and self._version >= 2:
+            time["question"] = question["question"]
+        self._say(time)
 
     def _time(self, question: dict[str, Any]) -> float:
         return self.now()
@@ -265,6 +301,7 @@ class World:
 
     def _obey(self, what: Any, message: dict[str, Any]) -> None:
         if what == "hello":
+            self._greet(message)
             return
         self._begin_time()
         if what == "start":
@@ -277,7 +314,24 @@ class World:
 
     def _begin_time(self) -> None:
         if self._zero is None:
-            self._zero = _time.monotonic()
+            self._zero = _time.time()
+            if self._ledger is not None:
+                self._ledger.write(zero=self._zero)
+
+    def _greet(self, message: dict[str, Any]) -> None:
+        resumed = message.get("resumed")
+        if self._ledger is not None:
+            if resumed is None:
+                self._ledger.begin()
+            else:
+                self._remember(self._ledger.read())
+        if VERSION not in message.get("versions", [message.get("version")]):
+            return
+        self._version = VERSION
+        can = list(self.capabilities)
+        can += ["look"] if self._look is not None else []
+        can += ["resume"] if self._ledger is not None else []
+        self._say({"type": "hello", "version": VERSION, "name": self.name, "can": can})
 
     def _start(self, message: dict[str, Any]) -> None:
         ticket = message["ticket"]
@@ -290,6 +344,10 @@ class World:
             self._take({"type": "ended", "ticket": ticket, "outcome": "failed",
                         "why": f"this world has no action {action.name}"}, self.now())  # fmt: skip
             return
+        if self._ledger is not None:
+            # Written before anything moves: what is not in the ledger was never begun.
+            self._ledger.write(ticket=ticket, action=action.text, duration=action.duration,
+                               start=self.now())  # fmt: skip
         self._launch(found, action)
 
     def _launch(self, found: tuple[str, Does], action: Action) -> None:
@@ -298,7 +356,7 @@ class World:
             self._call(function, action)
         else:
             # What takes no time has started when it is done.
-            if action.duration is not None:
+            if not action.is_resumed and action.duration is not None:
                 self._take({"type": "started", "ticket": action.ticket}, self.now())
             threading.Thread(target=self._do, args=(function, action), daemon=True).start()
 
@@ -335,6 +393,8 @@ class World:
         if ticket is not None:
             if ticket in self._ended or (what == "started" and ticket in self._begun):
                 return
+            if what == "feedback" and self._version < 2:
+                return
             action = self._actions[ticket]
             if what == "started":
                 self._begun.add(ticket)
@@ -343,14 +403,27 @@ class World:
                 if ticket not in self._begun and report["outcome"] == "succeeded":
                     self._take({"type": "started", "ticket": ticket}, at)
                 self._ended[ticket] = report
+                if self._ledger is not None:
+                    self._ledger.write(report=report)
             if what == "started" and action.duration is None:
                 # An instantaneous action is over when it has started.
                 self._ended[ticket] = report
+                if self._ledger is not None:
+                    self._ledger.write(report=dict(report, type="ended", outcome="succeeded"))
         self._news.append(report)
 
     def _see(self, question: dict[str, Any]) -> None:
         """Looks at what is asked for."""
         now = self.now()
+        for ticket in question.get("tickets", []):
+            if ticket in self._ended:
+                self._again(self._ended[ticket])
+            elif ticket in self._actions:
+                start = self._actions[ticket].start
+                if start is not None:
+                    self._again({"type": "started", "ticket": ticket, "time": start})
+            else:
+                self._again({"type": "unknown", "ticket": ticket, "time": now})
         if self._look is None:
             return
         for kind, key, name in (
@@ -366,12 +439,43 @@ class World:
                 what = "fact" if kind == "fact" else "fluent"
                 self._news.append({"type": kind, what: name, key: seen, "time": now})
 
+    def _again(self, report: dict[str, Any]) -> None:
+        if report not in self._news:
+            self._news.append(report)
+
+    def _remember(self, lines: list[dict[str, Any]]) -> None:
+        """What happened before this program was started again."""
+        for line in lines:
+            if "zero" in line:
+                self._zero = line["zero"]
+            elif "report" in line:
+                self._ended[line["report"]["ticket"]] = line["report"]
+            elif "ticket" in line:
+                action = Action(self, line["ticket"], line["action"], line.get("duration"))
+                action.start, action.is_resumed = line["start"], True
+                self._actions[action.ticket] = action
+                self._begun.add(action.ticket)
+        under_way = []
+        for ticket, action in list(self._actions.items()):
+            if ticket in self._ended:
+                continue
+            found = self._does.get(action.name.lower()) or self._does.get("*")
+            if found is not None and (action.name.lower() in self._resumes or "*" in self._resumes):
+                under_way.append(action)
+                self._launch(found, action)
+            else:
+                action.failed("it was under way when the world was restarted")
+
+        if self._resumed is not None:
+            self._resumed(under_way)
+
     def _leave(self) -> None:
-        """The run is over, or Elbowroom is gone: what runs is to stop."""
-        for action in self._actions.values():
-            if action.ticket not in self._ended:
-                action._cancelled.set()
-                self._cancel(action)
+        """The run is over, or Elbowroom is gone: what runs is to stop, unless it can be resumed."""
+        if self._ledger is None:
+            for action in self._actions.values():
+                if action.ticket not in self._ended:
+                    action._cancelled.set()
+                    self._cancel(action)
 
 
 class Simulation(World):
@@ -394,7 +498,7 @@ class Simulation(World):
     def lasts(self, *names: str) -> Callable[[Callable[[Action], float]], Callable[[Action], float]]:
         """The function says how many seconds these actions take. It may ``raise Failed(why)``: then
         the action does not start. What it says of an instantaneous action does not count."""
-        return self._register(names, "lasts")
+        return self._register(names, "lasts", False)
 
     def now(self) -> float:
         return self._clock
@@ -449,6 +553,42 @@ class Simulation(World):
 
     def _time(self, question: dict[str, Any]) -> float:
         return self._clock
+
+
+class _Ledger:
+    """What was begun and what has ended, line by line, on the disk before it is said."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._path = os.fspath(path)
+        self._file: TextIO | None = None
+
+    def begin(self) -> None:
+        """A new run: what the last one left is forgotten."""
+        self._file = open(self._path, "w", encoding="utf-8")
+
+    def read(self) -> list[dict[str, Any]]:
+        lines = []
+        try:
+            with open(self._path, encoding="utf-8") as file:
+                for line in file:
+                    try:
+                        lines.append(json.loads(line))
+                    except ValueError:
+                        break  # cut off in the middle
+        except FileNotFoundError:
+            pass
+        # What was cut off is left out for good.
+        self._file = open(self._path + ".new", "w", encoding="utf-8")
+        for line in lines:
+            self.write(**line)
+        os.replace(self._path + ".new", self._path)
+        return lines
+
+    def write(self, **line: Any) -> None:
+        assert self._file is not None, "a ledger begins with the greeting"
+        self._file.write(json.dumps(line) + "\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
 
 
 def _number(value: Any) -> float | None:

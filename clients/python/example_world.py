@@ -1,14 +1,17 @@
 """A world for `elbowroom run --world-process "python3 clients/python/example_world.py"`: on the wall clock,
-at ten times its speed. In place of a robot, each action sleeps."""
+at 20 times its speed. In place of a robot, each action sleeps."""
 
 from elbowroom_world import World
 
-world = World("sleeper", speed=10)
+world = World("sleeper", speed=20)
 
 
 @world.action("*")
 def work(action):
-    action.sleep(action.duration or 0)  # ends early when the action is cancelled
+    for part in range(10):
+        action.feedback(part / 10)
+        if not action.sleep((action.duration or 0) / 10):
+            return  # it was cancelled
 
 
 world.run()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import tempfile
 import threading
 import time
 import unittest
@@ -20,7 +21,7 @@ def tearDownModule():
 class Peer:
     """The other side: Elbowroom, line by line."""
 
-    def __init__(self, world):
+    def __init__(self, world, version=2, resumed=None):
         self.world = world
         there, self._said = os.pipe(), os.pipe()
         self._mouth = os.fdopen(there[1], "w")
@@ -29,7 +30,14 @@ class Peer:
         PIPES.extend([self._mouth, self._ears, *self._ends])
         self._thread = threading.Thread(target=world.run, args=self._ends, daemon=True)
         self._thread.start()
-        self.tell(type="hello", protocol="elbowroom-world", version=1)
+        hello = {"type": "hello", "protocol": "elbowroom-world", "version": 1}
+        if version == 2:
+            hello["versions"] = [1, 2]
+        if resumed is not None:
+            hello["resumed"] = resumed
+        self.tell(**hello)
+        self.greeting = self.hear() if version == 2 else None
+        self._question = 0
 
     def tell(self, **message):
         self._mouth.write(json.dumps(message) + "\n")
@@ -44,7 +52,8 @@ class Peer:
 
     def ask(self, **question):
         """The reports up to `time`, and what time it is."""
-        self.tell(**question)
+        self._question += 1
+        self.tell(question=self._question, **question)
         reports = []
         while True:
             message = self.hear()
@@ -75,7 +84,7 @@ class Peer:
 
 
 def kinds(reports):
-    return [(it["type"], it.get("outcome")) for it in reports]
+    return [(it["type"], it.get("outcome")) for it in reports if it["type"] != "feedback"]
 
 
 class OnTheWallClock(unittest.TestCase):
@@ -85,12 +94,17 @@ class OnTheWallClock(unittest.TestCase):
         @world.action("drive")
         def drive(action):
             self.assertEqual(action.arguments, ["rover", "depot", "shelf"])
+            action.feedback(0.5, "half-way")
             action.sleep(action.duration)
 
         peer = Peer(world)
+        self.assertEqual(peer.greeting["version"], 2)
+        self.assertIn("cancel", peer.greeting["can"])
         peer.start(0)
-        reports = peer.reports(2)
+        reports = peer.reports(3)
         self.assertEqual(kinds(reports), [("started", None), ("ended", "succeeded")])
+        half = [it for it in reports if it["type"] == "feedback"]
+        self.assertEqual([(it["completion"], it["note"]) for it in half], [(0.5, "half-way")])
         took = reports[-1]["time"] - reports[0]["time"]
         self.assertGreaterEqual(took, 1.0)
         self.assertTrue(peer.stop())
@@ -175,6 +189,7 @@ class OnTheWallClock(unittest.TestCase):
         world = World(speed=10)
         world.look(lambda words: {"at": True, "charge": 17.5}.get(words[0]))
         peer = Peer(world)
+        self.assertIn("look", peer.greeting["can"])
         threading.Timer(0.05, lambda: world.fact("(open door)", False)).start()
         ((report,), now) = peer.wait(1000)
         self.assertEqual((report["fact"], report["becomes"]), ("(open door)", False))
@@ -182,6 +197,18 @@ class OnTheWallClock(unittest.TestCase):
         seen, _ = peer.ask(type="look", facts=["(at r b)", "(lies p)"], fluents=["(charge r)"])
         self.assertEqual([it["type"] for it in seen], ["fact", "value"])
         self.assertEqual(seen[1]["value"], 17.5)
+
+    def test_without_an_offer_of_version_2_the_first_is_spoken(self):
+        world = World(speed=100)
+
+        @world.action("*")
+        def work(action):
+            action.feedback(0.5)
+
+        peer = Peer(world, version=1)
+        peer.start(0)
+        reports = peer.reports(2)
+        self.assertEqual([it["type"] for it in reports], ["started", "ended"])
 
     def test_when_elbowroom_is_gone_what_runs_is_told_to_stop(self):
         world, stopped = World(speed=1), threading.Event()
@@ -219,6 +246,76 @@ class Simulated(unittest.TestCase):
         self.assertEqual((reports[0]["outcome"], now), ("succeeded", 10))
         self.assertEqual(peer.wait(100), ([], 100))
         self.assertTrue(peer.stop())
+
+
+class AfterACrash(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.ledger = os.path.join(self.folder.name, "ledger")
+
+    def world(self, resumes):
+        world, self.done = World(speed=100, ledger=self.ledger), []
+
+        @world.action("drive", resumes=resumes)
+        def drive(action):
+            self.done.append((action.ticket, action.is_resumed))
+            action.sleep(action.start + action.duration - world.now() if action.start else action.duration)
+
+        return world
+
+    def before(self):
+        """One action has ended, and one runs, when both sides die."""
+        peer = Peer(self.world(False))
+        self.assertIn("resume", peer.greeting["can"])
+        peer.start(0, duration=1.0)
+        self.assertEqual(len(peer.reports(2)), 2)
+        peer.start(1, duration=500.0)
+        peer.reports(1)
+        self.assertTrue(peer.hang_up())
+        with open(self.ledger, "a", encoding="utf-8") as file:
+            file.write('{"ticket": 7, "act')  # cut off
+
+    def resumed(self, resumes):
+        peer = Peer(self.world(resumes), resumed={"now": 3})
+        reports, _ = peer.ask(type="look", facts=[], fluents=[], tickets=[0, 1, 2])
+        return {it["ticket"]: it for it in reports}, peer
+
+    def test_it_says_what_became_of_what_was_started(self):
+        self.before()
+        told, _ = self.resumed(True)
+        self.assertEqual((told[0]["type"], told[0]["outcome"]), ("ended", "succeeded"))
+        self.assertEqual(told[1]["type"], "started")
+        self.assertEqual(told[2]["type"], "unknown")
+        self.assertEqual(self.done, [(1, True)])
+
+    def test_what_cannot_be_resumed_has_failed(self):
+        self.before()
+        told, peer = self.resumed(False)
+        if 1 in told and told[1]["type"] == "started":
+            told = {it["ticket"]: it for it in peer.wait(1000)[0]}
+        self.assertEqual((told[1]["type"], told[1]["outcome"]), ("ended", "failed"))
+
+    def test_its_time_goes_on(self):
+        self.before()
+        time.sleep(0.1)
+        _, peer = self.resumed(True)
+        _, now = peer.wait(0)
+        self.assertGreater(now, 10)
+
+    def test_nothing_is_started_twice(self):
+        self.before()
+        _, peer = self.resumed(True)
+        peer.start(0)
+        peer.start(1)
+        time.sleep(0.05)
+        self.assertEqual(self.done, [(1, True)])
+
+    def test_a_new_run_begins_with_an_empty_ledger(self):
+        self.before()
+        Peer(self.world(False))
+        with open(self.ledger, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ mod number;
 mod odds;
 mod plan;
 mod run;
+mod world_check;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -24,6 +25,7 @@ use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
 pub(crate) use plan::{EMBEDDED, PlanArgs};
 pub(crate) use run::{RunArgs, RunningChoice};
+pub(crate) use world_check::WorldCheckArgs;
 
 /// How much elbow room does a temporal plan have?
 #[derive(Debug, Parser)]
@@ -96,6 +98,8 @@ pub(crate) enum Command {
     Envelope(Box<EnvelopeArgs>),
     /// Execute a plan, monitor it, and replan when it no longer works
     Run(Box<RunArgs>),
+    /// Play through the protocol with a program that is a world, and say what it does wrong
+    WorldCheck(WorldCheckArgs),
     /// Compare executors over many simulated runs
     Compare(CompareArgs),
     /// Learn from logs how long actions take and how often they fail
@@ -123,6 +127,7 @@ impl Command {
             Self::Stn(arguments) => arguments.json,
             Self::Envelope(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
+            Self::WorldCheck(arguments) => arguments.json,
             Self::Compare(arguments) => arguments.json,
             Self::Learn(arguments) => arguments.json,
             Self::Odds(arguments) => arguments.json,

@@ -12,3 +12,4 @@ pub(crate) mod run;
 pub(crate) mod shell;
 pub(crate) mod stn;
 pub(crate) mod val;
+pub(crate) mod world_check;

@@ -68,6 +68,11 @@ impl Failure {
         }
     }
 
+    /// What is wrong, in lower case.
+    pub(crate) fn message(&self) -> &str {
+        &self.message
+    }
+
     /// Where texts are wrong.
     pub(crate) fn diagnostics(&self) -> &[Record] {
         &self.diagnostics

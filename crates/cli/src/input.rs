@@ -15,6 +15,7 @@ pub(crate) use elbowroom::AnyPlan;
 
 use crate::args::ProblemArgs;
 use crate::exit::Failure;
+use crate::journal::Journal;
 use crate::look::{HINT, styled};
 use crate::output::{self, Output};
 use crate::words::plain;
@@ -84,6 +85,17 @@ pub(crate) fn tell_repair(path: &Path, violation: &Violation) {
         path.display(),
         styled(HINT, "note"),
     ));
+}
+
+/// Reads a trace, or another record of `what`. Of a journal, its lines without their checksums.
+pub(crate) fn record(path: &Path, what: &str) -> Result<Source, Failure> {
+    let text = source(path, what)?;
+    if !crate::journal::is_journal(text.text()) {
+        return Ok(text);
+    }
+    let journal = Journal::read(text.text())
+        .map_err(|why| Failure::new(format!("the journal {}: {why}", path.display()), ""))?;
+    Ok(Source::new(text.name(), journal.text))
 }
 
 /// Reads a text file, or standard input for `-`.

@@ -8,9 +8,11 @@ mod args;
 mod bug;
 mod clock;
 mod commands;
+mod conversation;
 mod exit;
 mod input;
 mod interrupt;
+mod journal;
 mod limits;
 mod look;
 mod number;
@@ -44,6 +46,7 @@ pub fn run(line: Vec<OsString>) -> u8 {
         Command::Plan(arguments) => commands::plan::run(&arguments, &mut output),
         Command::Stn(arguments) => commands::stn::run(&arguments, &mut output),
         Command::Envelope(arguments) => commands::envelope::run(&arguments, &mut output),
+        Command::WorldCheck(arguments) => commands::world_check::run(&arguments, &mut output),
         Command::Compare(arguments) => commands::compare::run(&arguments, &mut output),
         Command::Learn(arguments) => commands::learn::run(&arguments, &mut output),
         Command::Odds(arguments) => commands::odds::run(&arguments, &mut output),

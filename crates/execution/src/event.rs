@@ -66,6 +66,15 @@ pub enum Event {
         /// By how much its end really changed fluents, where that was measured.
         measured: Vec<Measured>,
     },
+    /// A running action says how far it has come. It changes nothing, but is a sign of life.
+    Feedback {
+        /// The ticket of its start.
+        ticket: Ticket,
+        /// The part that is done, from 0 to 1, if that is known.
+        completion: Option<Rational>,
+        /// What there is to say about it; may be empty.
+        note: String,
+    },
     /// A fact is seen to be true or false.
     Fact {
         /// The fact.

@@ -17,6 +17,7 @@
 //! | a success after a cancel | the success counts: the action was faster |
 //! | a report with a time in the future, or before the action's start | its time is taken as the nearest possible one |
 //! | a report that comes late | it counts from its own time on for durations, from its arrival on for the state |
+//! | feedback | a sign of life: silence counts from then on |
 //! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
 //! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
 //! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |

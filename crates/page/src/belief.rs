@@ -131,7 +131,9 @@ impl<'t> Belief<'t> {
                     self.progression.see_value(fluent, &value.0);
                 }
             }
-            ObservationLine::Started { .. } | ObservationLine::Unintelligible { .. } => {}
+            ObservationLine::Started { .. }
+            | ObservationLine::Feedback { .. }
+            | ObservationLine::Unintelligible { .. } => {}
         }
         self.note(texts);
     }

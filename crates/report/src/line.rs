@@ -309,6 +309,17 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
+    /// A running action says how far it has come.
+    Feedback {
+        /// Which start.
+        ticket: u64,
+        /// The part that is done, from 0 to 1; `None` if that is not known.
+        completion: Option<Exact>,
+        /// What there is to say about it.
+        note: String,
+        /// The time.
+        time: Exact,
+    },
     /// A fact is seen.
     Fact {
         /// Its name: `(at rover depot)`.

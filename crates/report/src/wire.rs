@@ -101,6 +101,14 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
             ending: ending(message)?,
             measured: read_amounts(message, task)?,
         },
+        "feedback" => Event::Feedback {
+            ticket: ticket()?,
+            completion: completion(message)?,
+            note: match message.get("note") {
+                None | Some(Value::Null) => String::new(),
+                Some(_) => field_text(message, "note")?.to_owned(),
+            },
+        },
         "fact" => {
             let name = field_text(message, "fact")?;
             let fact = task.fact_named(name);
@@ -128,7 +136,8 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
         },
         other => {
             return Err(wrong(format!(
-                "`{other}` is no type of observation: started, ended, fact, value"
+                "`{other}` is no type of observation: started, ended, feedback, \
+                 fact, value"
             )));
         }
     };
@@ -136,6 +145,18 @@ pub fn read_observation(message: &Value, task: &Task) -> Result<Observation, Wir
         time: field_number(message, "time")?,
         event,
     })
+}
+
+fn completion(message: &Value) -> Result<Option<Rational>, WireError> {
+    let Some(value) = message.get("completion").filter(|value| !value.is_null()) else {
+        return Ok(None);
+    };
+    let completion = read_number(value);
+    let completion = completion.filter(|part| !part.is_negative() && *part <= Rational::ONE);
+    match completion {
+        Some(part) => Ok(Some(part)),
+        None => Err(wrong("`completion` must be a number from 0 to 1")),
+    }
 }
 
 fn ending(message: &Value) -> Result<Ending, WireError> {

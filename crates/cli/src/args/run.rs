@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use elbowroom::num::Rational;
 
 use super::envelope::{Guarantee, controllable};
@@ -11,12 +11,13 @@ use super::plan::EMBEDDED;
 
 #[derive(Args, Debug)]
 #[command(after_long_help = executors_help())]
+#[command(group(ArgGroup::new("programs").args(["world_process", "resume"])))]
 pub(crate) struct RunArgs {
     /// The domain, in PDDL
-    #[arg(value_name = "DOMAIN", required_unless_present = "replay")]
+    #[arg(value_name = "DOMAIN", required_unless_present_any = ["replay", "resume"])]
     pub(crate) domain: Option<PathBuf>,
     /// The problem, in PDDL
-    #[arg(value_name = "PROBLEM", required_unless_present = "replay")]
+    #[arg(value_name = "PROBLEM", required_unless_present_any = ["replay", "resume"])]
     pub(crate) problem: Option<PathBuf>,
     /// The plan to begin with; without it, the planner makes one
     #[arg(value_name = "PLAN", conflicts_with = "plan")]
@@ -51,11 +52,11 @@ pub(crate) struct RunArgs {
     pub(crate) world_process: Option<String>,
     /// Time limit in seconds for each answer of that program
     #[arg(long, value_name = "S", default_value = "3600", value_parser = positive, allow_negative_numbers = true)]
-    #[arg(requires = "world_process")]
+    #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
     /// End the run at the first message of that program that is malformed or names something that
     /// the problem does not have; otherwise such messages are recorded and ignored
-    #[arg(long, requires = "world_process")]
+    #[arg(long, requires = "programs")]
     pub(crate) strict_world: bool,
     /// The executor
     #[arg(long, value_name = "NAME", default_value = "guarded")]
@@ -106,9 +107,23 @@ pub(crate) struct RunArgs {
     /// Write a trace of the run to this file (docs/formats/trace.md)
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) trace: Option<PathBuf>,
+    /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a crash.
+    /// Nothing is started that is not on the disk
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "world_process",
+        conflicts_with = "trace"
+    )]
+    pub(crate) journal: Option<PathBuf>,
+    /// Go on with the run of a journal, whose program has died: the world is asked what became of what was
+    /// under way; all other options are taken from the journal
+    #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]
+    pub(crate) resume: Option<PathBuf>,
     /// Replay a stored trace and say whether the decisions are the same; all other options are taken
     /// from the trace
     #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
+    #[arg(conflicts_with_all = ["answer_within", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
     /// Minimum time between interfering happenings (epsilon)
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
@@ -149,8 +164,6 @@ const IN_THE_TRACE: &[&str] = &[
     "world",
     "spoil",
     "world_process",
-    "answer_within",
-    "strict_world",
     "executor",
     "likelihoods",
     "seed",
@@ -164,6 +177,7 @@ const IN_THE_TRACE: &[&str] = &[
     "time_limit",
     "realtime",
     "trace",
+    "journal",
     "epsilon",
 ];
 

@@ -29,7 +29,7 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
         }
         (None, false) => Some(PathBuf::from("-")),
     };
-    let source = input::source(&path, "trace or answer")?;
+    let source = input::record(&path, "trace or answer")?;
     let failure = |error| Failure::new(error, "");
     if let Some(target) = &arguments.perfetto {
         let trace = elbowroom_page::perfetto(source.name(), source.text()).map_err(failure)?;

@@ -1,17 +1,22 @@
 //! `elbowroom run`: execute a plan in a world.
 
+mod journaled;
 mod live;
 mod process;
 mod realtime;
 mod replay;
+mod resume;
 mod spec;
 mod text;
 mod trace_file;
 
+use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
-use elbowroom::answers::RunRequest;
 use elbowroom::answers::run::{RunOutcome, run as execute};
+use elbowroom::answers::{Halt, RunRequest, Watcher};
 use elbowroom::execute::{RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Recorder, World};
@@ -24,9 +29,11 @@ use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
+use crate::journal::JournalFile;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
+use journaled::{Careful, JournalWriter, Kept};
 use realtime::{Pace, PacedPlanner, Realtime};
 use spec::contradiction;
 use trace_file::TraceFile;
@@ -35,6 +42,9 @@ use trace_file::TraceFile;
 pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     if let Some(path) = &arguments.replay {
         return replay::run(path, arguments.json, output);
+    }
+    if let Some(path) = &arguments.resume {
+        return resume::run(path, arguments, output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new("DOMAIN and PROBLEM are missing", ""));
@@ -55,9 +65,18 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         Failure::new(error, "`elbowroom help envelope` says what --vary can name")
     })?;
     spec.check().map_err(contradiction)?;
-    let mut file = TraceFile::open(arguments.trace.as_deref())?;
     let interrupt = Interrupt::listen();
     let task = Arc::new(task);
+    if let (Some(path), Some(command)) = (&arguments.journal, &arguments.world_process) {
+        let job = Job {
+            spec: &spec,
+            task: &task,
+            first,
+            interrupt: &interrupt,
+        };
+        return job.journaled(path, command, arguments, output);
+    }
+    let mut file = TraceFile::open(arguments.trace.as_deref())?;
     let outcome = {
         let mut sink = |line: &str| file.write(line);
         let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
@@ -86,17 +105,38 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         }
     };
     let trouble = file.close();
-    let shown = if arguments.json {
-        output.document(&outcome.answer)
-    } else {
-        output::print(&text::human(&outcome.report))
-    };
+    let shown = show(arguments, &outcome, output);
     // The run has been what it was, whatever became of its record.
     if let Some(trouble) = trouble {
         output::warn(&trouble);
     }
     shown?;
     exit(outcome.verdict())
+}
+
+fn show(arguments: &RunArgs, outcome: &RunOutcome, output: &mut Output) -> Result<(), Failure> {
+    if arguments.json {
+        output.document(&outcome.answer)
+    } else {
+        output::print(&text::human(&outcome.report))
+    }
+}
+
+/// Shows what came of a run with a journal; `trouble` is why that could not be written.
+fn conclude(
+    arguments: &RunArgs,
+    outcome: &RunOutcome,
+    trouble: Option<&str>,
+    output: &mut Output,
+) -> Answer {
+    show(arguments, outcome, output)?;
+    match trouble {
+        Some(why) => Err(Failure::new(
+            format!("the journal cannot be written ({why}), so the run was ended in order"),
+            "make room on the disk; `elbowroom run --resume` goes on from what the journal has",
+        )),
+        None => exit(outcome.verdict()),
+    }
 }
 
 /// The problem of a specification, with its warnings told.
@@ -127,6 +167,59 @@ impl Job<'_> {
         execute(request, world, &mut Stopwatch::start(self.interrupt))
     }
 
+    /// A run in a world that is a process, with a journal.
+    fn journaled(
+        self,
+        path: &Path,
+        command: &str,
+        arguments: &RunArgs,
+        output: &mut Output,
+    ) -> Answer {
+        let mut file = JournalFile::create(path)?;
+        let mut is_kept = false;
+        let mut sink = |line: &str| is_kept = file.write(line);
+        let mut header = trace::TraceWriter::new(Arc::clone(self.task), &mut sink);
+        let written = header.header(self.spec);
+        written.map_err(|error| Failure::new(format!("cannot write the journal: {error}"), ""))?;
+        if !is_kept {
+            let why = file.trouble().unwrap_or_default();
+            return Err(Failure::new(
+                format!("cannot write the journal {}: {why}", path.display()),
+                "nothing was started; make room on the disk, or choose another file",
+            ));
+        }
+        let manners = process::Manners {
+            patience: arguments.answer_within.clone(),
+            is_strict: arguments.strict_world,
+        };
+        let kept = Kept::default();
+        let interrupt = self.interrupt;
+        let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
+        let mut world = Careful {
+            inner: world,
+            kept: kept.clone(),
+            refused: Vec::new(),
+        };
+        let outcome = {
+            let mut writer = JournalWriter {
+                task: Arc::clone(self.task),
+                file: &mut file,
+                kept: kept.clone(),
+            };
+            let request = RunRequest::new(self.spec, self.task)
+                .beginning_with(self.first)
+                .recorded_by(live::Live::new(&mut writer));
+            let mut watch = Attentive {
+                inner: Stopwatch::start(interrupt),
+                kept,
+            };
+            execute(request, &mut world, &mut watch)
+        };
+        world.inner.stop();
+        let outcome = outcome.map_err(contradiction)?;
+        conclude(arguments, &outcome, file.trouble().as_deref(), output)
+    }
+
     /// A run in the world that the specification describes, on a wall clock if it asks for one.
     fn simulated(self, recorder: &mut dyn Recorder) -> Result<RunOutcome, SpecError> {
         let (spec, task) = (self.spec, self.task);
@@ -155,6 +248,25 @@ impl Job<'_> {
             })
             .recorded_by(recorder);
         execute(request, &mut world, &mut Stopwatch::start(self.interrupt))
+    }
+}
+
+/// Ends a run also when its journal cannot be written.
+struct Attentive {
+    inner: Stopwatch,
+    kept: Kept,
+}
+
+impl Watcher for Attentive {
+    fn elapsed(&mut self) -> Duration {
+        self.inner.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        if self.kept.is_lost() {
+            return ControlFlow::Break(Halt::Cancelled);
+        }
+        self.inner.flow()
     }
 }
 

@@ -33,6 +33,8 @@ pub(super) struct Opened {
     pub(super) step: Option<StepId>,
     pub(super) ordered: Rational,
     pub(super) started: Option<Rational>,
+    /// When it last gave a sign of life, after its start.
+    heard: Option<Rational>,
     pub(super) ended: Option<(Rational, Ending)>,
     cancelled: Option<Rational>,
     pub(super) measured: [Vec<Measured>; 2],
@@ -72,6 +74,7 @@ impl Account {
             step: Some(order.step),
             ordered: now.clone(),
             started: None,
+            heard: None,
             ended: None,
             cancelled: None,
             measured: [Vec::new(), Vec::new()],
@@ -123,6 +126,12 @@ impl Account {
         self.open.remove(&ticket);
     }
 
+    pub(super) fn note_heard(&mut self, ticket: Ticket, time: &Rational) {
+        let heard = &mut self.entries[index(ticket)].heard;
+        let latest = heard.take().into_iter().chain([time.clone()]).max();
+        *heard = latest;
+    }
+
     pub(super) fn is_cancelled(&self, ticket: Ticket) -> bool {
         self.get(ticket)
             .is_some_and(|entry| entry.cancelled.is_some())
@@ -146,7 +155,8 @@ impl Account {
         }
         let planned = entry.planned.clone().unwrap_or_default();
         let wait = (planned * &patience.factor).max(patience.at_least.clone());
-        let limit = entry.started.as_ref().unwrap_or(&entry.ordered) + wait;
+        let began = entry.started.as_ref().unwrap_or(&entry.ordered);
+        let limit = began.max(entry.heard.as_ref().unwrap_or(began)) + wait;
         allowed.map_or(limit.clone(), |allowed| limit.max(allowed))
     }
 

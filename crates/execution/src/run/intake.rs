@@ -14,6 +14,9 @@ use crate::record::Entry;
 /// The objection to a report that is ignored or corrected.
 type Remark = Option<&'static str>;
 
+/// The objection to a report on a ticket that was not given out.
+const NEVER_STARTED: &str = "nothing of that number was started";
+
 impl Run<'_> {
     /// Believes what is reported, as far as it can be believed, and notes what is new.
     pub(super) fn take_in(&mut self, observations: Vec<Observation>) {
@@ -36,9 +39,10 @@ impl Run<'_> {
         let (ticket, is_end) = match event {
             Event::Started { ticket, .. } => (*ticket, false),
             Event::Ended { ticket, .. } => (*ticket, true),
-            Event::Fact { .. } | Event::Value { .. } | Event::Unintelligible { .. } => {
-                return Planned::default();
-            }
+            Event::Feedback { .. }
+            | Event::Fact { .. }
+            | Event::Value { .. }
+            | Event::Unintelligible { .. } => return Planned::default(),
         };
         let step = self.account.get(ticket).and_then(|entry| entry.step);
         let window = step.and_then(|step| self.ports.executor.window(step, is_end));
@@ -55,6 +59,7 @@ impl Run<'_> {
                 ending,
                 measured,
             } => self.ended(*ticket, &time, ending, measured),
+            Event::Feedback { ticket, .. } => self.heard(*ticket, &time),
             Event::Fact { fact, truth } => {
                 self.believe_until(&time);
                 if self.task.is_derived(*fact) {
@@ -82,6 +87,18 @@ impl Run<'_> {
         remark.or(is_early.then_some("its time is in the future; taken as now"))
     }
 
+    /// An action gives a sign of life: so long it has not been silent.
+    fn heard(&mut self, ticket: Ticket, time: &Rational) -> Remark {
+        match self.account.get(ticket) {
+            None => Some(NEVER_STARTED),
+            Some(entry) if entry.ended.is_some() => Some("it had ended already"),
+            Some(_) => {
+                self.account.note_heard(ticket, time);
+                None
+            }
+        }
+    }
+
     /// The belief is never taken back in time, so a late report changes the present state. What is
     /// reported of one time is one group.
     fn believe_until(&mut self, time: &Rational) {
@@ -90,7 +107,7 @@ impl Run<'_> {
 
     fn started(&mut self, ticket: Ticket, time: &Rational, measured: &[Measured]) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return Some("nothing of that number was started");
+            return Some(NEVER_STARTED);
         };
         if entry.started.is_some() {
             return Some("it had started already");
@@ -135,7 +152,7 @@ impl Run<'_> {
         measured: &[Measured],
     ) -> Remark {
         let Some(entry) = self.account.get(ticket) else {
-            return Some("nothing of that number was started");
+            return Some(NEVER_STARTED);
         };
         if let Some((_, earlier)) = &entry.ended {
             let is_same = std::mem::discriminant(earlier) == std::mem::discriminant(ending);

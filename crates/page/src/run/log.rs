@@ -202,6 +202,24 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             };
             (&time.0, format!("{} {how}{why}", action(ticket)))
         }
+        ObservationLine::Feedback {
+            ticket,
+            completion,
+            note,
+            time,
+        } => {
+            let part = completion.as_ref().map(|part| {
+                let percent = &part.0 * &Rational::from(100);
+                format!(" is {} % done", nearest(&percent))
+            });
+            let part = part.unwrap_or_else(|| " is under way".to_owned());
+            let note = if note.is_empty() {
+                String::new()
+            } else {
+                format!(": {note}")
+            };
+            (&time.0, format!("{}{part}{note}", action(ticket)))
+        }
         ObservationLine::Fact {
             fact,
             becomes,

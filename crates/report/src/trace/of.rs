@@ -173,6 +173,16 @@ impl ObservationLine {
                 },
                 time,
             },
+            Event::Feedback {
+                ticket,
+                completion,
+                note,
+            } => Self::Feedback {
+                ticket: ticket.0,
+                completion: optional(completion.as_ref()),
+                note: note.clone(),
+                time,
+            },
             Event::Fact { fact, truth } => Self::Fact {
                 fact: task.fact_name(*fact),
                 becomes: *truth,

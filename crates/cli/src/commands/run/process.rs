@@ -1,8 +1,6 @@
 //! A world that is a process: `docs/formats/world-protocol.md`.
 
-mod pipes;
-
-use std::process::{Child, Command as Program, Stdio};
+use std::process::Child;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,10 +12,13 @@ use elbowroom::report::wire;
 use serde_json::{Value, json};
 
 use crate::clock::Clock;
+use crate::conversation::{
+    Ability, Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Listener, Mouth, Said, Told, ended, hello,
+    is_time, launch,
+};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
-use crate::words::{excerpt, plain};
-use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
+use crate::words::excerpt;
 
 /// The time that a program has to end when the run is over.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -56,8 +57,7 @@ pub(super) struct ProcessWorld {
     /// There is no use in telling it anything more.
     is_deaf: bool,
     task: Arc<Task>,
-    /// The tickets below this one were given.
-    given: u64,
+    listener: Listener,
 }
 
 impl ProcessWorld {
@@ -68,6 +68,42 @@ impl ProcessWorld {
         manners: Manners,
         interrupt: Interrupt,
     ) -> Result<Self, Failure> {
+        Self::greeted(command, task, manners, interrupt, &hello())
+    }
+
+    /// The same for a run that was cut off: the program is told what is known of what was under way, and that the
+    /// tickets below `given` were given.
+    pub(super) fn resume(
+        command: &str,
+        task: &Arc<Task>,
+        manners: Manners,
+        interrupt: Interrupt,
+        (resumed, given): (&Value, u64),
+    ) -> Result<Self, Failure> {
+        let mut hello = hello();
+        hello["resumed"] = resumed.clone();
+        let mut world = Self::greeted(command, task, manners, interrupt, &hello)?;
+        if let Some(last) = given.checked_sub(1) {
+            world.listener.note_start(last);
+        }
+        Ok(world)
+    }
+
+    /// Asks what became of these starts, and whether the program is one that remembers.
+    pub(super) fn recall(&mut self, tickets: &[u64]) -> Result<(Passage, bool), WorldError> {
+        let question = json!({ "type": "look", "facts": [], "fluents": [], "tickets": tickets });
+        let passage = self.ask(question)?;
+        let knows = self.listener.greeting().is_some() && self.listener.can(Ability::Resume);
+        Ok((passage, knows))
+    }
+
+    fn greeted(
+        command: &str,
+        task: &Arc<Task>,
+        manners: Manners,
+        interrupt: Interrupt,
+        hello: &Value,
+    ) -> Result<Self, Failure> {
         let cannot = |why: String| {
             Failure::new(
                 format!("cannot start the world `{command}`: {why}"),
@@ -75,28 +111,11 @@ impl ProcessWorld {
                  docs/formats/world-protocol.md says what it must do",
             )
         };
-        let mut words = command.split_whitespace();
-        let program = words
-            .next()
-            .ok_or_else(|| cannot("the command is empty".to_owned()))?;
-        let mut program = Program::new(program);
-        program
-            .args(words)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped());
-        // Ctrl-C is for this program, which then ends that one in order.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut program, 0);
-        let mut child = program.spawn().map_err(|error| cannot(plain(&error)))?;
-        let (Some(stdin), Some(stdout)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(cannot(
-                "its standard input and output are not there".to_owned(),
-            ));
-        };
+        let (child, mouth, ears) = launch(command).map_err(cannot)?;
         let mut world = Self {
             child,
-            mouth: Mouth::new(stdin),
-            ears: Ears::new(stdout),
+            mouth,
+            ears,
             patience: Duration::try_from_secs_f64(manners.patience.to_f64())
                 .unwrap_or(Duration::MAX),
             manners,
@@ -106,10 +125,9 @@ impl ProcessWorld {
             now: Rational::ZERO,
             is_deaf: false,
             task: Arc::clone(task),
-            given: 0,
+            listener: Listener::new(task),
         };
-        let hello = json!({ "type": "hello", "protocol": "elbowroom-world", "version": 1 });
-        match world.tell(&hello) {
+        match world.tell(hello) {
             Ok(()) => Ok(world),
             Err(error) => {
                 world.stop();
@@ -158,9 +176,10 @@ impl ProcessWorld {
     }
 
     /// Asks a question, unless one is open already, and listens.
-    fn ask(&mut self, question: &Value) -> Result<Passage, WorldError> {
+    fn ask(&mut self, mut question: Value) -> Result<Passage, WorldError> {
         if !self.is_asked {
-            self.tell(question)?;
+            question["question"] = self.listener.next_question().into();
+            self.tell(&question)?;
             self.is_asked = true;
         }
         self.hear()
@@ -203,7 +222,8 @@ impl ProcessWorld {
             if line.is_empty() {
                 continue;
             }
-            match self.read(line) {
+            match self.listener.read(line) {
+                Ok(Said::Greeting(_) | Said::Clock | Said::Unknown) => {}
                 Ok(Said::Time(now)) => {
                     self.is_asked = false;
                     self.now.clone_from(&now);
@@ -228,25 +248,6 @@ impl ProcessWorld {
                     }
                 }
             }
-        }
-    }
-
-    fn read(&mut self, line: &str) -> Result<Said, String> {
-        let message: Value =
-            serde_json::from_str(line).map_err(|error| format!("not JSON: {error}"))?;
-        if message.get("type").and_then(Value::as_str) == Some("time") {
-            let now = wire::field_number(&message, "now");
-            return now.map(Said::Time).map_err(|error| error.message);
-        }
-        let observation = wire::read_observation(&message, &self.task);
-        let observation = observation.map_err(|error| error.message)?;
-        match &observation.event {
-            Event::Started { ticket, .. } | Event::Ended { ticket, .. }
-                if ticket.0 >= self.given =>
-            {
-                Err(format!("ticket {} was never given", ticket.0))
-            }
-            _ => Ok(Said::Observation(observation)),
         }
     }
 
@@ -291,36 +292,13 @@ fn babbles(last: Option<&str>) -> WorldError {
     ))
 }
 
-/// Whether a line is a message that ends an answer, right or wrong.
-fn is_time(line: &str) -> bool {
-    let message = serde_json::from_str::<Value>(line).unwrap_or_default();
-    message.get("type").and_then(Value::as_str) == Some("time")
-}
-
-/// One line, understood.
-enum Said {
-    Time(Rational),
-    Observation(Observation),
-}
-
-/// How a program has ended, if it does so within `patience`.
-fn ended(child: &mut Child, patience: Duration) -> Option<std::process::ExitStatus> {
-    let clock = Clock::start();
-    loop {
-        match child.try_wait() {
-            Ok(Some(status)) => return Some(status),
-            Ok(None) if clock.elapsed() < patience => {
-                std::thread::sleep(Duration::from_millis(20));
-            }
-            _ => return None,
-        }
-    }
-}
-
 impl World for ProcessWorld {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        if let Command::Start { ticket, .. } = command {
-            self.given = self.given.max(ticket.0.saturating_add(1));
+        match command {
+            Command::Start { ticket, .. } => self.listener.note_start(ticket.0),
+            // It goes on until it ends by itself, or is given up.
+            Command::Cancel { .. } if !self.listener.can(Ability::Cancel) => return Ok(()),
+            Command::Cancel { .. } => {}
         }
         let mut message = wire::command(command);
         message["now"] = wire::number(now);
@@ -328,7 +306,7 @@ impl World for ProcessWorld {
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
-        let mut passage = self.ask(&json!({ "type": "wait", "until": wire::number(until) }))?;
+        let mut passage = self.ask(json!({ "type": "wait", "until": wire::number(until) }))?;
         // Who counts in floats has come as far as a float can.
         if passage.now.to_f64().total_cmp(&until.to_f64()).is_eq() {
             passage.now.clone_from(until);
@@ -341,6 +319,9 @@ impl World for ProcessWorld {
         facts: &[FactId],
         fluents: &[FluentId],
     ) -> Result<Vec<Observation>, WorldError> {
+        if !self.listener.can(Ability::Look) {
+            return Ok(Vec::new());
+        }
         let facts = facts.iter().map(|fact| self.task.fact_name(*fact));
         let fluents = fluents.iter().map(|fluent| self.task.fluent_name(*fluent));
         let message = json!({
@@ -348,6 +329,6 @@ impl World for ProcessWorld {
             "facts": facts.collect::<Vec<_>>(),
             "fluents": fluents.collect::<Vec<_>>(),
         });
-        Ok(self.ask(&message)?.observations)
+        Ok(self.ask(message)?.observations)
     }
 }

@@ -18,7 +18,7 @@ use crate::{input, output};
 
 pub(super) fn run(path: &Path, as_json: bool, output: &mut Output) -> Answer {
     let name = path.display().to_string();
-    let text = input::source(path, "trace")?;
+    let text = input::record(path, "trace")?;
     let unreadable = |message: String| Failure::new(format!("{name}, {message}"), "");
     let stored = Stored::read(text.text()).map_err(|error| unreadable(error.to_string()))?;
     let spec: RunSpec = stored.header().map_err(|error| {

@@ -8,20 +8,20 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 /// A line with more bytes is no message.
-pub(super) const LONGEST_LINE: usize = 1 << 20;
+pub(crate) const LONGEST_LINE: usize = 1 << 20;
 
 /// The limit on bytes that wait to be read, and on those in one answer.
-pub(super) const LONGEST_ANSWER: usize = 16 << 20;
+pub(crate) const LONGEST_ANSWER: usize = 16 << 20;
 
 /// The reader of a program's standard output.
-pub(super) struct Ears {
+pub(crate) struct Ears {
     lines: Receiver<Heard>,
     /// The number of bytes that have come and are not taken yet.
     waiting: Arc<AtomicUsize>,
 }
 
 /// The result of waiting for a line.
-pub(super) enum Heard {
+pub(crate) enum Heard {
     /// A line, without what is no UTF-8.
     Line(String),
     /// More than [`LONGEST_LINE`] bytes without a line feed.
@@ -35,7 +35,7 @@ pub(super) enum Heard {
 }
 
 impl Ears {
-    pub(super) fn new(stdout: ChildStdout) -> Self {
+    pub(crate) fn new(stdout: ChildStdout) -> Self {
         let (sender, lines) = channel();
         let waiting = Arc::new(AtomicUsize::new(0));
         let ears = Self {
@@ -47,7 +47,7 @@ impl Ears {
     }
 
     /// The next line, unless it takes longer than `patience`.
-    pub(super) fn hear(&self, patience: Duration) -> Heard {
+    pub(crate) fn hear(&self, patience: Duration) -> Heard {
         match self.lines.recv_timeout(patience) {
             Ok(heard) => {
                 if let Heard::Line(line) = &heard {
@@ -87,13 +87,13 @@ fn listen(mut reader: impl BufRead, sender: &Sender<Heard>, waiting: &AtomicUsiz
 }
 
 /// The writer to a program's standard input, which is closed when this is dropped.
-pub(super) struct Mouth {
+pub(crate) struct Mouth {
     lines: Sender<String>,
     written: Receiver<io::Result<()>>,
 }
 
 /// The result of writing a line.
-pub(super) enum Told {
+pub(crate) enum Told {
     /// It is written; whether the program has read it is not known.
     Yes,
     /// The pipe is full: the program does not read.
@@ -103,7 +103,7 @@ pub(super) enum Told {
 }
 
 impl Mouth {
-    pub(super) fn new(mut stdin: ChildStdin) -> Self {
+    pub(crate) fn new(mut stdin: ChildStdin) -> Self {
         let (lines, told) = channel::<String>();
         let (sender, written) = channel();
         std::thread::spawn(move || {
@@ -120,7 +120,7 @@ impl Mouth {
     }
 
     /// Writes a line, unless that takes longer than `patience`; then no more can be told.
-    pub(super) fn tell(&self, line: String, patience: Duration) -> Told {
+    pub(crate) fn tell(&self, line: String, patience: Duration) -> Told {
         if self.lines.send(line).is_err() {
             return Told::End;
         }

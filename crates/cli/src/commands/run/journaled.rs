@@ -1,0 +1,87 @@
+//! A run with a journal: nothing is started that is not on the disk.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use elbowroom::execution::{
+    Command, Ending, Entry, Event, Observation, Passage, Recorder, World, WorldError,
+};
+use elbowroom::model::Task;
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::Line;
+
+use crate::journal::JournalFile;
+
+/// Whether everything is on the disk that should be.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Kept(Arc<AtomicBool>);
+
+impl Kept {
+    /// Whether a record was lost.
+    pub(super) fn is_lost(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
+/// Writes each entry into a journal. Before the world is told to start or to cancel something, that is on
+/// the disk; all else is handed to the operating system at once.
+pub(super) struct JournalWriter<'a> {
+    pub(super) task: Arc<Task>,
+    pub(super) file: &'a mut JournalFile,
+    pub(super) kept: Kept,
+}
+
+impl Recorder for JournalWriter<'_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        let line = Line::of(&self.task, entry);
+        let is_written = self.file.write(&format!("{}\n", line.text()));
+        let is_kept = is_written && (!matches!(entry, Entry::Command { .. }) || self.file.sync());
+        if !is_kept {
+            self.kept.0.store(true, Ordering::SeqCst);
+        }
+    }
+}
+
+/// A world that starts nothing any more when the journal has lost a record. What runs is still told to
+/// stop: the run is over, in order.
+pub(super) struct Careful<W> {
+    pub(super) inner: W,
+    pub(super) kept: Kept,
+    /// What was not started.
+    pub(super) refused: Vec<Observation>,
+}
+
+impl<W: World> World for Careful<W> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        match command {
+            Command::Start { ticket, .. } if self.kept.is_lost() => {
+                let why = "it was not started: the journal cannot be written".to_owned();
+                self.refused.push(Observation {
+                    time: now.clone(),
+                    event: Event::Ended {
+                        ticket: *ticket,
+                        ending: Ending::Failed { why },
+                        measured: Vec::new(),
+                    },
+                });
+                Ok(())
+            }
+            _ => self.inner.command(now, command),
+        }
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let mut passage = self.inner.wait(until)?;
+        passage.observations.append(&mut self.refused);
+        Ok(passage)
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        self.inner.look(facts, fluents)
+    }
+}

@@ -1,0 +1,343 @@
+//! `elbowroom run --resume`: goes on with a run whose program has died.
+//!
+//! Everything that a run decides follows from what the world reported and what the planner answered, and
+//! both stand in the journal. So the run is played again up to where its journal ends, without a word to the
+//! world; there the world itself takes over. `docs/formats/journal.md` has the rules for what was under
+//! way.
+
+mod past;
+mod under_way;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::answers::RunRequest;
+use elbowroom::answers::run::run as execute;
+use elbowroom::execute::RunSpec;
+use elbowroom::execution::{
+    Command, Ending, Event, Observation, Passage, Ticket, World, WorldError,
+};
+use elbowroom::model::Task;
+use elbowroom::model::ground::{FactId, FluentId};
+use elbowroom::num::Rational;
+use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
+
+use super::journaled::{Careful, JournalWriter, Kept};
+use super::process::{Manners, ProcessWorld};
+use super::spec::contradiction;
+use crate::args::RunArgs;
+use crate::clock::Clock;
+use crate::exit::{Answer, Failure};
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::journal::{Journal, JournalFile};
+use crate::output::Output;
+use crate::stopwatch::Stopwatch;
+use past::{Past, PastPlanner, PastRecorder, Watch};
+use under_way::UnderWay;
+
+/// Goes on with the run of a journal.
+pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answer {
+    let name = path.display().to_string();
+    let unreadable = |message: String| Failure::new(format!("the journal {name}: {message}"), "");
+    let text = input::source(path, "journal")?;
+    if !crate::journal::is_journal(text.text()) {
+        return Err(Failure::new(
+            format!("{name} is no journal of a run"),
+            "`elbowroom run --journal` writes them; a trace can be played back with --replay",
+        ));
+    }
+    let mut journal = Journal::read(text.text()).map_err(unreadable)?;
+    let read = |journal: &Journal| {
+        let stored = Stored::read(&journal.text);
+        stored.map_err(|error| unreadable(error.to_string()))
+    };
+    let mut stored = read(&journal)?;
+    // A world that has died may be there again.
+    if let Some(Line::Over(report)) = stored.lines.last()
+        && report.verdict == WORLD_FAILED
+    {
+        journal = journal.without_last();
+        stored = read(&journal)?;
+    }
+    if let Some(Line::Over(report)) = stored.lines.last() {
+        return Err(Failure::new(
+            format!("the run of {name} is over: {}", report.verdict),
+            "there is nothing to go on with; `elbowroom report` shows what was done",
+        ));
+    }
+    let spec: RunSpec = stored.header().map_err(|error| {
+        let hint = "the journal may be of another version of this program";
+        Failure::new(format!("{name}, {error}"), hint)
+    })?;
+    let Some(command) = spec.world_process.clone() else {
+        return Err(unreadable("its world was no process".to_owned()));
+    };
+    let task = Arc::new(super::task(&spec, output)?);
+    let first = if spec.has_plan {
+        let first = stored.first_plan(&task);
+        first.map_err(|error| unreadable(error.to_string()))?
+    } else {
+        None
+    };
+    let mut file = JournalFile::go_on(path, &journal)?;
+    let interrupt = Interrupt::listen();
+    let kept = Kept::default();
+    let past = Arc::new(Past::new(&stored));
+    let outcome = {
+        let begun = Clock::start();
+        let clock = || begun.seconds();
+        let goes_on = || !interrupt.is_requested();
+        let planner = spec
+            .planner_for(None, &clock, &goes_on)
+            .map_err(contradiction)?;
+        let request = RunRequest::new(&spec, &task)
+            .beginning_with(first)
+            .planned_by(PastPlanner {
+                left: stored
+                    .lines
+                    .iter()
+                    .filter(|line| matches!(line, Line::Planned(_)))
+                    .count(),
+                past: ReplayPlanner::new(&stored),
+                present: planner,
+            })
+            .recorded_by(PastRecorder {
+                past: Arc::clone(&past),
+                task: Arc::clone(&task),
+                writer: JournalWriter {
+                    task: Arc::clone(&task),
+                    file: &mut file,
+                    kept: kept.clone(),
+                },
+            });
+        let mut world = Careful {
+            inner: PastWorld {
+                replay: ReplayWorld::new(&stored, &task),
+                left: stored.lines.iter().filter(|line| is_answer(line)).count(),
+                past: Arc::clone(&past),
+                under_way: UnderWay::of(&stored),
+                launch: Launch {
+                    command,
+                    task: &task,
+                    patience: arguments.answer_within.clone(),
+                    is_strict: arguments.strict_world,
+                    interrupt: interrupt.clone(),
+                },
+                present: None,
+                last: Rational::ZERO,
+                shift: Rational::ZERO,
+                news: None,
+            },
+            kept: kept.clone(),
+            refused: Vec::new(),
+        };
+        let mut watch = Watch {
+            inner: Stopwatch::start(&interrupt),
+            past: Arc::clone(&past),
+            kept: kept.clone(),
+        };
+        let outcome = execute(request, &mut world, &mut watch);
+        if let Some(world) = world.inner.present {
+            world.stop();
+        }
+        outcome.map_err(contradiction)?
+    };
+    if let Some(line) = past.difference() {
+        return Err(Failure::new(
+            format!(
+                "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
+                 told to the world"
+            ),
+            "it may be of another version of this program",
+        ));
+    }
+    super::conclude(arguments, &outcome, file.trouble().as_deref(), output)
+}
+
+/// The verdict of a run whose world has died.
+const WORLD_FAILED: &str = "world-failed";
+
+/// Whether it is an answer of the world.
+fn is_answer(line: &Line) -> bool {
+    matches!(line, Line::Passed(_) | Line::Looked(_))
+}
+
+/// How the world is started again.
+struct Launch<'a> {
+    command: String,
+    task: &'a Arc<Task>,
+    patience: Rational,
+    is_strict: bool,
+    interrupt: Interrupt,
+}
+
+/// The world of the journal, and behind its end the world itself.
+struct PastWorld<'a> {
+    replay: ReplayWorld,
+    /// How many answers of the world the journal still has.
+    left: usize,
+    past: Arc<Past>,
+    under_way: UnderWay,
+    launch: Launch<'a>,
+    present: Option<ProcessWorld>,
+    /// What time it is, for the run.
+    last: Rational,
+    /// What is added to the times of a world that begins anew.
+    shift: Rational,
+    /// What became of what was under way, until the run has heard it.
+    news: Option<Vec<Observation>>,
+}
+
+impl PastWorld<'_> {
+    /// The world itself, started again if need be. Then it is asked what became of what was under way.
+    fn present(&mut self) -> Result<&mut ProcessWorld, WorldError> {
+        if self.past.difference().is_some() {
+            return Err(WorldError::new("the journal leads to other decisions"));
+        }
+        if self.present.is_none() {
+            let launch = &self.launch;
+            let manners = Manners {
+                patience: launch.patience.clone(),
+                is_strict: launch.is_strict,
+            };
+            let resumed = self.under_way.told(&self.last);
+            let world = ProcessWorld::resume(
+                &launch.command,
+                launch.task,
+                manners,
+                launch.interrupt.clone(),
+                (&resumed, self.under_way.given),
+            );
+            let world = world.map_err(|failure| WorldError::new(failure.message()))?;
+            self.present = Some(world);
+            self.reconcile()?;
+        }
+        self.present
+            .as_mut()
+            .ok_or_else(|| WorldError::new("the world is not there"))
+    }
+
+    /// Asks what became of what was under way, and tells what was told already again.
+    fn reconcile(&mut self) -> Result<(), WorldError> {
+        let Some(world) = &mut self.present else {
+            return Ok(());
+        };
+        let tickets: Vec<u64> = self.under_way.open.keys().copied().collect();
+        let (passage, knows) = world.recall(&tickets)?;
+        if !knows {
+            // It begins with its time 0, at what is now for the run.
+            self.shift = self.last.clone();
+        }
+        self.last = (&passage.now + &self.shift).max(self.last.clone());
+        let mut news = shifted(passage.observations, &self.shift);
+        for (ticket, open) in &self.under_way.open {
+            let is_told = news.iter().any(|it| is_about(&it.event, *ticket));
+            if !(knows && is_told) {
+                let why = if knows {
+                    "the world knows nothing of it after the restart"
+                } else {
+                    "it was under way when the run was cut off, and the world cannot say what became of it"
+                };
+                news.push(Observation {
+                    time: self.last.clone(),
+                    event: Event::Ended {
+                        ticket: Ticket(*ticket),
+                        ending: Ending::Failed {
+                            why: why.to_owned(),
+                        },
+                        measured: Vec::new(),
+                    },
+                });
+            }
+            // Whether the world has heard it is not known, and it may be told twice. What it knows nothing
+            // of may go on all the same, and is to stop.
+            if open.is_cancelled || !is_told {
+                let ticket = Ticket(*ticket);
+                world.command(&self.last, &Command::Cancel { ticket })?;
+            }
+        }
+        self.news = Some(news);
+        Ok(())
+    }
+}
+
+fn is_about(event: &Event, about: u64) -> bool {
+    match event {
+        Event::Started { ticket, .. } | Event::Ended { ticket, .. } => ticket.0 == about,
+        _ => false,
+    }
+}
+
+fn shifted(mut observations: Vec<Observation>, shift: &Rational) -> Vec<Observation> {
+    for observation in &mut observations {
+        observation.time = &observation.time + shift;
+    }
+    observations
+}
+
+impl World for PastWorld<'_> {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        if self.past.has_last() {
+            return Ok(());
+        }
+        self.present()?;
+        let told = (now - &self.shift).max(Rational::ZERO);
+        if self.news.is_none() {
+            return self.present()?.command(&told, command);
+        }
+        // It was decided before anybody knew what became of the rest.
+        match command {
+            Command::Cancel { .. } => self.present()?.command(&told, command),
+            Command::Start { ticket, .. } => {
+                let why = "it was not started: the run was cut off just then".to_owned();
+                let time = self.last.clone();
+                let event = Event::Ended {
+                    ticket: *ticket,
+                    ending: Ending::Failed { why },
+                    measured: Vec::new(),
+                };
+                let news = self.news.get_or_insert_default();
+                news.push(Observation { time, event });
+                Ok(())
+            }
+        }
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        if let Some(left) = self.left.checked_sub(1) {
+            self.left = left;
+            let passage = self.replay.wait(until)?;
+            self.last = passage.now.clone().max(self.last.clone());
+            return Ok(passage);
+        }
+        self.present()?;
+        if let Some(observations) = self.news.take() {
+            let now = self.last.clone();
+            return Ok(Passage { now, observations });
+        }
+        let shift = self.shift.clone();
+        let passage = self.present()?.wait(&(until - &shift))?;
+        Ok(Passage {
+            now: &passage.now + &shift,
+            observations: shifted(passage.observations, &shift),
+        })
+    }
+
+    fn look(
+        &mut self,
+        facts: &[FactId],
+        fluents: &[FluentId],
+    ) -> Result<Vec<Observation>, WorldError> {
+        if let Some(left) = self.left.checked_sub(1) {
+            self.left = left;
+            return self.replay.look(facts, fluents);
+        }
+        let mut seen = shifted(self.present()?.look(facts, fluents)?, &self.shift.clone());
+        if let Some(mut news) = self.news.take() {
+            news.append(&mut seen);
+            return Ok(news);
+        }
+        Ok(seen)
+    }
+}

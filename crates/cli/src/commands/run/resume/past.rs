@@ -1,0 +1,126 @@
+//! What stands in the journal of a run, played again.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use elbowroom::answers::{Halt, Watcher};
+use elbowroom::execution::{Entry, Planner, PlannerAnswer, Recorder};
+use elbowroom::model::{Situation, Task};
+use elbowroom::report::trace::{Line, ReplayPlanner, Stored};
+
+use super::super::journaled::{JournalWriter, Kept};
+use crate::stopwatch::Stopwatch;
+
+/// What stands in the journal, and how much of it has been played.
+pub(super) struct Past {
+    lines: Vec<Line>,
+    played: AtomicUsize,
+    /// The first line that came out otherwise; 0 if none has.
+    difference: AtomicUsize,
+    is_to_end: AtomicBool,
+}
+
+impl Past {
+    pub(super) fn new(stored: &Stored) -> Self {
+        let past = Self {
+            lines: stored.lines.clone(),
+            played: AtomicUsize::new(0),
+            difference: AtomicUsize::new(0),
+            is_to_end: AtomicBool::new(false),
+        };
+        past.look_ahead(0);
+        past
+    }
+
+    /// The run was asked to end where its journal says so.
+    fn look_ahead(&self, next: usize) {
+        let is_to_end = matches!(self.lines.get(next), Some(Line::Interrupted(_)));
+        self.is_to_end.store(is_to_end, Ordering::SeqCst);
+    }
+
+    /// Takes note of an entry; whether it is a new one.
+    fn play(&self, line: &Line) -> bool {
+        let index = self.played.fetch_add(1, Ordering::SeqCst);
+        let Some(stored) = self.lines.get(index) else {
+            return self.difference().is_none();
+        };
+        self.look_ahead(index + 1);
+        if stored != line && self.difference().is_none() {
+            // The header is the first line of the file.
+            self.difference.store(index + 2, Ordering::SeqCst);
+        }
+        false
+    }
+
+    /// Whether the last entry stands in the journal: what it tells the world, the world was told, or may
+    /// have been.
+    pub(super) fn has_last(&self) -> bool {
+        self.played.load(Ordering::SeqCst) <= self.lines.len()
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.played.load(Ordering::SeqCst) >= self.lines.len()
+    }
+
+    pub(super) fn difference(&self) -> Option<usize> {
+        Some(self.difference.load(Ordering::SeqCst)).filter(|line| *line > 0)
+    }
+}
+
+/// Compares what is in the journal, and writes what is not.
+pub(super) struct PastRecorder<'a> {
+    pub(super) past: Arc<Past>,
+    pub(super) task: Arc<Task>,
+    pub(super) writer: JournalWriter<'a>,
+}
+
+impl Recorder for PastRecorder<'_> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        if self.past.play(&Line::of(&self.task, entry)) {
+            self.writer.record(entry);
+        }
+    }
+}
+
+/// Makes the plans that were made, and then new ones.
+pub(super) struct PastPlanner<'a> {
+    pub(super) left: usize,
+    pub(super) past: ReplayPlanner,
+    pub(super) present: Box<dyn Planner + 'a>,
+}
+
+impl Planner for PastPlanner<'_> {
+    fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+        match self.left.checked_sub(1) {
+            Some(left) => {
+                self.left = left;
+                self.past.plan(task, situation)
+            }
+            None => self.present.plan(task, situation),
+        }
+    }
+}
+
+/// Ends the run where it was asked to end, and when it is asked to now, or cannot be written down.
+pub(super) struct Watch {
+    pub(super) inner: Stopwatch,
+    pub(super) past: Arc<Past>,
+    pub(super) kept: Kept,
+}
+
+impl Watcher for Watch {
+    fn elapsed(&mut self) -> Duration {
+        self.inner.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let is_to_end = self.past.is_to_end.load(Ordering::SeqCst) || self.kept.is_lost();
+        match () {
+            () if is_to_end => ControlFlow::Break(Halt::Cancelled),
+            () if self.past.is_over() => self.inner.flow(),
+            () => ControlFlow::Continue(()),
+        }
+    }
+}

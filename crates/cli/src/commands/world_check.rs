@@ -1,0 +1,303 @@
+//! `elbowroom world-check`: does a program keep to the protocol of worlds?
+
+mod player;
+mod table;
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::text::Source;
+use serde_json::json;
+
+use crate::args::{ProblemArgs, WorldCheckArgs};
+use crate::conversation::{Greeting, launch};
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::look::{BAD, GOOD, HINT, Look, styled};
+use crate::output::{self, Output};
+use crate::words::{excerpt, tame};
+use crate::wrap::wrapped;
+use player::{Gone, Player};
+use table::{Check, Findings, Outcome, Row};
+
+/// What a world is told to do when there is no plan.
+const DOMAIN: &str = "(define (domain world-check) (:requirements :durative-actions)
+    (:predicates (waited))
+    (:durative-action wait-a-second :parameters () :duration (= ?duration 1)
+        :condition (and) :effect (at end (waited))))";
+const PROBLEM: &str =
+    "(define (problem world-check) (:domain world-check) (:init) (:goal (waited)))";
+const ACTION: &str = "(wait-a-second)";
+
+/// Three times as long as planned, and this many seconds more, an action may take here.
+const PATIENCE: i64 = 10;
+
+/// How long a cancelled action may take to stop, in seconds of the world.
+const OBEDIENCE: i64 = 5;
+
+/// Plays through the protocol, and says what is wrong.
+pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
+    let (task, actions) = script(arguments, output)?;
+    let program = launch(&arguments.command).map_err(|why| {
+        Failure::new(
+            format!("cannot start the world `{}`: {why}", arguments.command),
+            "give a program and its arguments, separated by spaces, as one argument",
+        )
+    })?;
+    let patience = Duration::try_from_secs_f64(arguments.answer_within.to_f64());
+    let patience = patience.unwrap_or(Duration::MAX);
+    let (rows, greeting) = match Player::new(program, &Arc::new(task), patience) {
+        Ok(mut player) => {
+            let played = play(&mut player, &actions);
+            let greeting = player.greeting().cloned();
+            let rows = match played {
+                Ok(()) => player.stop().rows(None),
+                Err(Gone) => cut_short(player.abandon()),
+            };
+            (rows, greeting)
+        }
+        Err((Gone, findings)) => (cut_short(findings), None),
+    };
+    let conforms = rows.iter().all(|row| row.outcome != Outcome::Wrong);
+    if arguments.json {
+        output.json(&json!({
+            "format": "elbowroom-world-check",
+            "version": 1,
+            "command": arguments.command,
+            "speaks": greeting.as_ref().map_or(1, |greeting| greeting.version),
+            "name": greeting.as_ref().map(|greeting| &greeting.name),
+            "can": greeting.as_ref().map(|greeting| &greeting.can),
+            "conforms": conforms,
+            "checks": rows,
+        }))?;
+    } else {
+        output::print(&text(&rows, greeting.as_ref(), conforms))?;
+    }
+    Ok(if conforms { Exit::Yes } else { Exit::No })
+}
+
+fn cut_short(findings: Findings) -> Vec<Row> {
+    findings.rows(Some("the conversation had come to its end"))
+}
+
+/// The problem, and the actions to start, with their durations.
+fn script(
+    arguments: &WorldCheckArgs,
+    output: &mut Output,
+) -> Result<(Task, Vec<(String, Rational)>), Failure> {
+    let (Some(domain), Some(problem), Some(plan)) =
+        (&arguments.domain, &arguments.problem, &arguments.plan)
+    else {
+        let [domain, problem] = [("domain", DOMAIN), ("problem", PROBLEM)];
+        let source = |(name, text)| Source::new(name, text);
+        let read = elbowroom::pddl::read_problem(&source(domain), &source(problem));
+        let task = Task::new(input::with_warnings(read, output)?);
+        return Ok((task, vec![(ACTION.to_owned(), Rational::ONE)]));
+    };
+    let files = ProblemArgs {
+        domain: domain.clone(),
+        problem: problem.clone(),
+    };
+    let task = input::task(&files, &Rational::new(1, 1000), output)?;
+    let steps = input::time_triggered(&task, plan, output)?.steps;
+    let actions = steps.into_iter().filter_map(|step| {
+        let duration = step.duration?;
+        Some((step.action.name, duration))
+    });
+    let actions: Vec<_> = actions.take(2).collect();
+    if actions.is_empty() {
+        return Err(Failure::new(
+            "no action of the plan takes time",
+            "give a plan with durative actions, or none",
+        ));
+    }
+    Ok((task, actions))
+}
+
+fn play(player: &mut Player, actions: &[(String, Rational)]) -> Result<(), Gone> {
+    // Nothing has been told, so time passes.
+    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    let (name, duration) = &actions[0];
+    let (other, other_duration) = actions.last().unwrap_or(&actions[0]);
+    let long = longest(duration).max(longest(other_duration));
+    let step = (duration / Rational::from(10)).max(Rational::ONE);
+
+    // One action, to its end.
+    player.start(0, name, Some(duration))?;
+    until_begun(player, &[0], &long, &step)?;
+    until_ended(player, &[0], &long, &step)?;
+    if let Some(why) = player.failure(0) {
+        let why = format!(
+            "{} failed, so there was nothing to see: {}",
+            name,
+            excerpt(why)
+        );
+        player.findings.wrong(Check::Starts, why);
+        return player.look();
+    }
+
+    // What is over, or was never heard of.
+    player.findings.look_at(Check::IgnoresTheUnknown);
+    player.cancel(0)?;
+    player.mumble()?;
+    player.look()?;
+    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+
+    // Two at a time. A plan with one action has it twice.
+    player.start(1, name, Some(duration))?;
+    player.start(2, other, Some(other_duration))?;
+    until_begun(player, &[1, 2], &long, &step)?;
+    player.findings.look_at(Check::DoesTwoAtOnce);
+    if player.failure(1).or(player.failure(2)).is_some() {
+        let why = "one of two actions that were started together was refused";
+        player.findings.wrong(Check::DoesTwoAtOnce, why);
+    }
+    until_ended(player, &[1, 2], &long, &step)?;
+
+    // One that is stopped.
+    if player.can_cancel() {
+        player.start(3, name, Some(duration))?;
+        until_begun(player, &[3], &long, &step)?;
+        player.cancel(3)?;
+        let limit = Rational::from(OBEDIENCE);
+        pass(player, &limit, &Rational::ONE, |player| player.has_ended(3))?;
+        player.findings.look_at(Check::Cancels);
+        if !player.has_ended(3) {
+            let why = format!("{OBEDIENCE} s after its cancel, {name} had not ended");
+            player.findings.wrong(Check::Cancels, why);
+        }
+    }
+    // Whatever is said twice is said soon.
+    pass(player, &Rational::ONE, &Rational::ONE, |_| false)?;
+    player.findings.look_at(Check::EndsOnce);
+    Ok(())
+}
+
+fn longest(duration: &Rational) -> Rational {
+    duration * Rational::from(3) + Rational::from(PATIENCE)
+}
+
+/// Waits until something was heard of the start of each.
+fn until_begun(
+    player: &mut Player,
+    tickets: &[u64],
+    long: &Rational,
+    step: &Rational,
+) -> Result<(), Gone> {
+    let have_begun = |player: &Player| tickets.iter().all(|it| player.has_begun(*it));
+    pass(player, long, step, have_begun)?;
+    player.findings.look_at(Check::Starts);
+    for ticket in tickets {
+        if player.has_begun(*ticket) {
+            continue;
+        }
+        let why = format!(
+            "nothing was heard of start {ticket} within {} s",
+            long.to_f64()
+        );
+        player.findings.wrong(Check::Starts, why);
+    }
+    Ok(())
+}
+
+/// Waits until each has ended.
+fn until_ended(
+    player: &mut Player,
+    tickets: &[u64],
+    long: &Rational,
+    step: &Rational,
+) -> Result<(), Gone> {
+    let have_ended = |player: &Player| {
+        tickets
+            .iter()
+            .all(|it| player.has_ended(*it) || !player.is_running(*it))
+    };
+    pass(player, long, step, have_ended)?;
+    player.findings.look_at(Check::Ends);
+    for ticket in tickets {
+        if !player.is_running(*ticket) {
+            continue;
+        }
+        let why = format!("start {ticket} had not ended {} s later", long.to_f64());
+        player.findings.wrong(Check::Ends, why);
+    }
+    Ok(())
+}
+
+/// Lets time pass, at most `long`, in steps, until it is enough.
+fn pass(
+    player: &mut Player,
+    long: &Rational,
+    step: &Rational,
+    is_enough: impl Fn(&Player) -> bool,
+) -> Result<(), Gone> {
+    let last = &player.now + long;
+    // With time unchanged, as many answers as there can be reports, and some more.
+    let mut idle = 0;
+    while !is_enough(player) && player.now < last {
+        let before = player.now.clone();
+        let until = (&before + step).min(last.clone());
+        player.wait(&until)?;
+        idle = if player.now > before { 0 } else { idle + 1 };
+        if idle > MOST_IDLE {
+            let why = format!(
+                "its clock stands still at {}: {MOST_IDLE} answers brought no progress",
+                before.to_f64()
+            );
+            player.findings.wrong(Check::KeepsTime, why);
+            return Err(Gone);
+        }
+    }
+    Ok(())
+}
+
+/// So many answers in a row may leave the time unchanged.
+const MOST_IDLE: usize = 100;
+
+fn text(rows: &[Row], greeting: Option<&Greeting>, conforms: bool) -> String {
+    let width = Look::of_stdout().width;
+    let mut text = match greeting {
+        Some(greeting) => {
+            let name = match greeting.name.as_str() {
+                "" => "the world".to_owned(),
+                name => tame(name),
+            };
+            let can = if greeting.can.is_empty() {
+                "nothing of what is optional".to_owned()
+            } else {
+                tame(&greeting.can.join(", "))
+            };
+            format!(
+                "{name} speaks version {}; it can: {can}\n",
+                greeting.version
+            )
+        }
+        None => "the world speaks version 1: it has not introduced itself\n".to_owned(),
+    };
+    for row in rows {
+        let mark = match row.outcome {
+            Outcome::Passed => styled(GOOD, "ok"),
+            Outcome::Wrong => styled(BAD, "wrong"),
+            Outcome::Skipped => styled(HINT, "skipped"),
+        };
+        let line = format!("{mark}  {}: {}", row.check, row.what);
+        let _ = writeln!(text, "{}", wrapped(&line, width, 2));
+        for why in &row.why {
+            let _ = writeln!(text, "{}", wrapped(&tame(why), width, 6));
+        }
+    }
+    let wrong = rows
+        .iter()
+        .filter(|row| row.outcome == Outcome::Wrong)
+        .count();
+    let verdict = if conforms {
+        styled(GOOD, "nothing is wrong")
+    } else {
+        styled(BAD, &format!("{wrong} of {} checks went wrong", rows.len()))
+    };
+    let _ = writeln!(text, "{verdict}");
+    text
+}

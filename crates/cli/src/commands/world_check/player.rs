@@ -1,0 +1,355 @@
+//! The other side of a conversation with a world: asks, listens, and notes what is wrong.
+
+use std::collections::BTreeMap;
+use std::process::Child;
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::execution::{Ending, Event, Observation};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::report::wire;
+use serde_json::{Value, json};
+
+use super::table::{Check, Findings};
+use crate::clock::Clock;
+use crate::conversation::{
+    Ability, Ears, Greeting, Heard, LONGEST_ANSWER, Listener, Mouth, Said, Told, ended, hello,
+};
+use crate::words::excerpt;
+
+/// How long a world may take to end when it was told to.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// The conversation cannot go on.
+pub(super) struct Gone;
+
+/// A world that is being checked.
+pub(super) struct Player {
+    child: Child,
+    mouth: Mouth,
+    ears: Ears,
+    listener: Listener,
+    patience: Duration,
+    pub(super) findings: Findings,
+    /// What time it says it is.
+    pub(super) now: Rational,
+    actions: BTreeMap<u64, Begun>,
+}
+
+/// What became of a start.
+#[derive(Clone, Debug, Default)]
+struct Begun {
+    name: String,
+    is_instantaneous: bool,
+    started: Option<Rational>,
+    ending: Option<Ending>,
+}
+
+impl Player {
+    /// Greets a program that has just been started.
+    pub(super) fn new(
+        (child, mouth, ears): (Child, Mouth, Ears),
+        task: &Arc<Task>,
+        patience: Duration,
+    ) -> Result<Self, (Gone, Findings)> {
+        let mut player = Self {
+            child,
+            mouth,
+            ears,
+            listener: Listener::new(task),
+            patience,
+            findings: Findings::default(),
+            now: Rational::ZERO,
+            actions: BTreeMap::new(),
+        };
+        match player.tell(&hello()) {
+            Ok(()) => Ok(player),
+            Err(gone) => {
+                let _ = player.child.kill();
+                let _ = player.child.wait();
+                Err((gone, player.findings))
+            }
+        }
+    }
+
+    /// How the program has introduced itself.
+    pub(super) fn greeting(&self) -> Option<&Greeting> {
+        self.listener.greeting()
+    }
+
+    /// Whether it says it can stop actions.
+    pub(super) fn can_cancel(&self) -> bool {
+        self.listener.can(Ability::Cancel)
+    }
+
+    /// Whether the action has started, and has not ended.
+    pub(super) fn is_running(&self, ticket: u64) -> bool {
+        let action = self.actions.get(&ticket);
+        action.is_some_and(|it| it.started.is_some() && it.ending.is_none())
+    }
+
+    /// Whether the action has ended, or was refused.
+    pub(super) fn has_ended(&self, ticket: u64) -> bool {
+        let action = self.actions.get(&ticket);
+        action.is_some_and(|it| it.ending.is_some())
+    }
+
+    /// Why the action failed, if it did.
+    pub(super) fn failure(&self, ticket: u64) -> Option<&str> {
+        match &self.actions.get(&ticket)?.ending {
+            Some(Ending::Failed { why }) => Some(why),
+            _ => None,
+        }
+    }
+
+    /// Whether something was heard of its start, or that it was refused.
+    pub(super) fn has_begun(&self, ticket: u64) -> bool {
+        let action = self.actions.get(&ticket);
+        action.is_some_and(|it| it.started.is_some() || it.ending.is_some())
+    }
+
+    pub(super) fn start(
+        &mut self,
+        ticket: u64,
+        name: &str,
+        duration: Option<&Rational>,
+    ) -> Result<(), Gone> {
+        self.listener.note_start(ticket);
+        let action = Begun {
+            name: name.to_owned(),
+            is_instantaneous: duration.is_none(),
+            ..Begun::default()
+        };
+        self.actions.insert(ticket, action);
+        self.tell(&json!({
+            "type": "start", "ticket": ticket, "action": name,
+            "duration": duration.map(wire::number), "now": wire::number(&self.now),
+        }))
+    }
+
+    pub(super) fn cancel(&mut self, ticket: u64) -> Result<(), Gone> {
+        self.tell(&json!({ "type": "cancel", "ticket": ticket, "now": wire::number(&self.now) }))
+    }
+
+    /// Says something that no version of the protocol has.
+    pub(super) fn mumble(&mut self) -> Result<(), Gone> {
+        self.tell(&json!({ "type": "from-a-later-version", "now": wire::number(&self.now) }))
+    }
+
+    pub(super) fn look(&mut self) -> Result<(), Gone> {
+        let number = self.listener.next_question();
+        let question = json!({ "type": "look", "facts": [], "fluents": [], "question": number });
+        self.ask(&question, None)
+    }
+
+    /// Lets time pass until then, or until something is observed.
+    pub(super) fn wait(&mut self, until: &Rational) -> Result<(), Gone> {
+        let number = self.listener.next_question();
+        let question = json!({ "type": "wait", "until": wire::number(until), "question": number });
+        self.ask(&question, Some(until))
+    }
+
+    fn tell(&mut self, message: &Value) -> Result<(), Gone> {
+        match self.mouth.tell(format!("{message}\n"), self.patience) {
+            Told::Yes => Ok(()),
+            Told::NobodyReads => {
+                let what = message["type"].as_str().unwrap_or_default();
+                let why = format!("it has not read `{what}` within {} s", self.seconds());
+                self.findings.wrong(Check::Answers, why);
+                Err(Gone)
+            }
+            Told::End => Err(self.dead()),
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        self.patience.as_secs_f64()
+    }
+
+    fn dead(&mut self) -> Gone {
+        let why = match ended(&mut self.child, FAREWELL) {
+            Some(status) => format!("it has ended by itself ({status})"),
+            None => "it has closed its standard input or output".to_owned(),
+        };
+        self.findings.wrong(Check::Lives, why);
+        Gone
+    }
+
+    fn ask(&mut self, question: &Value, until: Option<&Rational>) -> Result<(), Gone> {
+        self.tell(question)?;
+        self.findings.look_at(Check::Answers);
+        let what = question["type"].as_str().unwrap_or_default().to_owned();
+        let before = self.now.clone();
+        let (clock, mut said, mut observations) = (Clock::start(), 0, Vec::new());
+        loop {
+            let left = self.patience.saturating_sub(clock.elapsed());
+            let line = match self.ears.hear(left) {
+                Heard::Line(line) => line,
+                Heard::EndlessLine => {
+                    let why = "a line has more than a megabyte; one message a line";
+                    self.findings.wrong(Check::Speaks, why);
+                    return Err(Gone);
+                }
+                Heard::TooMuch => {
+                    let why = "it says more than 16 MB without being asked";
+                    self.findings.wrong(Check::Answers, why);
+                    return Err(Gone);
+                }
+                Heard::Nothing => {
+                    let why = format!("no `time` within {} s after `{what}`", self.seconds());
+                    self.findings.wrong(Check::Answers, why);
+                    return Err(Gone);
+                }
+                Heard::End => return Err(self.dead()),
+            };
+            said += line.len();
+            if said > LONGEST_ANSWER {
+                let why = format!("more than 16 MB in answer to `{what}`");
+                self.findings.wrong(Check::Answers, why);
+                return Err(Gone);
+            }
+            let line = line.trim();
+            if line.is_empty() {
+                continue;
+            }
+            match self.listener.read(line) {
+                Ok(Said::Greeting(_) | Said::Clock | Said::Unknown) => {}
+                Ok(Said::Observation(observation)) => observations.push(observation),
+                Ok(Said::Time(now)) => {
+                    self.findings.look_at(Check::Speaks);
+                    self.note_time(now, until, observations.is_empty());
+                    self.take(&observations, &before);
+                    return Ok(());
+                }
+                Err(why) => self.misunderstood(line, &why),
+            }
+        }
+    }
+
+    fn misunderstood(&mut self, line: &str, why: &str) {
+        let check = if why.contains("was never given") {
+            Check::KnowsItsTickets
+        } else if why.contains("answers question") {
+            Check::Answers
+        } else {
+            Check::Speaks
+        };
+        self.findings
+            .wrong(check, format!("{}: {why}", excerpt(line)));
+    }
+
+    fn note_time(&mut self, now: Rational, until: Option<&Rational>, is_silent: bool) {
+        self.findings.look_at(Check::KeepsTime);
+        let (was, is) = (self.now.to_f64(), now.to_f64());
+        if now < self.now {
+            let why = format!("after {was} came {is}");
+            self.findings.wrong(Check::KeepsTime, why);
+            return;
+        }
+        if let Some(until) = until {
+            let allowed = until.clone().max(self.now.clone());
+            // A clock that is real may be late when nothing happens; one that reports must not be.
+            let late = &now - &allowed;
+            if is_silent && late > Rational::from(5) {
+                let why = format!(
+                    "asked to wait until {}, it waited until {is}",
+                    until.to_f64()
+                );
+                self.findings.wrong(Check::KeepsTime, why);
+            }
+        }
+        self.now = now;
+    }
+
+    /// Notes what was reported in an answer, after the answer of the time `before`.
+    fn take(&mut self, observations: &[Observation], before: &Rational) {
+        for Observation { time, event } in observations {
+            let (Event::Started { ticket, .. }
+            | Event::Ended { ticket, .. }
+            | Event::Feedback { ticket, .. }) = event
+            else {
+                continue;
+            };
+            self.findings.look_at(Check::KnowsItsTickets);
+            let Some(action) = self.actions.get_mut(&ticket.0) else {
+                continue;
+            };
+            let name = excerpt(&action.name);
+            let mut wrong = |check, why| self.findings.wrong(check, why);
+            let (is, now) = (time.to_f64(), self.now.to_f64());
+            if *time > self.now {
+                let why = format!("{name}: a report of {is} came at {now}, before its time");
+                wrong(Check::ReportsInTime, why);
+            } else if *time < before - &Rational::ONE {
+                let why = format!("{name}: a report of {is} came at {now}");
+                wrong(Check::ReportsInTime, why);
+            }
+            match event {
+                Event::Started { .. } if action.ending.is_some() => {
+                    let why = format!("{name}: `started` came after `ended`");
+                    wrong(Check::StartsBeforeItEnds, why);
+                }
+                Event::Started { .. } if action.started.is_some() => {
+                    wrong(Check::EndsOnce, format!("{name} started twice"));
+                }
+                Event::Started { .. } => {
+                    action.started = Some(time.clone());
+                    if action.is_instantaneous {
+                        action.ending = Some(Ending::Succeeded);
+                    }
+                }
+                Event::Ended { ending, .. } => {
+                    if action.ending.is_some() {
+                        wrong(Check::EndsOnce, format!("{name} ended twice"));
+                        continue;
+                    }
+                    match &action.started {
+                        None if *ending == Ending::Succeeded => wrong(
+                            Check::StartsBeforeItEnds,
+                            format!("{name} succeeded, but never started"),
+                        ),
+                        Some(start) if start > time => wrong(
+                            Check::StartsBeforeItEnds,
+                            format!("{name} started at {} and ended at {is}", start.to_f64()),
+                        ),
+                        _ => {}
+                    }
+                    action.ending = Some(ending.clone());
+                }
+                _ => {}
+            }
+        }
+        for check in [Check::ReportsInTime, Check::StartsBeforeItEnds] {
+            if !observations.is_empty() {
+                self.findings.look_at(check);
+            }
+        }
+    }
+
+    /// Tells the program to stop, and sees to it that it does.
+    pub(super) fn stop(mut self) -> Findings {
+        self.findings.look_at(Check::Stops);
+        let told = self
+            .mouth
+            .tell("{\"type\":\"stop\"}\n".to_owned(), FAREWELL);
+        drop(self.mouth);
+        let ended = ended(&mut self.child, FAREWELL).is_some();
+        if !ended {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+            let why = "it was still there a second later, and was killed";
+            self.findings.wrong(Check::Stops, why);
+        } else if matches!(told, Told::Yes) {
+            self.findings.look_at(Check::Lives);
+        }
+        self.findings
+    }
+
+    /// The conversation has ended otherwise.
+    pub(super) fn abandon(mut self) -> Findings {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        self.findings
+    }
+}

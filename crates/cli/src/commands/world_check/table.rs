@@ -1,0 +1,151 @@
+//! What a world must do, and whether it does.
+
+use serde::Serialize;
+
+/// One thing that a world must do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Check {
+    Lives,
+    Speaks,
+    Answers,
+    KeepsTime,
+    Starts,
+    StartsBeforeItEnds,
+    Ends,
+    EndsOnce,
+    ReportsInTime,
+    KnowsItsTickets,
+    DoesTwoAtOnce,
+    Cancels,
+    IgnoresTheUnknown,
+    Stops,
+}
+
+impl Check {
+    /// All of them, in the order in which they are shown, with a word and a sentence for each.
+    pub(super) const ALL: [(Self, &str, &str); 14] = [
+        (Self::Lives, "lives", "it lives until it is told to stop"),
+        (
+            Self::Speaks,
+            "speaks",
+            "each line that it says is a message of the protocol",
+        ),
+        (
+            Self::Answers,
+            "answers",
+            "each question is answered in time, up to `time`",
+        ),
+        (
+            Self::KeepsTime,
+            "keeps-time",
+            "time goes on, never back, and not beyond what was asked for",
+        ),
+        (
+            Self::Starts,
+            "starts",
+            "what was told to start is reported as started, or as failed",
+        ),
+        (
+            Self::StartsBeforeItEnds,
+            "starts-before-it-ends",
+            "`started` comes before `ended`, and with an earlier or equal time",
+        ),
+        (Self::Ends, "ends", "what has started also ends"),
+        (Self::EndsOnce, "ends-once", "each action ends once"),
+        (
+            Self::ReportsInTime,
+            "reports-in-time",
+            "reports come in the answer in whose time they happened",
+        ),
+        (
+            Self::KnowsItsTickets,
+            "knows-its-tickets",
+            "reports are about tickets that were given",
+        ),
+        (
+            Self::DoesTwoAtOnce,
+            "does-two-at-once",
+            "two actions run at the same time",
+        ),
+        (
+            Self::Cancels,
+            "cancels",
+            "a cancelled action ends within five seconds",
+        ),
+        (
+            Self::IgnoresTheUnknown,
+            "ignores-the-unknown",
+            "what it does not know (a message, a cancel of what has ended) does not disturb it",
+        ),
+        (Self::Stops, "stops", "it ends within a second after `stop`"),
+    ];
+}
+
+/// The outcome of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Outcome {
+    Passed,
+    Wrong,
+    Skipped,
+}
+
+/// A row of the answer.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Row {
+    pub(super) check: &'static str,
+    pub(super) what: &'static str,
+    pub(super) outcome: Outcome,
+    /// What is wrong, or why it was not looked at.
+    pub(super) why: Vec<String>,
+}
+
+/// What was found out so far.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    wrong: Vec<(Check, String)>,
+    done: Vec<Check>,
+}
+
+/// So many examples of one mistake are enough.
+const MOST_EXAMPLES: usize = 3;
+
+impl Findings {
+    /// It was looked at.
+    pub(super) fn look_at(&mut self, check: Check) {
+        self.done.push(check);
+    }
+
+    /// The world does something wrong.
+    pub(super) fn wrong(&mut self, check: Check, why: impl Into<String>) {
+        let why = why.into();
+        let known = self.wrong.iter().filter(|(other, _)| *other == check);
+        let known: Vec<_> = known.map(|(_, known)| known).collect();
+        if known.len() < MOST_EXAMPLES && !known.contains(&&why) {
+            self.wrong.push((check, why));
+        }
+    }
+
+    /// The rows; `end` is why nothing more was looked at, if so.
+    pub(super) fn rows(self, end: Option<&str>) -> Vec<Row> {
+        let row = |(check, name, what)| {
+            let wrong = self.wrong.iter().filter(|(other, _)| *other == check);
+            let wrong: Vec<String> = wrong.map(|(_, why)| why.clone()).collect();
+            let (outcome, why) = if !wrong.is_empty() {
+                (Outcome::Wrong, wrong)
+            } else if self.done.contains(&check) {
+                (Outcome::Passed, Vec::new())
+            } else {
+                let why = end.unwrap_or("there was no occasion");
+                (Outcome::Skipped, vec![why.to_owned()])
+            };
+            Row {
+                check: name,
+                what,
+                outcome,
+                why,
+            }
+        };
+        Check::ALL.into_iter().map(row).collect()
+    }
+}

@@ -1,0 +1,50 @@
+//! The conversation with a program that is a world: `docs/formats/world-protocol.md`.
+
+mod clocks;
+mod listener;
+mod pipes;
+
+pub(crate) use listener::{Ability, Greeting, Listener, Said, hello, is_time};
+pub(crate) use pipes::{Ears, Heard, LONGEST_ANSWER, LONGEST_LINE, Mouth, Told};
+
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use crate::clock::Clock;
+use crate::words::plain;
+
+/// Starts a program, with the words of `command` as its arguments and both of its pipes.
+///
+/// # Errors
+/// In words, when it cannot be started.
+pub(crate) fn launch(command: &str) -> Result<(Child, Mouth, Ears), String> {
+    let mut words = command.split_whitespace();
+    let program = words.next().ok_or("the command is empty")?;
+    let mut program = Command::new(program);
+    program
+        .args(words)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped());
+    // Ctrl-C is for this program, which then ends that one in order.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut program, 0);
+    let mut child = program.spawn().map_err(|error| plain(&error))?;
+    match (child.stdin.take(), child.stdout.take()) {
+        (Some(stdin), Some(stdout)) => Ok((child, Mouth::new(stdin), Ears::new(stdout))),
+        _ => Err("its standard input and output are not there".to_owned()),
+    }
+}
+
+/// How a program has ended, if it does so within `patience`.
+pub(crate) fn ended(child: &mut Child, patience: Duration) -> Option<ExitStatus> {
+    let clock = Clock::start();
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return Some(status),
+            Ok(None) if clock.elapsed() < patience => {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            _ => return None,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+"""Worlds for `elbowroom world-check`: `right`, and those that each do one thing wrong."""
+
+import json
+import sys
+
+fault = sys.argv[1]
+now, ends, starts, news, held = 0.0, {}, 0, [], []
+
+
+def report(kind, ticket, time=None, **more):
+    news.append(dict(more, type=kind, ticket=ticket, time=now if time is None else time))
+
+
+def say(message):
+    print(message if isinstance(message, str) else json.dumps(message), flush=True)
+
+
+def greet():
+    if fault == "speaks of feedback without greeting":
+        return
+    if fault == "speaks version 3":
+        say({"type": "hello", "version": 3})
+    elif fault == "greets twice":
+        say({"type": "hello", "version": 2, "can": ["cancel"]})
+        say({"type": "hello", "version": 2, "can": ["cancel"]})
+    else:
+        say({"type": "hello", "version": 2, "name": fault, "can": ["cancel", "feedback"]})
+
+
+def start(ticket, duration):
+    global starts
+    starts += 1
+    if fault == "dies when it has to work":
+        sys.exit(3)
+    if fault == "does one thing at a time" and ends:
+        return report("ended", ticket, outcome="failed", why="busy")
+    if fault == "never starts":
+        return None
+    if fault == "finishes what has not started":
+        return report("ended", ticket, outcome="succeeded")
+    report("started", ticket)
+    if fault == "starts after it ends":
+        return report("ended", ticket, time=now - 0.5, outcome="succeeded")
+    if fault == "speaks of feedback without greeting" or fault == "right":
+        report("feedback", ticket, completion=0.0, note="begun")
+    if fault == "knows other tickets":
+        report("started", 99)
+    if fault == "is ahead of time":
+        return report("ended", ticket, time=now + duration, outcome="succeeded")
+    ends[ticket] = now + (1e9 if fault == "never ends" else duration)
+    return None
+
+
+def cancel(ticket):
+    if fault == "dies of a cancel that comes too late" and ticket not in ends:
+        sys.exit(4)
+    if fault != "never answers a cancel" and ends.pop(ticket, None) is not None:
+        report("ended", ticket, outcome="cancelled")
+    if fault == "answers each cancel" and ticket not in ends:
+        report("ended", ticket, outcome="cancelled")
+
+
+def wait(until):
+    global now
+    if fault == "reports late":
+        news.extend(held)
+        held.clear()
+    if news:
+        return
+    ticket = min(ends, key=ends.get, default=None)
+    if fault == "stands still":
+        return
+    if ticket is not None and ends[ticket] <= until:
+        now = max(now, ends.pop(ticket))
+        if fault == "never answers a cancel" and starts > 3:
+            return
+        report("ended", ticket, outcome="succeeded")
+        if fault == "repeats itself":
+            report("ended", ticket, outcome="succeeded")
+        if fault == "reports late":
+            held.extend(news)
+            news.clear()
+            now = max(now, until) + 3
+    else:
+        now = max(now, until) + (60 if fault == "oversleeps" else 0)
+    if fault == "goes back in time" and starts:
+        now -= 1.5
+
+
+def answer(question):
+    for message in news:
+        say(message)
+    news.clear()
+    if fault == "is silent" and starts:
+        return
+    if fault == "writes no JSON" and starts:
+        say("INFO: all is well")
+    time = {"type": "time", "now": now, "question": question}
+    if fault == "answers another question":
+        time["question"] = question + 1
+    say(time)
+
+
+for line in sys.stdin:
+    message = json.loads(line)
+    kind = message["type"]
+    if kind == "hello":
+        greet()
+    elif kind == "start":
+        start(message["ticket"], message["duration"]["decimal"])
+    elif kind == "cancel":
+        cancel(message["ticket"])
+    elif kind == "wait":
+        wait(message["until"]["decimal"])
+        answer(message["question"])
+    elif kind == "look":
+        answer(message["question"])
+    elif kind == "stop":
+        if fault == "does not stop":
+            continue
+        break
+    elif fault == "dies of what it does not know":
+        raise ValueError(kind)
+while fault == "does not stop":
+    pass

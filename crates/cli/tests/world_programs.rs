@@ -1,0 +1,174 @@
+//! Programs that are worlds: what is wrong with them is named, and the library for Python makes right
+//! ones.
+
+mod command;
+#[path = "../../../testing/skipped.rs"]
+mod skipped;
+
+use std::fs;
+use std::process::Command;
+
+use command::{elbowroom, root};
+use serde_json::Value;
+use skipped::skipped;
+
+const DELIVERY: [&str; 3] = [
+    "cases/delivery/domain.pddl",
+    "cases/delivery/problem.pddl",
+    "cases/delivery/plan.plan",
+];
+
+fn python_is_there() -> bool {
+    let is_there = Command::new("python3").arg("--version").output().is_ok();
+    if !is_there {
+        skipped("there is no python3");
+    }
+    is_there
+}
+
+/// The document about this world, and the exit code.
+fn checked(command: &str, options: &[&str]) -> (Value, Option<i32>) {
+    let line = [&["world-check", command, "--json"][..], options].concat();
+    let output = elbowroom(&line);
+    let document = serde_json::from_slice(&output.stdout);
+    let document = document.unwrap_or_else(|_| panic!("no document: {output:?}"));
+    (document, output.status.code())
+}
+
+/// The checks with that outcome.
+fn with_outcome<'a>(document: &'a Value, outcome: &str) -> Vec<&'a str> {
+    let checks = document["checks"].as_array().expect("checks");
+    let checks = checks.iter().filter(|check| check["outcome"] == outcome);
+    checks.filter_map(|check| check["check"].as_str()).collect()
+}
+
+/// A program of `tests/files/worlds.py`, whose fault has no spaces on a command line.
+fn world(fault: &str) -> (String, String) {
+    let script = fs::read_to_string(root().join("crates/cli/tests/files/worlds.py"));
+    let script = script.expect("the worlds");
+    let spoken = serde_json::to_string(fault).expect("a text");
+    let script = script.replace("sys.argv[1]", &spoken);
+    let name = format!(
+        "elbowroom-{}-{}.py",
+        std::process::id(),
+        fault.replace(' ', "-")
+    );
+    let file = std::env::temp_dir().join(name).display().to_string();
+    fs::write(&file, script).expect("a temporary file can be written");
+    (format!("python3 {file}"), file)
+}
+
+#[test]
+fn each_fault_of_a_world_is_named() {
+    if !python_is_there() {
+        return;
+    }
+    for (fault, check) in [
+        ("is silent", "answers"),
+        ("answers another question", "answers"),
+        ("writes no JSON", "speaks"),
+        ("speaks of feedback without greeting", "speaks"),
+        ("speaks version 3", "speaks"),
+        ("greets twice", "speaks"),
+        ("stands still", "keeps-time"),
+        ("goes back in time", "keeps-time"),
+        ("oversleeps", "keeps-time"),
+        ("never starts", "starts"),
+        ("finishes what has not started", "starts-before-it-ends"),
+        ("starts after it ends", "starts-before-it-ends"),
+        ("never ends", "ends"),
+        ("repeats itself", "ends-once"),
+        ("answers each cancel", "ends-once"),
+        ("reports late", "reports-in-time"),
+        ("is ahead of time", "reports-in-time"),
+        ("knows other tickets", "knows-its-tickets"),
+        ("does one thing at a time", "does-two-at-once"),
+        ("never answers a cancel", "cancels"),
+        ("dies of a cancel that comes too late", "lives"),
+        ("dies of what it does not know", "lives"),
+        ("dies when it has to work", "lives"),
+        ("does not stop", "stops"),
+    ] {
+        let (command, file) = world(fault);
+        let (document, code) = checked(&command, &["--answer-within", "2"]);
+        assert_eq!(code, Some(1), "{fault}: {document:#}");
+        assert_eq!(document["conforms"], false, "{fault}");
+        let wrong = with_outcome(&document, "wrong");
+        assert!(wrong.contains(&check), "{fault}: {document:#}");
+        fs::remove_file(file).expect("the world is there");
+    }
+}
+
+#[test]
+fn nothing_is_wrong_with_a_world_that_keeps_to_the_protocol() {
+    if !python_is_there() {
+        return;
+    }
+    let (right, file) = world("right");
+    // The last one speaks the first version of the protocol.
+    for (command, speaks) in [
+        (right.as_str(), 2),
+        ("python3 clients/python/example_simulation.py", 2),
+        ("python3 clients/python/example_world.py", 2),
+        ("python3 examples/world.py", 1),
+    ] {
+        for plan in [&DELIVERY[..], &[]] {
+            let (document, code) = checked(command, plan);
+            assert_eq!(code, Some(0), "{command}: {document:#}");
+            assert_eq!(document["speaks"], speaks, "{command}");
+            assert_eq!(with_outcome(&document, "passed").len(), 14, "{document:#}");
+        }
+    }
+    fs::remove_file(file).expect("the world is there");
+}
+
+#[test]
+fn a_world_that_cannot_be_started_is_no_answer() {
+    let output = elbowroom(&["world-check", "no-such-program"]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.contains("cannot start the world"), "{text}");
+}
+
+/// How far a running action has come is in the trace, and changes no decision.
+#[test]
+fn feedback_is_recorded_and_replayed() {
+    if !python_is_there() {
+        return;
+    }
+    let trace = std::env::temp_dir().join(format!("elbowroom-{}-fb.jsonl", std::process::id()));
+    let trace = trace.display().to_string();
+    let world = "python3 clients/python/example_world.py";
+    let run = [
+        &["run"][..],
+        &DELIVERY[..],
+        &["--world-process", world, "--trace", &trace],
+    ]
+    .concat();
+    let output = elbowroom(&run);
+    assert!(output.status.success(), "{output:?}");
+    let lines = fs::read_to_string(&trace).expect("a trace");
+    assert!(lines.contains(r#""type":"feedback","ticket":0"#), "{lines}");
+    assert!(!lines.contains("unintelligible"), "{lines}");
+    let replayed = elbowroom(&["run", "--replay", &trace]);
+    assert!(replayed.status.success(), "{replayed:?}");
+    fs::remove_file(trace).expect("the trace is there");
+}
+
+#[test]
+fn the_library_for_python_and_the_bridges_pass_their_own_tests() {
+    if !python_is_there() {
+        return;
+    }
+    for folder in ["clients/python", "examples"] {
+        let tests = ["-m", "unittest", "discover", "-s", folder, "-v"];
+        let output = Command::new("python3")
+            .args(tests)
+            .current_dir(root())
+            .output();
+        let output = output.expect("python3 can be started");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{folder}: {said}");
+        assert!(said.contains("\nOK"), "{folder}: {said}");
+    }
+}
