@@ -55,7 +55,7 @@ impl Ability {
 /// One line, understood.
 #[derive(Debug)]
 pub(crate) enum Said {
-    Greeting(Greeting),
+    Greeting,
     /// One of its clocks was read, of which nothing follows yet.
     Clock,
     /// It knows nothing of a start that it was asked about.
@@ -128,7 +128,7 @@ impl Listener {
             serde_json::from_str(line).map_err(|error| format!("not JSON: {error}"))?;
         let what = message.get("type").and_then(Value::as_str);
         match what {
-            Some("hello") => return self.greeted(&message).map(Said::Greeting),
+            Some("hello") => return self.greeted(&message).map(|()| Said::Greeting),
             Some("time") => return self.time(&message).map(Said::Time),
             Some(word @ ("clock" | "feedback")) if self.greeting.is_none() => {
                 return Err(format!(
@@ -160,7 +160,7 @@ impl Listener {
         }
     }
 
-    fn greeted(&mut self, message: &Value) -> Result<Greeting, String> {
+    fn greeted(&mut self, message: &Value) -> Result<(), String> {
         if self.greeting.is_some() || self.has_spoken {
             return Err("`hello` comes once, and before anything else".to_owned());
         }
@@ -185,9 +185,9 @@ impl Listener {
         };
         // Who says that it speaks the first version has said nothing else about itself.
         if version > VERSIONS[0] {
-            self.greeting = Some(greeting.clone());
+            self.greeting = Some(greeting);
         }
-        Ok(greeting)
+        Ok(())
     }
 
     fn time(&self, message: &Value) -> Result<Rational, String> {

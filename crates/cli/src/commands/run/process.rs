@@ -223,7 +223,7 @@ impl ProcessWorld {
                 continue;
             }
             match self.listener.read(line) {
-                Ok(Said::Greeting(_) | Said::Clock | Said::Unknown) => {}
+                Ok(Said::Greeting | Said::Clock | Said::Unknown) => {}
                 Ok(Said::Time(now)) => {
                     self.is_asked = false;
                     self.now.clone_from(&now);

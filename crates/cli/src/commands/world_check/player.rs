@@ -214,7 +214,7 @@ impl Player {
                 continue;
             }
             match self.listener.read(line) {
-                Ok(Said::Greeting(_) | Said::Clock | Said::Unknown) => {}
+                Ok(Said::Greeting | Said::Clock | Said::Unknown) => {}
                 Ok(Said::Observation(observation)) => observations.push(observation),
                 Ok(Said::Time(now)) => {
                     self.findings.look_at(Check::Speaks);
