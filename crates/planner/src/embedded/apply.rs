@@ -110,7 +110,7 @@ impl<'a> Stepper<'a> {
         let is_in_time = state.earliest_end() <= self.horizon;
         let metric = self.compiled.metric.as_ref();
         let limit = metric.zip(self.limit.as_ref());
-        (is_in_time && symbolic::is_possible(state, self.compiled.scale, limit)).then_some(())
+        (is_in_time && symbolic::is_possible(state, self.compiled, limit)).then_some(())
     }
 
     /// Whether happenings may leave the network.

@@ -222,6 +222,16 @@ impl Compiled {
         self.is_exact && self.relaxation_incomplete_because.is_none()
     }
 
+    /// The earliest time that a tick stands for. That of now is rounded down where the situation's time is
+    /// not on the grid, and nothing happens before that.
+    pub(crate) fn earliest(&self, tick: Ticks) -> Rational {
+        if tick == self.now {
+            self.beginning.time.clone()
+        } else {
+            self.scale.units(tick)
+        }
+    }
+
     /// The snap of that number.
     pub(crate) fn snap(&self, number: u32) -> &Snap {
         &self.snaps[number as usize]

@@ -49,7 +49,7 @@ pub(crate) fn plan_of(
         exact_times(compiled, &state.network, log, task.epsilon())?
     } else {
         let exact = exact_distances(log);
-        symbolic::solve(&state, compiled.scale, &exact, compiled.metric.as_ref())?
+        symbolic::solve(&state, compiled, &exact)?
     };
     let plan = written(task, situation, compiled, &timings, &times)?;
     match validate_from(task, situation, &plan, &validate::Settings::default()) {
@@ -165,7 +165,7 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
 ///
 /// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
 /// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
-/// rounding.
+/// rounding. What can happen at once happens at the situation's time, which may be later than its tick.
 fn exact_times(
     compiled: &Compiled,
     network: &Network,
@@ -190,7 +190,7 @@ fn exact_times(
         .bounds()
         .map(|(floor, _)| {
             let is_free = floor <= compiled.now;
-            scale.units(if is_free { floor } else { floor + slack })
+            compiled.earliest(if is_free { floor } else { floor + slack })
         })
         .collect();
     let exact = exact_distances(log);

@@ -78,6 +78,37 @@ fn a_deadline_that_has_passed_does_not_come_again() {
     assert!(matches!(answer, Answer::Unsolvable { .. }));
 }
 
+const TIMELY: &str = "
+    (:requirements :typing :durative-actions :numeric-fluents :duration-inequalities)
+    (:predicates (idle) (done))
+    (:functions (water))
+    (:durative-action work :parameters () :duration (= ?duration 2)
+      :condition (at start (idle))
+      :effect (and (at start (not (idle))) (at end (idle)) (at end (done))))
+    (:durative-action fill :parameters () :duration (and (>= ?duration 1) (<= ?duration 9))
+      :condition (at start (idle))
+      :effect (and (at start (not (idle))) (at end (idle)) (at end (increase (water) (* ?duration 2)))))";
+
+/// Worlds tell the time in floats, which no grid holds.
+#[test]
+fn a_plan_that_begins_at_once_begins_at_no_earlier_time_than_it_is() {
+    for goal in ["(done)", "(>= (water) 5)", "(and (done) (>= (water) 5))"] {
+        let problem = format!("(:init (idle) (= (water) 0)) (:goal {goal})");
+        let task = task(TIMELY, &problem);
+        let mut situation = Situation::initial(&task);
+        for time in [0.022_737_979_888_916_016, 0.1, 6.043_167_626_857_75, 1e5 / 3.0] {
+            situation.time = Rational::from_f64_as_written(time).expect("finite");
+            let answer = answer_from(&task, &situation, 400);
+            let Answer::Plan { found, .. } = answer else {
+                panic!("{goal} at {time}: {answer}", answer = describe(&answer));
+            };
+            // The first step waits for nothing.
+            let first = &found.plan.steps[0].start;
+            assert_eq!(*first, situation.time, "{goal} at {time}");
+        }
+    }
+}
+
 const GRID: &str = "
     (:requirements :typing :durative-actions :numeric-fluents)
     (:types place) (:predicates (at ?p - place) (next ?a ?b - place) (been ?p - place))

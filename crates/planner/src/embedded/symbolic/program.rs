@@ -5,18 +5,18 @@ use elbowroom_num::simplex::{Optimum, Simplex, VariableId};
 use elbowroom_num::{Delta, Rational};
 
 use super::super::bound::MetricBound;
-use super::super::compile::Metric;
+use super::super::compile::{Compiled, Metric};
 use super::super::expressions::Form;
 use super::super::formula::Numeric;
 use super::super::network::{Network, NodeId};
 use super::super::state::State;
-use super::super::time::{NEVER, Scale};
+use super::super::time::NEVER;
 
 /// Whether there are times that meet all demands and the network, and leave what has been spent
 /// within the limit.
 pub(crate) fn is_possible(
     state: &State,
-    scale: Scale,
+    compiled: &Compiled,
     limit: Option<(&Metric, &MetricBound)>,
 ) -> bool {
     let Some(symbolic) = &state.symbolic else {
@@ -27,7 +27,7 @@ pub(crate) fn is_possible(
     if !symbolic.has_demands() && !is_limited {
         return true;
     }
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, scale, &[]);
+    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, &[]);
     if is_limited
         && let Some((metric, limit)) = limit
         && let Some((row, constant)) = objective(state, metric, &times, end)
@@ -49,13 +49,12 @@ pub(crate) fn is_possible(
 /// last one is as early as possible.
 pub(crate) fn solve(
     state: &State,
-    scale: Scale,
+    compiled: &Compiled,
     exact: &[(NodeId, NodeId, Rational)],
-    metric: Option<&Metric>,
 ) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
-    let (mut program, times, end) = program(&state.network, &symbolic.demands, scale, exact);
-    let objective = metric.and_then(|metric| objective(state, metric, &times, end));
+    let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, exact);
+    let objective = compiled.metric.as_ref().and_then(|metric| objective(state, metric, &times, end));
     if let Some((row, _)) = objective {
         let least = program.minimize(&row).ok()?;
         // Where it has no minimum, as far as these happenings go, the makespan alone decides.
@@ -115,14 +114,20 @@ fn objective(
 fn program(
     network: &Network,
     demands: &[(Form, Comparison)],
-    scale: Scale,
+    compiled: &Compiled,
     exact: &[(NodeId, NodeId, Rational)],
 ) -> (Simplex, Vec<VariableId>, VariableId) {
+    let scale = compiled.scale;
     let mut program = Simplex::new();
     let times: Vec<VariableId> = network.bounds().map(|_| program.add_variable()).collect();
     let end = program.add_variable();
     for (&time, (floor, latest)) in times.iter().zip(network.bounds()) {
-        program.assert_lower(time, Delta::from(scale.units(floor)), 0);
+        let earliest = if latest > floor {
+            compiled.earliest(floor)
+        } else {
+            scale.units(floor)
+        };
+        program.assert_lower(time, Delta::from(earliest), 0);
         if latest < NEVER {
             program.assert_upper(time, Delta::from(scale.units(latest)), 0);
         }
