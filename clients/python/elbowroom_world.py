@@ -134,7 +134,8 @@ class World:
 
     With a ``ledger``, a file, it can be started again after a crash, its own or Elbowroom's: it
     writes down each start before the action begins, and each end, and answers from that what
-    became of them (``elbowroom run --resume``).
+    became of them (``elbowroom run --resume``). A ledger belongs to one program at a time: who is
+    started while the last one is still about waits for its end.
     """
 
     capabilities: Iterable[str] = ("cancel", "feedback", "facts")
@@ -158,6 +159,8 @@ class World:
         self._news: list[dict[str, Any]] = []
         self._out: TextIO | None = None
         self._version = 1
+        # Whether Elbowroom is gone.
+        self._is_alone = threading.Event()
         # The wall clock's time at the world's time 0, which begins with the first thing to do: what
         # is prepared before that takes no time.
         self._zero: float | None = None
@@ -262,6 +265,7 @@ class World:
                 continue
             if isinstance(message, dict):
                 self._inbox.put(("message", message))
+        self._is_alone.set()
         self._inbox.put(("end",))
 
     def _next(self, question: dict[str, Any] | None) -> tuple[Any, ...]:
@@ -321,6 +325,7 @@ class World:
     def _greet(self, message: dict[str, Any]) -> None:
         resumed = message.get("resumed")
         if self._ledger is not None:
+            self._ledger.claim(self._is_alone.is_set)
             if resumed is None:
                 self._ledger.begin()
             else:
@@ -561,6 +566,26 @@ class _Ledger:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._path = os.fspath(path)
         self._file: TextIO | None = None
+        self._lock: TextIO | None = None
+
+    def claim(self, is_over: Callable[[], bool]) -> None:
+        """Waits until no other program has this ledger: what that began might go on until it ends. The
+        system gives it back when this program ends, however it does."""
+        self._lock = open(self._path + ".lock", "w", encoding="utf-8")
+        is_said = False
+        while not _locked(self._lock.fileno()):
+            if is_over():
+                sys.exit(f"{self._path} belongs to another program, which has not ended")
+            if not is_said:
+                print(f"waiting for the program that has {self._path} to end", file=sys.stderr)
+                is_said = True
+            _time.sleep(0.02)
+
+    def release(self) -> None:
+        """Gives it to the next program before this one has ended."""
+        for file in (self._file, self._lock):
+            if file is not None:
+                file.close()
 
     def begin(self) -> None:
         """A new run: what the last one left is forgotten."""
@@ -589,6 +614,27 @@ class _Ledger:
         self._file.write(json.dumps(line) + "\n")
         self._file.flush()
         os.fsync(self._file.fileno())
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _locked(file: int) -> bool:
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+
+else:
+    import fcntl
+
+    def _locked(file: int) -> bool:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True
 
 
 def _number(value: Any) -> float | None:

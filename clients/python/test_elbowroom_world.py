@@ -1,5 +1,6 @@
 """What the library makes of what it is told. `python3 -m unittest discover -s clients/python`"""
 
+import io
 import json
 import os
 import tempfile
@@ -273,6 +274,8 @@ class AfterACrash(unittest.TestCase):
         peer.start(1, duration=500.0)
         peer.reports(1)
         self.assertTrue(peer.hang_up())
+        # As its end does.
+        peer.world._ledger.release()
         with open(self.ledger, "a", encoding="utf-8") as file:
             file.write('{"ticket": 7, "act')  # cut off
 
@@ -310,6 +313,36 @@ class AfterACrash(unittest.TestCase):
         peer.start(1)
         time.sleep(0.05)
         self.assertEqual(self.done, [(1, True)])
+
+    def test_a_ledger_belongs_to_one_program_at_a_time(self):
+        first = Peer(self.world(True))
+        first.start(0, duration=500.0)
+        first.reports(1)
+        done, taken_over = self.done, []
+
+        def take_over():
+            taken_over.append(Peer(self.world(True), resumed={"now": 3}))
+
+        second = threading.Thread(target=take_over, daemon=True)
+        second.start()
+        second.join(0.3)
+        # It does not even greet: the first may still move something.
+        self.assertEqual((taken_over, done), ([], [(0, False)]))
+        first.world._ledger.release()
+        second.join(30)
+        reports, _ = taken_over[0].ask(type="look", facts=[], fluents=[], tickets=[0])
+        self.assertEqual([it["type"] for it in reports], ["started"])
+
+    def test_who_waits_for_a_ledger_ends_when_nobody_needs_it_any_more(self):
+        Peer(self.world(True))
+        world = self.world(True)
+        there = os.pipe()
+        source = os.fdopen(there[0])
+        PIPES.append(source)
+        with os.fdopen(there[1], "w") as mouth:
+            mouth.write('{"type":"hello","protocol":"elbowroom-world","version":1,"versions":[1,2]}\n')
+        with self.assertRaises(SystemExit):
+            world.run(source, io.StringIO())
 
     def test_a_new_run_begins_with_an_empty_ledger(self):
         self.before()

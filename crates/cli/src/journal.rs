@@ -33,6 +33,8 @@ pub(crate) struct Journal {
     pub(crate) is_torn: bool,
     /// The length of what is whole, in bytes.
     length: u64,
+    /// The length of everything that was read, in bytes.
+    read: u64,
     last: String,
     /// The same, and the length of the text, without its last record.
     before: (u64, String, usize),
@@ -42,14 +44,22 @@ impl JournalFile {
     /// An empty journal. One that has something in it is not overwritten.
     pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         let name = path.display();
-        if std::fs::metadata(path).is_ok_and(|it| it.is_file() && it.len() > 0) {
+        let open = || {
+            let mut options = OpenOptions::new();
+            options.write(true).create(true).truncate(false).open(path)
+        };
+        let file = open().map_err(|error| cannot_write(path, &error))?;
+        claim(path, &file)?;
+        if file
+            .metadata()
+            .is_ok_and(|it| it.is_file() && it.len() > 0)
+        {
             return Err(Failure::new(
                 format!("there is a journal {name} already"),
                 "`elbowroom run --resume` goes on with its run; if that is over, choose another file, or remove \
                  this one",
             ));
         }
-        let file = File::create(path).map_err(|error| cannot_write(path, &error))?;
         // A file that nobody finds after a power failure is none. Not every system can do this.
         let folder = path
             .parent()
@@ -66,14 +76,20 @@ impl JournalFile {
 
     /// Goes on behind what is whole of a journal.
     pub(crate) fn go_on(path: &Path, journal: &Journal) -> Result<Self, Failure> {
-        let open = || {
-            let mut file = OpenOptions::new().write(true).open(path)?;
+        let open = || OpenOptions::new().write(true).open(path);
+        let mut file = open().map_err(|error| cannot_write(path, &error))?;
+        claim(path, &file)?;
+        // It was read before it was claimed.
+        if file.metadata().is_ok_and(|it| it.len() != journal.read) {
+            return Err(under_way(path));
+        }
+        let mut cut = || {
             file.set_len(journal.length)?;
-            file.seek(SeekFrom::Start(journal.length))?;
-            Ok(file)
+            file.seek(SeekFrom::Start(journal.length))
         };
+        cut().map_err(|error| cannot_write(path, &error))?;
         Ok(Self {
-            file: open().map_err(|error: io::Error| cannot_write(path, &error))?,
+            file,
             last: journal.last.clone(),
             error: None,
         })
@@ -111,6 +127,29 @@ impl JournalFile {
     }
 }
 
+/// Keeps every other program from writing this journal, until this one ends, however it does. Where files cannot
+/// be locked, nothing is kept.
+fn claim(path: &Path, file: &File) -> Result<(), Failure> {
+    #[cfg(unix)]
+    {
+        use rustix::fs::{FlockOperation, flock};
+        use rustix::io::Errno;
+        if flock(file, FlockOperation::NonBlockingLockExclusive) == Err(Errno::WOULDBLOCK) {
+            return Err(under_way(path));
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = (path, file);
+    Ok(())
+}
+
+fn under_way(path: &Path) -> Failure {
+    Failure::new(
+        format!("the run of {} is under way", path.display()),
+        "another program writes this journal; wait for its end, or end it",
+    )
+}
+
 fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     Failure::new(
         format!(
@@ -140,6 +179,7 @@ impl Journal {
             text: String::with_capacity(text.len()),
             is_torn: false,
             length: 0,
+            read: text.len() as u64,
             last: BEGINNING.to_owned(),
             before: (0, BEGINNING.to_owned(), 0),
         };

@@ -120,6 +120,11 @@ fn judge(folder: &Path, output: &Output, what: &str) {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{what}: {text}{errors}");
     assert!(text.contains("goal reached"), "{what}: {text}");
+    judge_what_was_done(folder, what, &text);
+}
+
+/// What the robot itself has written down.
+fn judge_what_was_done(folder: &Path, what: &str, text: &str) {
     let begun = lines(folder, "begun");
     let tickets: BTreeSet<_> = begun
         .iter()
@@ -173,6 +178,10 @@ fn killed(number: u64) -> u64 {
                 break output;
             }
             let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            // It was killed after its last record.
+            if text.contains("is over: goal-reached") {
+                break output;
+            }
             assert!(
                 text.contains("world failed") || text.contains("cannot start"),
                 "{what}: {text}"
@@ -187,11 +196,12 @@ fn killed(number: u64) -> u64 {
             kill_the_world(&folder);
         }
     };
-    judge(
-        &folder,
-        &output,
-        &format!("run {number} after {kills} kills"),
-    );
+    let what = format!("run {number} after {kills} kills");
+    if String::from_utf8_lossy(&output.stderr).contains("is over: goal-reached") {
+        judge_what_was_done(&folder, &what, "it was over when it was killed");
+    } else {
+        judge(&folder, &output, &what);
+    }
     let replayed = elbowroom(&["run", "--replay", &journal]);
     assert!(replayed.status.success(), "run {number}: {replayed:?}");
     fs::remove_dir_all(&folder).expect("the folder is there");
@@ -259,7 +269,7 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
         .map(|word| format!("'{word}'"))
         .collect::<Vec<_>>();
     let script = format!(
-        "trap '' XFSZ; ulimit -f 24; exec '{program}' {}",
+        "trap '' XFSZ; ulimit -f 8; exec '{program}' {}",
         line.join(" ")
     );
     let output = Command::new("bash")
@@ -273,9 +283,39 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     assert!(text.contains("the run was ended in order"), "{text}");
+    let begun = lines(&folder, "begun").len();
+    assert!((1..6).contains(&begun), "in the middle: {begun} begun");
     let resume = ["run".to_owned(), "--resume".to_owned(), journal];
     let output = awaited(started(&resume), "after the disk was full");
     judge(&folder, &output, "after the disk was full");
+    fs::remove_dir_all(&folder).expect("the folder is there");
+}
+
+/// Two that write one journal would start everything twice.
+#[cfg(unix)]
+#[test]
+fn a_run_that_is_under_way_is_not_gone_on_with_beside_it() {
+    if !python_is_there() {
+        return;
+    }
+    let folder = folder("twice");
+    let journal = folder.join("journal").display().to_string();
+    let line = beginning(&folder, &journal);
+    let first = started(&line);
+    for _ in 0..600 {
+        if !lines(&folder, "begun").is_empty() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let resume = ["run", "--resume", &journal].map(str::to_owned);
+    for line in [&resume[..], &line] {
+        let second = awaited(started(line), "the second");
+        let text = String::from_utf8_lossy(&second.stderr).into_owned();
+        assert_eq!(second.status.code(), Some(2), "{text}");
+        assert!(text.contains("is under way"), "{text}");
+    }
+    judge(&folder, &awaited(first, "the first"), "the first");
     fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
