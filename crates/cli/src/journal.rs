@@ -33,8 +33,6 @@ pub(crate) struct Journal {
     pub(crate) is_torn: bool,
     /// The length of what is whole, in bytes.
     length: u64,
-    /// The length of everything that was read, in bytes.
-    read: u64,
     last: String,
     /// The same, and the length of the text, without its last record.
     before: (u64, String, usize),
@@ -74,13 +72,13 @@ impl JournalFile {
         })
     }
 
-    /// Goes on behind what is whole of a journal.
-    pub(crate) fn go_on(path: &Path, journal: &Journal) -> Result<Self, Failure> {
+    /// Goes on behind what is whole of a journal; `before` is how many bytes the file had before that was read.
+    pub(crate) fn go_on(path: &Path, journal: &Journal, before: u64) -> Result<Self, Failure> {
         let open = || OpenOptions::new().write(true).open(path);
         let mut file = open().map_err(|error| cannot_write(path, &error))?;
         claim(path, &file)?;
         // It was read before it was claimed.
-        if file.metadata().is_ok_and(|it| it.len() != journal.read) {
+        if file.metadata().is_ok_and(|it| it.len() != before) {
             return Err(under_way(path));
         }
         let mut cut = || {
@@ -179,7 +177,6 @@ impl Journal {
             text: String::with_capacity(text.len()),
             is_torn: false,
             length: 0,
-            read: text.len() as u64,
             last: BEGINNING.to_owned(),
             before: (0, BEGINNING.to_owned(), 0),
         };

@@ -51,9 +51,9 @@ pub(crate) fn run(arguments: &WorldCheckArgs, output: &mut Output) -> Answer {
     let patience = patience.unwrap_or(Duration::MAX);
     let (rows, greeting) = match Player::new(program, &Arc::new(task), patience) {
         Ok(mut player) => {
-            let played = play(&mut player, &actions);
+            let outcome = play(&mut player, &actions);
             let greeting = player.greeting().cloned();
-            let rows = match played {
+            let rows = match outcome {
                 Ok(()) => player.stop().rows(None),
                 Err(Gone) => cut_short(player.abandon()),
             };

@@ -36,10 +36,19 @@ use crate::stopwatch::Stopwatch;
 use past::{Past, PastPlanner, PastRecorder, Watch};
 use under_way::UnderWay;
 
-/// Goes on with the run of a journal.
-pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answer {
+/// A run that was cut off.
+struct Cut {
+    journal: Journal,
+    /// The bytes of its file, at the beginning.
+    length: u64,
+    stored: Stored,
+    spec: RunSpec,
+}
+
+/// Reads the journal of a run that can be gone on with.
+fn cut(path: &Path) -> Result<Cut, Failure> {
     let name = path.display().to_string();
-    let unreadable = |message: String| Failure::new(format!("the journal {name}: {message}"), "");
+    let length = std::fs::metadata(path).map_or(0, |it| it.len());
     let text = input::source(path, "journal")?;
     if !crate::journal::is_journal(text.text()) {
         return Err(Failure::new(
@@ -47,10 +56,10 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
             "`elbowroom run --journal` writes them; a trace can be played back with --replay",
         ));
     }
-    let mut journal = Journal::read(text.text()).map_err(unreadable)?;
+    let mut journal = Journal::read(text.text()).map_err(|why| unreadable(&name, &why))?;
     let read = |journal: &Journal| {
         let stored = Stored::read(&journal.text);
-        stored.map_err(|error| unreadable(error.to_string()))
+        stored.map_err(|error| unreadable(&name, &error.to_string()))
     };
     let mut stored = read(&journal)?;
     // A world that has died may be there again.
@@ -70,17 +79,38 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
         let hint = "the journal may be of another version of this program";
         Failure::new(format!("{name}, {error}"), hint)
     })?;
+    Ok(Cut {
+        journal,
+        length,
+        stored,
+        spec,
+    })
+}
+
+fn unreadable(name: &str, message: &str) -> Failure {
+    Failure::new(format!("the journal {name}: {message}"), "")
+}
+
+/// Goes on with the run of a journal.
+pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answer {
+    let name = path.display().to_string();
+    let Cut {
+        journal,
+        length,
+        stored,
+        spec,
+    } = cut(path)?;
     let Some(command) = spec.world_process.clone() else {
-        return Err(unreadable("its world was no process".to_owned()));
+        return Err(unreadable(&name, "its world was no process"));
     };
     let task = Arc::new(super::task(&spec, output)?);
     let first = if spec.has_plan {
         let first = stored.first_plan(&task);
-        first.map_err(|error| unreadable(error.to_string()))?
+        first.map_err(|error| unreadable(&name, &error.to_string()))?
     } else {
         None
     };
-    let mut file = JournalFile::go_on(path, &journal)?;
+    let mut file = JournalFile::go_on(path, &journal, length)?;
     let interrupt = Interrupt::listen();
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
