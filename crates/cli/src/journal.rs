@@ -48,10 +48,7 @@ impl JournalFile {
         };
         let file = open().map_err(|error| cannot_write(path, &error))?;
         claim(path, &file)?;
-        if file
-            .metadata()
-            .is_ok_and(|it| it.is_file() && it.len() > 0)
-        {
+        if file.metadata().is_ok_and(|it| it.is_file() && it.len() > 0) {
             return Err(Failure::new(
                 format!("there is a journal {name} already"),
                 "`elbowroom run --resume` goes on with its run; if that is over, choose another file, or remove \

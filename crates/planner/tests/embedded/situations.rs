@@ -96,7 +96,12 @@ fn a_plan_that_begins_at_once_begins_at_no_earlier_time_than_it_is() {
         let problem = format!("(:init (idle) (= (water) 0)) (:goal {goal})");
         let task = task(TIMELY, &problem);
         let mut situation = Situation::initial(&task);
-        for time in [0.022_737_979_888_916_016, 0.1, 6.043_167_626_857_75, 1e5 / 3.0] {
+        for time in [
+            0.022_737_979_888_916_016,
+            0.1,
+            6.043_167_626_857_75,
+            1e5 / 3.0,
+        ] {
             situation.time = Rational::from_f64_as_written(time).expect("finite");
             let answer = answer_from(&task, &situation, 400);
             let Answer::Plan { found, .. } = answer else {

@@ -54,7 +54,10 @@ pub(crate) fn solve(
 ) -> Option<Vec<Rational>> {
     let symbolic = state.symbolic.as_ref()?;
     let (mut program, times, end) = program(&state.network, &symbolic.demands, compiled, exact);
-    let objective = compiled.metric.as_ref().and_then(|metric| objective(state, metric, &times, end));
+    let objective = compiled
+        .metric
+        .as_ref()
+        .and_then(|metric| objective(state, metric, &times, end));
     if let Some((row, _)) = objective {
         let least = program.minimize(&row).ok()?;
         // Where it has no minimum, as far as these happenings go, the makespan alone decides.
