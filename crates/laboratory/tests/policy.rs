@@ -1,10 +1,27 @@
-//! `policy` beside the timed optimum and beside all other executors, in the worlds of `experiments`.
+//! `policy` beside the timed optimum and beside all other executors, in the worlds of `experiments` and in
+//! random small ones.
 //!
 //! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
 //! (`--nocapture`).
 
+#[path = "timed/twin.rs"]
+mod twin;
+
+use std::sync::Arc;
+
+use elbowroom::execute::{Embedded, Execution};
+use elbowroom_execution::run::{Report, Verdict};
+use elbowroom_execution::{Outlook, PlanAnswer, Planner};
 use elbowroom_laboratory::compare::{Experiment, Part, Results, run};
-use elbowroom_pddl::Source;
+use elbowroom_laboratory::timed::{Policy, Settings};
+use elbowroom_model::{Situation, Task};
+use elbowroom_num::Rational;
+use elbowroom_pddl::{Source, read_plan, read_problem};
+use elbowroom_sim::WorldModel;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use twin::SmallWorld;
 
 fn experiment(name: &str) -> Experiment {
     let folder = format!("{}/../../experiments", env!("CARGO_MANIFEST_DIR"));
@@ -36,6 +53,7 @@ fn results(name: &str, jobs: usize, trials: u64) -> Results {
 /// Three standard errors of a share.
 #[allow(clippy::cast_precision_loss, reason = "there are few trials")]
 fn doubt(share: f64, trials: u64) -> f64 {
+    let share = share.clamp(0.0, 1.0);
     3.0 * (share * (1.0 - share)).sqrt() / (trials as f64).sqrt()
 }
 
@@ -95,4 +113,125 @@ fn the_same_seed_leads_to_the_same_runs_on_any_number_of_threads() {
     let one = results("weld", 1, 40);
     let two = results("weld", 2, 40);
     assert_eq!(one.json(), two.json());
+}
+
+/// A world with a plan to begin with, as text.
+struct Small<'a> {
+    domain: &'a str,
+    problem: &'a str,
+    world: &'a str,
+    /// `None`: the planner's.
+    plan: Option<&'a str>,
+    ends: Rational,
+}
+
+/// What `policy` makes of a world: its table's lower bound, and the runs.
+struct Made {
+    lower: f64,
+    reports: Vec<Report>,
+}
+
+/// `None` if there is no plan: whoever has none does not begin.
+fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
+    let source = |text: &str| Source::new("test", text);
+    let read = read_problem(&source(small.domain), &source(small.problem));
+    let task = Arc::new(Task::new(read.expect("it is PDDL").0));
+    let model = WorldModel::read(small.world, task.problem()).expect("a world");
+    let plan = match small.plan {
+        Some(text) => read_plan(&source(text), &task).expect("it is a plan").0,
+        None => match Embedded::default()
+            .plan(&task, &Situation::initial(&task))
+            .answer
+        {
+            PlanAnswer::Plan(plan) => plan,
+            _ => return None,
+        },
+    };
+    let settings = Settings {
+        most_states: 20_000,
+        horizon: Some(small.ends.clone()),
+        ..Settings::default()
+    };
+    let policy = Policy::new(&task, &model, &settings, &|| true);
+    let policy = policy.expect("all of it is known to the process")?;
+    let lower = policy.optimum().lower;
+    let outlook: Arc<dyn Outlook> = Arc::new(policy);
+    let reports = (0..runs).map(|seed| {
+        let execution = Execution::of(&task)
+            .by("policy".parse().expect("it is registered"))
+            .beginning_with(plan.clone())
+            .with_outlook(Some(Arc::clone(&outlook)));
+        execution.run_in(&mut *model.world(&task, seed))
+    });
+    Some(Made {
+        lower,
+        reports: reports.collect(),
+    })
+}
+
+/// Run in the world that it knows, it succeeds as often as its table and the plain recursion say, but for
+/// the dice: in worlds in which one can be sure, and in those that are left to chance.
+#[test]
+#[allow(clippy::cast_precision_loss, reason = "there are few runs")]
+fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
+    const RUNS: u64 = 200;
+    const OF_EACH_KIND: usize = 10;
+    let mut tried = [0; 2];
+    for number in 0..400 {
+        let mut rng = ChaCha8Rng::seed_from_u64(number);
+        let world = SmallWorld::random(&mut rng, number % 2 == 0);
+        let (worst, best) = world.best();
+        let kind = usize::from(worst < 0.99);
+        if best == 0.0 || tried[kind] == OF_EACH_KIND {
+            continue;
+        }
+        let small = Small {
+            domain: &world.domain(),
+            problem: &world.problem(),
+            world: &world.world(),
+            plan: None,
+            ends: Rational::from(i64::from(twin::ENDS)),
+        };
+        let Some(Made { lower, reports }) = made_of(&small, RUNS) else {
+            continue;
+        };
+        // What happens one after another is ε apart, so that the last second's end is a little late.
+        let ends = &small.ends + Rational::new(1, 10);
+        let is_won =
+            |report: &&Report| report.verdict == Verdict::GoalReached && report.time <= ends;
+        let share = reports.iter().filter(is_won).count() as f64 / RUNS as f64;
+        println!("{number}: table {lower:.3}, recursion {worst:.3} to {best:.3}, runs {share:.3}");
+        let at_least = (worst - 0.02).max(lower - 0.001);
+        let lost = reports.iter().find(|report| !is_won(report));
+        assert!(
+            share >= at_least - doubt(at_least, RUNS) && share <= best + doubt(best, RUNS),
+            "{number}: {share} is not between {worst} and {best}, table {lower}\n{world:#?}\n{lost:#?}"
+        );
+        tried[kind] += 1;
+    }
+    assert_eq!(tried, [OF_EACH_KIND; 2], "too few worlds have a plan");
+}
+
+/// The plan passes through the goal, loses it again, and fails half of the time on the way back to it.
+#[test]
+fn what_is_under_way_is_let_go_when_the_goal_holds() {
+    let small = Small {
+        domain: "(define (domain lamp) (:requirements :durative-actions)
+            (:predicates (lit) (pressed) (wired))
+            (:durative-action press :parameters () :duration (= ?duration 4)
+              :condition () :effect (and (at start (lit)) (at end (not (lit))) (at end (pressed))))
+            (:durative-action wire :parameters () :duration (= ?duration 4)
+              :condition (at start (pressed)) :effect (at end (lit))))",
+        problem: "(define (problem p) (:domain lamp) (:init) (:goal (lit)))",
+        world: "format = \"elbowroom-world\"\nversion = 1\n
+            [[failure]]\naction = \"wire\"\nprobability = 0.5\n",
+        plan: Some("0: (press) [4]\n4.001: (wire) [4]\n"),
+        ends: Rational::from(10),
+    };
+    let made = made_of(&small, 20).expect("there is a plan");
+    assert!(made.lower > 0.99, "{}", made.lower);
+    for report in made.reports {
+        assert_eq!(report.verdict, Verdict::GoalReached, "{report:#?}");
+        assert!(report.time < Rational::from(4), "{report:#?}");
+    }
 }

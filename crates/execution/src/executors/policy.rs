@@ -11,7 +11,7 @@ use crate::dispatch::replan;
 use crate::executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 use crate::outlook::{Move, Outlook, Standing, Weighed};
 use crate::preparation::Need;
-use crate::progression::Progression;
+use crate::progression::{Outlook as Prospect, Progression};
 use crate::reason::{About, Cause, Reason};
 
 pub(super) const REGISTERED: Registered = Registered {
@@ -240,16 +240,17 @@ impl Policy {
         outlook: &dyn Outlook,
     ) -> Decided {
         let kept = self.still_kept(kept);
+        // What counts is that the goal holds, whatever the plan would still do.
+        if moment.belief.outlook() == Prospect::Reached {
+            self.follows = false;
+            return self.finish();
+        }
         let starts = kept.as_ref().is_some_and(|kept| {
             matches!(
                 kept.decision,
                 Decision::Start(_) | Decision::Cancel(_) | Decision::GoalReached
             )
         });
-        let is_goal = moment.belief.holds(moment.belief.task().goal(), None) == Ok(true);
-        if kept.is_none() && is_goal {
-            return self.finish();
-        }
         let mut steps = self.steps.values();
         let pending = steps.find(|ordered| !ordered.has_started || ordered.is_let_go);
         if let Some(ordered) = pending

@@ -1,6 +1,7 @@
 //! Small worlds in which all durations and times are whole and even, written out as PDDL and as a
 //! world file, and their best value by plain recursion: at each whole second the agent starts and
-//! cancels what it likes, and a second later happens what happens, in some order.
+//! cancels what it likes, and a second later happens what happens, in the worst order or in the best
+//! one.
 //!
 //! It knows neither cells nor bounds, and reads neither PDDL nor world files.
 
@@ -151,8 +152,9 @@ impl SmallWorld {
         text
     }
 
-    /// The best that can be reached from time 0.
-    pub(crate) fn best(&self) -> f64 {
+    /// The best that can be reached from time 0 if what happens at the same second happens in the worst
+    /// order, and in the best one.
+    pub(crate) fn best(&self) -> (f64, f64) {
         let start = Now {
             time: 0,
             facts: self.initial,
@@ -160,14 +162,15 @@ impl SmallWorld {
             happened: 0,
             begun: 0,
         };
-        self.value(&start, &mut BTreeMap::new())
+        let value = |choice| self.value(&start, choice, &mut BTreeMap::new());
+        (value(f64::min), value(f64::max))
     }
 
     fn is_won(&self, now: &Now) -> bool {
         self.goal.iter().all(|fact| now.facts & (1 << fact) != 0)
     }
 
-    fn value(&self, now: &Now, known: &mut BTreeMap<Now, f64>) -> f64 {
+    fn value(&self, now: &Now, choice: Choice, known: &mut BTreeMap<Now, f64>) -> f64 {
         if self.is_won(now) {
             return 1.0;
         }
@@ -178,7 +181,7 @@ impl SmallWorld {
         if let Some(value) = known.get(now) {
             return *value;
         }
-        let mut best = self.wait(now, known);
+        let mut best = self.wait(now, choice, known);
         for index in 0..self.actions.len() {
             let action = &self.actions[index];
             let mut after = now.clone();
@@ -195,38 +198,61 @@ impl SmallWorld {
             } else {
                 continue;
             }
-            best = best.max(self.value(&after, known));
+            best = best.max(self.value(&after, choice, known));
         }
         known.insert(now.clone(), best);
         best
     }
 
-    /// A second passes.
-    fn wait(&self, now: &Now, known: &mut BTreeMap<Now, f64>) -> f64 {
+    /// A second passes, and then happens what happens, in the order of that choice.
+    fn wait(&self, now: &Now, choice: Choice, known: &mut BTreeMap<Now, f64>) -> f64 {
         let time = now.time + 1;
-        let mut all = vec![(
-            1.0,
-            Now {
-                time,
-                begun: 0,
-                ..now.clone()
-            },
-        )];
-        for &(index, since) in &now.running {
-            let action = &self.actions[index];
+        let ends = now.running.iter().map(|&(index, since)| {
+            let durations = &self.actions[index].durations;
+            let count = |of: &dyn Fn(u32) -> bool| durations.iter().filter(|it| of(**it)).count();
             let age = time - since;
-            let left = action.durations.iter().filter(|it| **it >= age).count();
-            let due = action.durations.iter().filter(|it| **it == age).count();
-            let due = share(due, left);
-            let ways = [
-                (due * (1.0 - action.fails), Some(true)),
-                (due * action.fails, Some(false)),
-                (1.0 - due, None),
-            ];
-            all = branch(
-                all,
-                &ways,
-                |after, way| {
+            let due = share(count(&|it| it == age), count(&|it| it >= age));
+            (Happening::End(index), due)
+        });
+        let events = self.events.iter().enumerate();
+        let events = events.filter(|(index, _)| now.happened & (1 << index) == 0);
+        let events = events.map(|(index, event)| {
+            let part = |of: &dyn Fn(u32) -> bool| {
+                let count = event.times.iter().filter(|it| of(**it)).count();
+                share(count, event.times.len()) * event.probability
+            };
+            let due = part(&|it| it == time) / (1.0 - part(&|it| it < time));
+            (Happening::Event(index), due)
+        });
+        let due: Vec<_> = ends.chain(events).filter(|(_, p)| *p > 0.0).collect();
+        let after = Now {
+            time,
+            begun: 0,
+            ..now.clone()
+        };
+        let values = orders(&due).into_iter().map(|order| {
+            let all = order.iter().fold(vec![(1.0, after.clone())], |all, due| {
+                self.happen(all, *due)
+            });
+            let values = all
+                .iter()
+                .map(|(p, after)| p * self.value(after, choice, known));
+            values.sum()
+        });
+        values.reduce(choice).expect("there is an order, if of nothing")
+    }
+
+    fn happen(&self, all: Vec<(f64, Now)>, (what, due): (Happening, f64)) -> Vec<(f64, Now)> {
+        let is_won = |now: &Now| self.is_won(now);
+        match what {
+            Happening::End(index) => {
+                let action = &self.actions[index];
+                let ways = [
+                    (due * (1.0 - action.fails), Some(true)),
+                    (due * action.fails, Some(false)),
+                    (1.0 - due, None),
+                ];
+                let end = |after: &mut Now, way| {
                     let (Some(is_well), Some(place)) =
                         (way, after.running.iter().position(|it| it.0 == index))
                     else {
@@ -237,39 +263,20 @@ impl SmallWorld {
                         after.facts = set(action.at_end, after.facts);
                         self.break_off(after);
                     }
-                },
-                |now| self.is_won(now),
-            );
-        }
-        for (index, event) in self
-            .events
-            .iter()
-            .enumerate()
-            .filter(|(index, _)| now.happened & (1 << index) == 0)
-        {
-            let count = |of: &dyn Fn(u32) -> bool| {
-                share(
-                    event.times.iter().filter(|it| of(**it)).count(),
-                    event.times.len(),
-                ) * event.probability
-            };
-            let due = count(&|it| it == time) / (1.0 - count(&|it| it < time));
-            all = branch(
-                all,
-                &[(due, true), (1.0 - due, false)],
-                |after, happens| {
+                };
+                branch(all, &ways, end, is_won)
+            }
+            Happening::Event(index) => {
+                let change = |after: &mut Now, happens| {
                     if happens {
                         after.happened |= 1 << index;
-                        after.facts = set(event.change, after.facts);
+                        after.facts = set(self.events[index].change, after.facts);
                         self.break_off(after);
                     }
-                },
-                |now| self.is_won(now),
-            );
+                };
+                branch(all, &[(due, true), (1.0 - due, false)], change, is_won)
+            }
         }
-        all.iter()
-            .map(|(p, after)| p * self.value(after, known))
-            .sum()
     }
 
     fn break_off(&self, now: &mut Now) {
@@ -280,6 +287,31 @@ impl SmallWorld {
                 .is_none_or(|it| holds(it, facts))
         });
     }
+}
+
+/// Which of two values the order leads to.
+type Choice = fn(f64, f64) -> f64;
+
+#[derive(Clone, Copy, Debug)]
+enum Happening {
+    End(usize),
+    Event(usize),
+}
+
+/// All orders of those.
+fn orders<T: Copy>(of: &[T]) -> Vec<Vec<T>> {
+    let mut all = vec![Vec::new()];
+    for (count, item) in of.iter().enumerate() {
+        let longer = all.iter().flat_map(|order: &Vec<T>| {
+            (0..=count).map(|place| {
+                let mut longer = order.clone();
+                longer.insert(place, *item);
+                longer
+            })
+        });
+        all = longer.collect();
+    }
+    all
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
