@@ -239,7 +239,9 @@ impl SmallWorld {
                 .map(|(p, after)| p * self.value(after, choice, known));
             values.sum()
         });
-        values.reduce(choice).expect("there is an order, if of nothing")
+        values
+            .reduce(choice)
+            .expect("there is an order, if of nothing")
     }
 
     fn happen(&self, all: Vec<(f64, Now)>, (what, due): (Happening, f64)) -> Vec<(f64, Now)> {
