@@ -69,6 +69,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         ],
     ),
     ("page", &["elbowroom", "laboratory"]),
+    ("web", &["elbowroom", "page"]),
     ("cli", &["elbowroom", "laboratory", "page"]),
     ("python", &["elbowroom", "laboratory", "cli"]),
 ];

@@ -1,0 +1,102 @@
+//! The interface of the module: memory and one function, as C would call them.
+//!
+//! A host reserves room with [`elbowroom_reserve`], writes a question in UTF-8 there, and calls
+//! [`elbowroom_ask`]. The reply begins with its length in bytes, four of them, the lowest first; the
+//! reply itself follows, in UTF-8. The host gives back what it was given with [`elbowroom_release`].
+//! On WebAssembly the module imports one function, `now` from `elbowroom`: milliseconds since some
+//! fixed moment, as a double.
+//!
+//! A panic ends the instance, which is of no more use then: the host makes a new one.
+
+#![allow(
+    unsafe_code,
+    reason = "whoever calls from another language hands over addresses"
+)]
+
+use std::time::Duration;
+
+/// The bytes before a reply: its length.
+const HEAD: usize = 4;
+
+/// Room for that many bytes, which belongs to the host until it gives it back.
+#[unsafe(no_mangle)]
+pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
+    handed_over(vec![0; length])
+}
+
+/// Takes back room.
+///
+/// # Safety
+/// `start` and `length` are those of room that was reserved, or of a reply with its head, and it has not
+/// been given back before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn elbowroom_release(start: *mut u8, length: usize) {
+    let slice = std::ptr::slice_from_raw_parts_mut(start, length);
+    // SAFETY: what is handed over is a boxed slice of that length, by `handed_over`.
+    drop(unsafe { Box::from_raw(slice) });
+}
+
+/// The reply to a question.
+///
+/// # Safety
+/// The host has written that many bytes at `start`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn elbowroom_ask(start: *const u8, length: usize) -> *mut u8 {
+    // SAFETY: by this function's own contract.
+    let question = unsafe { std::slice::from_raw_parts(start, length) };
+    let question = String::from_utf8_lossy(question);
+    let reply = crate::reply(&question, &mut now);
+    let reply = serde_json::to_vec(&reply).unwrap_or_default();
+    let count = u32::try_from(reply.len()).unwrap_or_default();
+    let mut whole = Vec::with_capacity(HEAD + reply.len());
+    whole.extend(count.to_le_bytes());
+    whole.extend(reply);
+    handed_over(whole)
+}
+
+fn handed_over(bytes: Vec<u8>) -> *mut u8 {
+    Box::into_raw(bytes.into_boxed_slice()).cast()
+}
+
+#[cfg(target_arch = "wasm32")]
+fn now() -> Duration {
+    #[link(wasm_import_module = "elbowroom")]
+    unsafe extern "C" {
+        #[link_name = "now"]
+        safe fn milliseconds() -> f64;
+    }
+    Duration::try_from_secs_f64(milliseconds() / 1000.0).unwrap_or_default()
+}
+
+/// Without a host there is no clock.
+#[cfg(not(target_arch = "wasm32"))]
+fn now() -> Duration {
+    Duration::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HEAD, elbowroom_ask, elbowroom_release, elbowroom_reserve};
+
+    #[test]
+    fn a_reply_comes_with_its_length_and_can_be_given_back() {
+        let question = b"no question";
+        let room = elbowroom_reserve(question.len());
+        // SAFETY: the room is as long as the question, and both it and the reply are given back once.
+        let reply = unsafe {
+            room.copy_from_nonoverlapping(question.as_ptr(), question.len());
+            let reply = elbowroom_ask(room, question.len());
+            let mut head = [0; HEAD];
+            head.copy_from_slice(std::slice::from_raw_parts(reply, HEAD));
+            let length = u32::from_le_bytes(head) as usize;
+            let text = std::slice::from_raw_parts(reply.add(HEAD), length).to_vec();
+            elbowroom_release(room, question.len());
+            elbowroom_release(reply, HEAD + length);
+            text
+        };
+        let reply: serde_json::Value = serde_json::from_slice(&reply).unwrap();
+        assert_eq!(reply["exit"], 2);
+        let document = reply["document"].as_str().unwrap();
+        assert!(document.contains("the question cannot be read"), "{document}");
+    }
+}

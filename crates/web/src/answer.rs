@@ -1,0 +1,358 @@
+//! From questions to replies.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
+use elbowroom::answers::plan::{PlanFinding, PlanRequest, plan};
+use elbowroom::answers::run::{RunRequest, simulate};
+use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
+use elbowroom::envelope::BestSettings;
+use elbowroom::execute::{RunSpec, SpecError};
+use elbowroom::execution::executors::EXECUTORS;
+use elbowroom::execution::run::Verdict;
+use elbowroom::model::validate::Settings;
+use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Diagnostic};
+use elbowroom::plan::format;
+use elbowroom::plan::parametrize::VarySpec;
+use elbowroom::report::trace::TraceWriter;
+use elbowroom::{AnyPlan, PlanKind};
+use serde_json::json;
+
+use crate::question::{
+    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion, StnQuestion,
+    Text,
+};
+use crate::reply::{Failure, Reply, document};
+use crate::watch::Watch;
+
+/// What the exit codes say.
+const YES: u8 = 0;
+const NO: u8 = 1;
+const BAD_INPUT: u8 = 2;
+const LIMIT: u8 = 3;
+const INTERRUPTED: u8 = 130;
+
+type Clock<'a> = dyn FnMut() -> Duration + Send + 'a;
+
+pub(crate) fn answer(question: &Question, clock: &mut Clock<'_>) -> Result<Reply, Failure> {
+    let mut clock = || clock();
+    match question {
+        Question::Check(question) => checked(question),
+        Question::Plan(question) => planned(question, &mut clock),
+        Question::Stn(question) => relaxed(question),
+        Question::Envelope(question) => widened(question, &mut clock),
+        Question::Run(question) => ran(question, &mut clock),
+        Question::Page(question) => page(question),
+        Question::About => about(),
+    }
+}
+
+/// A problem, and what there was to remark on in its texts.
+struct Read {
+    task: Task,
+    warnings: Vec<Diagnostic>,
+}
+
+impl Read {
+    fn of(domain: &Text, problem: &Text, epsilon: Option<&str>) -> Result<Self, Failure> {
+        let epsilon = match epsilon {
+            Some(text) => positive("epsilon", text)?,
+            None => Task::default_epsilon(),
+        };
+        let (problem, warnings) = pddl::read_problem(&domain.source(), &problem.source())?;
+        let task = Task::new(problem).with_epsilon(epsilon);
+        Ok(Self { task, warnings })
+    }
+
+    /// A plan of either kind: told by its content, or by a name that ends in `.stn`.
+    fn plan(&mut self, text: &Text) -> Result<AnyPlan, Failure> {
+        let has_name_of_stn = text.name.to_ascii_lowercase().ends_with(".stn");
+        if has_name_of_stn || PlanKind::of_text(&text.text) == PlanKind::Stn {
+            return Ok(AnyPlan::Stn(format::read(&text.source(), &self.task)?));
+        }
+        let (plan, warnings) = pddl::read_plan(&text.source(), &self.task)?;
+        self.warnings.extend(warnings);
+        Ok(AnyPlan::TimeTriggered(plan))
+    }
+
+    fn plan_with_times(&mut self, text: &Text) -> Result<TimeTriggeredPlan, Failure> {
+        match self.plan(text)? {
+            AnyPlan::TimeTriggered(plan) => Ok(plan),
+            AnyPlan::Stn(_) => Err(Failure::new(format!(
+                "{} is an STN plan file, which stands for many plans; give a plan with fixed times",
+                text.name
+            ))),
+        }
+    }
+}
+
+fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
+    let mut read = Read::of(
+        &question.domain,
+        &question.problem,
+        question.epsilon.as_deref(),
+    )?;
+    let plan = match &question.plan {
+        Some(text) => Some(read.plan_with_times(text)?),
+        None => None,
+    };
+    let settings = match &question.tolerance {
+        Some(text) => Settings::like_val(number("tolerance", text)?),
+        None => Settings::default(),
+    };
+    let request = CheckRequest {
+        task: &read.task,
+        plan: plan.as_ref(),
+        name: question
+            .plan
+            .as_ref()
+            .map_or_else(String::new, |text| text.name.clone()),
+        settings,
+    };
+    let answer = check(&request).map_err(Failure::new)?;
+    let is_invalid = matches!(
+        answer,
+        CheckAnswer::Plan(PlanChecked {
+            finding: CheckFinding::Invalid { .. },
+            ..
+        })
+    );
+    Ok(Reply {
+        exit: if is_invalid { NO } else { YES },
+        document: document(&answer, &read.warnings)?,
+        ..Reply::default()
+    })
+}
+
+fn planned(question: &PlanQuestion, clock: &mut (dyn FnMut() -> Duration + Send)) -> Result<Reply, Failure> {
+    let read = Read::of(
+        &question.domain,
+        &question.problem,
+        question.epsilon.as_deref(),
+    )?;
+    let limit = limit(question.time_limit.as_deref())?;
+    let mut request = PlanRequest {
+        task: &read.task,
+        first_plan_only: question.first || limit.is_none(),
+        most_memory: None,
+    };
+    let outcome = plan(&mut request, &mut Watch::start(clock, limit)).map_err(Failure::new)?;
+    Ok(Reply {
+        exit: match &outcome.answer.finding {
+            PlanFinding::Plan { .. } => YES,
+            PlanFinding::NoPlan { .. } => NO,
+            PlanFinding::None { .. } => LIMIT,
+        },
+        document: document(&outcome.answer, &read.warnings)?,
+        ..Reply::default()
+    })
+}
+
+fn relaxed(question: &StnQuestion) -> Result<Reply, Failure> {
+    let mut read = Read::of(
+        &question.domain,
+        &question.problem,
+        question.epsilon.as_deref(),
+    )?;
+    let plan = read.plan(&question.plan)?;
+    let request = StnRequest {
+        task: &read.task,
+        plan,
+    };
+    let outcome = stn(&request).map_err(Failure::new)?;
+    let stn = match &outcome.plan {
+        Some(plan) => Some(format::write(&read.task, plan).map_err(Failure::new)?),
+        None => None,
+    };
+    Ok(Reply {
+        exit: match &outcome.answer.finding {
+            StnFinding::Network { .. } => YES,
+            StnFinding::Invalid { .. } => NO,
+        },
+        document: document(&outcome.answer, &read.warnings)?,
+        stn,
+        ..Reply::default()
+    })
+}
+
+fn widened(
+    question: &EnvelopeQuestion,
+    clock: &mut (dyn FnMut() -> Duration + Send),
+) -> Result<Reply, Failure> {
+    let limit = limit(question.time_limit.as_deref())?;
+    let mut watch = Watch::start(clock, limit);
+    let mut read = Read::of(
+        &question.domain,
+        &question.problem,
+        question.epsilon.as_deref(),
+    )?;
+    let controllable = question.controllable.iter();
+    let controllable = controllable.map(|action| format!("controllable {action}"));
+    let vary: Result<Vec<VarySpec>, _> = question
+        .vary
+        .iter()
+        .cloned()
+        .chain(controllable)
+        .map(|text| text.parse())
+        .collect();
+    let vary = vary.map_err(Failure::new)?;
+    let plan = read.plan(&question.plan)?;
+    let search = Search::default();
+    let precision = match &question.precision {
+        Some(text) => Some(positive("precision", text)?),
+        None => None,
+    };
+    let request = EnvelopeRequest {
+        name: question.plan.name.clone(),
+        vary,
+        guarantee: question.guarantee,
+        enforce: question.enforce,
+        contains: question.contains.clone(),
+        search: Search {
+            relative: match precision {
+                Some(_) => None,
+                None => search.relative,
+            },
+            precision: precision.unwrap_or(search.precision),
+            growth: question.growth,
+            sharpen: question.sharpen,
+            method: question.method,
+            most_checks: search.most_checks,
+            best: BestSettings {
+                objective: question.objective,
+                symmetric: question.symmetric,
+                ..search.best
+            },
+        },
+        ..EnvelopeRequest::new(&Arc::new(read.task), plan)
+    };
+    let outcome = envelope(&request, &mut watch).map_err(Failure::new)?;
+    Ok(Reply {
+        exit: match &outcome.answer.finding {
+            EnvelopeFinding::Envelope { .. } | EnvelopeFinding::Inside { .. } => YES,
+            EnvelopeFinding::Fails(_) | EnvelopeFinding::Outside { .. } => NO,
+            EnvelopeFinding::None { .. } => LIMIT,
+        },
+        document: document(&outcome.answer, &read.warnings)?,
+        ..Reply::default()
+    })
+}
+
+fn ran(
+    question: &RunQuestion,
+    clock: &mut (dyn FnMut() -> Duration + Send),
+) -> Result<Reply, Failure> {
+    let mut spec = RunSpec {
+        world: question.world.as_ref().map(|world| world.text.clone()),
+        likelihoods: question.likelihoods.as_ref().map(Text::named),
+        has_plan: question.plan.is_some(),
+        seed: question.seed,
+        guarantee: question.guarantee,
+        ..RunSpec::new(question.domain.named(), question.problem.named())
+    };
+    if let Some(executor) = &question.executor {
+        spec.executor = executor.parse().map_err(Failure::new)?;
+    }
+    if let Some(most) = question.max_replans {
+        spec.max_replans = most;
+    }
+    if let Some(epsilon) = &question.epsilon {
+        spec.epsilon = positive("epsilon", epsilon)?;
+    }
+    let mut read = Read::of(
+        &question.domain,
+        &question.problem,
+        question.epsilon.as_deref(),
+    )?;
+    let first = match &question.plan {
+        Some(text) => Some(read.plan_with_times(text)?),
+        None => None,
+    };
+    spec.check().map_err(contradiction)?;
+    let task = Arc::new(read.task);
+    let mut trace = String::new();
+    let mut sink = |line: &str| trace.push_str(line);
+    let mut writer = TraceWriter::new(Arc::clone(&task), &mut sink);
+    let written = writer.header(&spec);
+    written.map_err(|error| Failure::new(format!("cannot write the trace: {error}")))?;
+    let request = RunRequest::new(&spec, &task)
+        .beginning_with(first)
+        .recorded_by(&mut writer);
+    let outcome = simulate(request, &mut Watch::start(clock, None)).map_err(contradiction)?;
+    Ok(Reply {
+        exit: match outcome.verdict() {
+            Verdict::GoalReached => YES,
+            Verdict::Unsolvable | Verdict::NoPlan { .. } => NO,
+            Verdict::ReplanLimit | Verdict::TimeLimit => LIMIT,
+            Verdict::Interrupted => INTERRUPTED,
+            Verdict::WorldFailed { .. } => BAD_INPUT,
+        },
+        document: document(&outcome.answer, &read.warnings)?,
+        trace: Some(trace),
+        ..Reply::default()
+    })
+}
+
+/// What is wrong with a world or with likelihoods is said of their texts.
+fn contradiction(error: SpecError) -> Failure {
+    match error {
+        SpecError::World(wrong) | SpecError::Likelihoods(wrong) => wrong.into(),
+        error => Failure::new(error),
+    }
+}
+
+fn page(question: &PageQuestion) -> Result<Reply, Failure> {
+    let page = elbowroom_page::page(&question.of.name, &question.of.text).map_err(Failure::new)?;
+    Ok(Reply {
+        exit: YES,
+        page: Some(page),
+        ..Reply::default()
+    })
+}
+
+fn about() -> Result<Reply, Failure> {
+    let executors = EXECUTORS.iter().map(|executor| {
+        json!({ "usage": executor.usage(), "summary": executor.summary })
+    });
+    let about = json!({
+        "format": "elbowroom-about",
+        "version": 1,
+        "elbowroom": env!("CARGO_PKG_VERSION"),
+        "executors": executors.collect::<Vec<_>>(),
+    });
+    Ok(Reply {
+        exit: YES,
+        document: document(&about, &[])?,
+        ..Reply::default()
+    })
+}
+
+fn number(name: &str, text: &str) -> Result<Rational, Failure> {
+    let wrong = || Failure::new(format!("`{text}` is no number for {name}; write 0.5 or 1/2"));
+    let number: Rational = text.parse().map_err(|_| wrong())?;
+    if number.is_negative() {
+        return Err(Failure::new(format!("{name} is negative: {text}")));
+    }
+    Ok(number)
+}
+
+fn positive(name: &str, text: &str) -> Result<Rational, Failure> {
+    let number = number(name, text)?;
+    if number.is_zero() {
+        return Err(Failure::new(format!("{name} is zero; it has to be positive")));
+    }
+    Ok(number)
+}
+
+fn limit(seconds: Option<&str>) -> Result<Option<Duration>, Failure> {
+    let Some(text) = seconds else {
+        return Ok(None);
+    };
+    let seconds = positive("time-limit", text)?.to_f64();
+    let limit = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+    Ok(Some(limit))
+}

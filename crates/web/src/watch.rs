@@ -1,0 +1,45 @@
+//! Time limits, by the clock that the caller brings.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use elbowroom::answers::{Halt, Watcher};
+
+/// Ends the work at a time limit, if there is one.
+pub(crate) struct Watch<'a> {
+    clock: &'a mut (dyn FnMut() -> Duration + Send),
+    begun: Duration,
+    limit: Option<Duration>,
+}
+
+impl<'a> Watch<'a> {
+    /// Begins to watch now.
+    pub(crate) fn start(
+        clock: &'a mut (dyn FnMut() -> Duration + Send),
+        limit: Option<Duration>,
+    ) -> Self {
+        let begun = clock();
+        Self {
+            clock,
+            begun,
+            limit,
+        }
+    }
+}
+
+impl Watcher for Watch<'_> {
+    fn elapsed(&mut self) -> Duration {
+        (self.clock)().saturating_sub(self.begun)
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        let Some(limit) = self.limit else {
+            return ControlFlow::Continue(());
+        };
+        if self.elapsed() >= limit {
+            ControlFlow::Break(Halt::TimeLimit)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
