@@ -15,15 +15,15 @@ fn root() -> PathBuf {
 
 /// A file, by the name that the command is given.
 fn file(name: &str) -> Value {
-    let text = std::fs::read_to_string(root().join(name)).unwrap();
+    let text = std::fs::read_to_string(root().join(name)).expect("a file of the project");
     json!({ "name": name, "text": text })
 }
 
 /// The cases, and which of their files there are.
 fn cases() -> Vec<(String, Vec<&'static str>)> {
     let mut cases: Vec<(String, Vec<&'static str>)> = std::fs::read_dir(root().join("cases"))
-        .unwrap()
-        .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
+        .expect("the folder of cases")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .map(|name| {
             let folder = format!("cases/{name}");
             let there = ["plan.plan", "plan.stn", "late.plan"];
@@ -44,9 +44,12 @@ fn said(arguments: &[&str]) -> (String, i32) {
         .arg("--json")
         .current_dir(root())
         .output()
-        .unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    (text, output.status.code().unwrap())
+        .expect("the command runs");
+    let text = String::from_utf8(output.stdout).expect("the command prints UTF-8");
+    (
+        text,
+        output.status.code().expect("no signal ends the command"),
+    )
 }
 
 fn asked(question: &Value) -> Reply {
@@ -71,7 +74,11 @@ fn timeless(document: &str) -> String {
 fn assert_same(arguments: &[&str], question: &Value) -> Reply {
     let (printed, exit) = said(arguments);
     let reply = asked(question);
-    assert_eq!(timeless(&reply.document), timeless(&printed), "{arguments:?}");
+    assert_eq!(
+        timeless(&reply.document),
+        timeless(&printed),
+        "{arguments:?}"
+    );
     assert_eq!(i32::from(reply.exit), exit, "{arguments:?}");
     reply
 }
@@ -83,9 +90,8 @@ fn every_case_has_the_answers_of_the_command() {
             format!("{folder}/domain.pddl"),
             format!("{folder}/problem.pddl"),
         );
-        let question = |ask: &str| {
-            json!({ "ask": ask, "domain": file(&domain), "problem": file(&problem) })
-        };
+        let question =
+            |ask: &str| json!({ "ask": ask, "domain": file(&domain), "problem": file(&problem) });
         assert_same(&["check", &domain, &problem], &question("check"));
         assert_same(&["plan", &domain, &problem], &question("plan"));
         for plan in plans {
@@ -105,7 +111,12 @@ fn every_case_has_the_answers_of_the_command() {
             let mut boxed = with_plan("envelope");
             boxed["contains"] = "all=±40%".into();
             let arguments = [
-                "envelope", &domain, &problem, &plan, "--contains", "all=±40%",
+                "envelope",
+                &domain,
+                &problem,
+                &plan,
+                "--contains",
+                "all=±40%",
             ];
             assert_same(&arguments, &boxed);
         }
@@ -123,9 +134,18 @@ fn a_run_with_a_seed_is_the_same_run() {
             "world": file(&world), "seed": seed,
         });
         let seed = seed.to_string();
-        let trace = std::env::temp_dir().join(format!("elbowroom-web-{}.jsonl", std::process::id()));
+        let trace =
+            std::env::temp_dir().join(format!("elbowroom-web-{}.jsonl", std::process::id()));
         let arguments = [
-            "run", &domain, &problem, &plan, "--world", &world, "--seed", &seed, "--trace",
+            "run",
+            &domain,
+            &problem,
+            &plan,
+            "--world",
+            &world,
+            "--seed",
+            &seed,
+            "--trace",
             trace.to_str().unwrap(),
         ];
         let reply = assert_same(&arguments, &question);
@@ -134,7 +154,11 @@ fn a_run_with_a_seed_is_the_same_run() {
         let trace = reply.trace.expect("a run has a trace");
         assert_eq!(trace, written);
         let page = asked(&json!({ "ask": "page", "of": { "name": "run.jsonl", "text": trace } }));
-        assert!(page.page.expect("a trace has a page").contains("<!doctype html>"));
+        assert!(
+            page.page
+                .expect("a trace has a page")
+                .contains("<!doctype html>")
+        );
     }
 }
 
@@ -150,10 +174,12 @@ fn what_is_wrong_in_a_text_is_said_in_the_same_words() {
 #[test]
 fn questions_that_make_no_sense_are_replied_to() {
     let domain = json!({ "name": "d", "text": "(define (domain d))" });
-    let problem = json!({ "name": "p", "text": "(define (problem p) (:domain d) (:init) (:goal (and)))" });
+    let problem =
+        json!({ "name": "p", "text": "(define (problem p) (:domain d) (:init) (:goal (and)))" });
     let plan = json!({ "name": "plan", "text": "" });
     let with = |ask: &str, member: &str, value: Value| {
-        let mut question = json!({ "ask": ask, "domain": domain, "problem": problem, "plan": plan });
+        let mut question =
+            json!({ "ask": ask, "domain": domain, "problem": problem, "plan": plan });
         question[member] = value;
         question
     };

@@ -7,7 +7,7 @@
 //! - [`exact`]: exact numbers in JSON.
 //! - [`statistics`]: proportions with Wilson's intervals, means.
 //! - [`table`]: tables as Markdown, CSV, or text for a terminal.
-//! - `plot`: plots as SVG, with the feature `plots`.
+//! - [`plot`]: what plots show, and, with the feature `plots`, plots as SVG.
 //! - [`short`]: exact numbers as short decimals.
 //! - [`lattice`]: a picture of the orders of a plan, as SVG.
 //!
@@ -27,7 +27,6 @@
 pub mod exact;
 pub mod lattice;
 pub mod line;
-#[cfg(feature = "plots")]
 pub mod plot;
 pub mod short;
 pub mod statistics;

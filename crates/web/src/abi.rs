@@ -97,6 +97,9 @@ mod tests {
         let reply: serde_json::Value = serde_json::from_slice(&reply).unwrap();
         assert_eq!(reply["exit"], 2);
         let document = reply["document"].as_str().unwrap();
-        assert!(document.contains("the question cannot be read"), "{document}");
+        assert!(
+            document.contains("the question cannot be read"),
+            "{document}"
+        );
     }
 }

@@ -23,8 +23,8 @@ use elbowroom::{AnyPlan, PlanKind};
 use serde_json::json;
 
 use crate::question::{
-    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion, StnQuestion,
-    Text,
+    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion,
+    StnQuestion, Text,
 };
 use crate::reply::{Failure, Reply, document};
 use crate::watch::Watch;
@@ -72,7 +72,7 @@ impl Read {
     fn plan(&mut self, text: &Text) -> Result<AnyPlan, Failure> {
         let has_name_of_stn = text.name.to_ascii_lowercase().ends_with(".stn");
         if has_name_of_stn || PlanKind::of_text(&text.text) == PlanKind::Stn {
-            return Ok(AnyPlan::Stn(format::read(&text.source(), &self.task)?));
+            return Ok(AnyPlan::Stn(format::read(text.source(), &self.task)?));
         }
         let (plan, warnings) = pddl::read_plan(&text.source(), &self.task)?;
         self.warnings.extend(warnings);
@@ -128,7 +128,10 @@ fn checked(question: &CheckQuestion) -> Result<Reply, Failure> {
     })
 }
 
-fn planned(question: &PlanQuestion, clock: &mut (dyn FnMut() -> Duration + Send)) -> Result<Reply, Failure> {
+fn planned(
+    question: &PlanQuestion,
+    clock: &mut (dyn FnMut() -> Duration + Send),
+) -> Result<Reply, Failure> {
     let read = Read::of(
         &question.domain,
         &question.problem,
@@ -316,7 +319,11 @@ fn page(question: &PageQuestion) -> Result<Reply, Failure> {
 
 fn about() -> Result<Reply, Failure> {
     let executors = EXECUTORS.iter().map(|executor| {
-        json!({ "usage": executor.usage(), "summary": executor.summary })
+        json!({
+            "usage": executor.usage(),
+            "example": executor.example(),
+            "summary": executor.summary,
+        })
     });
     let about = json!({
         "format": "elbowroom-about",
@@ -332,7 +339,11 @@ fn about() -> Result<Reply, Failure> {
 }
 
 fn number(name: &str, text: &str) -> Result<Rational, Failure> {
-    let wrong = || Failure::new(format!("`{text}` is no number for {name}; write 0.5 or 1/2"));
+    let wrong = || {
+        Failure::new(format!(
+            "`{text}` is no number for {name}; write 0.5 or 1/2"
+        ))
+    };
     let number: Rational = text.parse().map_err(|_| wrong())?;
     if number.is_negative() {
         return Err(Failure::new(format!("{name} is negative: {text}")));
@@ -343,7 +354,9 @@ fn number(name: &str, text: &str) -> Result<Rational, Failure> {
 fn positive(name: &str, text: &str) -> Result<Rational, Failure> {
     let number = number(name, text)?;
     if number.is_zero() {
-        return Err(Failure::new(format!("{name} is zero; it has to be positive")));
+        return Err(Failure::new(format!(
+            "{name} is zero; it has to be positive"
+        )));
     }
     Ok(number)
 }

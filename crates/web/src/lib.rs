@@ -27,8 +27,8 @@ mod watch;
 use std::time::Duration;
 
 pub use question::{
-    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion, StnQuestion,
-    Text,
+    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion,
+    StnQuestion, Text,
 };
 pub use reply::Reply;
 

@@ -8,10 +8,7 @@ use serde::Deserialize;
 /// A question, told by its member `ask`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "ask", rename_all = "lowercase")]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "there is one at a time"
-)]
+#[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub enum Question {
     /// Is a plan valid? `elbowroom check`.
     Check(CheckQuestion),
