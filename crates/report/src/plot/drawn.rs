@@ -185,7 +185,7 @@ fn float(count: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{IntervalPlot, Point, Series};
+    use super::super::{IntervalPlot, Point, Series};
 
     #[test]
     fn every_value_is_a_dot_and_every_interval_a_line() {
