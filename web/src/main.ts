@@ -11,7 +11,8 @@ const by = <T extends HTMLElement>(id: string): T => {
   if (!found) throw new Error(`there is no #${id}`);
   return found as T;
 };
-const status = by("status"), findings = by("findings"), frame = by<HTMLIFrameElement>("page");
+const status = by("status"), findings = by("findings");
+let frame = by<HTMLIFrameElement>("page");
 const stop = by<HTMLButtonElement>("stop"), save = by<HTMLButtonElement>("save");
 const example = by<HTMLSelectElement>("example");
 const choices = { guarantee: by<HTMLSelectElement>("guarantee"), executor: by<HTMLSelectElement>("executor"), seed: by<HTMLInputElement>("seed") };
@@ -110,9 +111,13 @@ function mark(answer: Answer): void {
 
 function showPage(page: string | undefined): void {
   made = page ?? "";
-  frame.hidden = save.hidden = !page;
-  if (page) frame.srcdoc = page;
-  else frame.removeAttribute("srcdoc");
+  // Each page has a frame of its own: a frame that went on to another page would be a step in the history.
+  const next = frame.cloneNode() as HTMLIFrameElement;
+  next.hidden = save.hidden = !page;
+  if (page) next.srcdoc = page;
+  else next.removeAttribute("srcdoc");
+  frame.replaceWith(next);
+  frame = next;
 }
 
 /** Asks, unless another question has been asked since. */

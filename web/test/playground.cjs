@@ -89,8 +89,10 @@ test("a run with a seed is the run of the command, and its page goes through tim
     const { executed } = JSON.parse(done.stdout);
     const table = frame.locator("section", { has: frame.locator("h2", { hasText: "Planned and done" }) });
     const cells = await cellsOf(table.locator("tbody tr"));
-    assert.deepEqual(cells.map((row) => row[0]), executed.map((it) => it.action));
-    for (const [index, it] of executed.entries()) assert.ok(Math.abs(Number(cells[index][2]) - it.start.decimal) < 0.001);
+    // The table also has the steps that were never started, without a time.
+    const started = cells.filter((row) => /^\d/.test(row[2]));
+    assert.deepEqual(started.map((row) => row[0]), executed.map((it) => it.action));
+    for (const [index, it] of executed.entries()) assert.ok(Math.abs(Number(started[index][2]) - it.start.decimal) < 0.001);
     const slider = frame.locator("#time");
     await slider.press("Home");
     const before = await slider.inputValue();
