@@ -4,6 +4,8 @@
 //! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
 //! (`--nocapture`).
 
+#![allow(clippy::print_stdout, reason = "the table is worth seeing")]
+
 #[path = "timed/twin.rs"]
 mod twin;
 

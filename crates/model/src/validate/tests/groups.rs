@@ -141,9 +141,13 @@ fn drafts() -> impl Strategy<Value = Draft> {
 
 fn drafted((timed, _, goal): &Draft) -> World {
     const FACTS: [&str; 3] = ["(p)", "(q)", "(r)"];
-    let literal = |fact: u8, truth: bool| match truth {
-        true => FACTS[usize::from(fact)].to_owned(),
-        false => format!("(not {})", FACTS[usize::from(fact)]),
+    let literal = |fact: u8, truth: bool| {
+        let fact = FACTS[usize::from(fact)];
+        if truth {
+            fact.to_owned()
+        } else {
+            format!("(not {fact})")
+        }
     };
     let mut world = World::new("(p)").instant("nothing", "", "");
     let mut seen = std::collections::BTreeSet::new();
