@@ -108,6 +108,8 @@ pub(crate) enum Command {
     Odds(Box<OddsArgs>),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
+    /// Check, without any search, that an answer's box is the largest
+    Verify(VerifyArgs),
     /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
     Val(ValArgs),
     /// Write an answer, a run or an experiment as a page to look at in a browser
@@ -132,6 +134,7 @@ impl Command {
             Self::Learn(arguments) => arguments.json,
             Self::Odds(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
+            Self::Verify(arguments) => arguments.json,
             Self::Val(_) | Self::Report(_) | Self::Completions(_) | Self::Man(_) => false,
         }
     }
@@ -172,6 +175,19 @@ pub(crate) struct ReportArgs {
     /// Write the run as an MCAP file, for Foxglove and others, there; without `--output`, no page
     #[arg(long, value_name = "FILE.mcap")]
     pub(crate) mcap: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+What is checked, and what is not: docs/largest-box.md; what a certificate is:
+docs/formats/certificate.md.")]
+pub(crate) struct VerifyArgs {
+    /// What `elbowroom envelope --method best --json` has printed
+    #[arg(value_name = "ANSWER.json")]
+    pub(crate) answer: PathBuf,
+    /// Print the verdict as one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Args, Debug)]

@@ -13,3 +13,4 @@ pub(crate) mod shell;
 pub(crate) mod stn;
 pub(crate) mod val;
 pub(crate) mod world_check;
+pub(crate) mod verify;

@@ -1,17 +1,23 @@
 //! The tolerance table: one row for each parameter.
 //!
 //! ```text
-//!                                 nominal   lower   upper       slack
+//!                                 nominal   lower   upper       slack     +-100%
 //!  d0  (drive rover depot shelf)       10   0.001  19.996   -99%  +99%  |----o----|
+//! !d1  (unlock office)                  6       6       9     0%  +50%       o-|
 //! ```
+//!
+//! All bars have one scale, that of their heading: deviations in relation to the nominal value, which
+//! stands in the middle. An arrow goes on beyond it. What has little room is marked (`!`).
 //!
 //! What is shown never promises more than what is known: lower ends are rounded up, upper ends
 //! down, and slack towards zero.
 
+use std::fmt::Write as _;
+
 use elbowroom::num::{End, Interval, Rational};
 use unicode_width::UnicodeWidthStr;
 
-use crate::look::{FAINT, Look, STRONG, styled};
+use crate::look::{FAINT, Look, STRONG, WARNING, styled};
 use crate::number::{self, Rounding};
 
 /// A row of the table.
@@ -39,8 +45,24 @@ impl Row {
         // Without any end there is more room than anywhere.
         room.map_or_else(|| Rational::from(i64::MAX), share)
     }
+
+    /// Whether it may hardly deviate in one direction.
+    pub(crate) fn is_critical(&self) -> bool {
+        let room = self.room();
+        room.is_zero() || (!self.nominal.is_zero() && room < Rational::new(CRITICAL, 100))
+    }
+
+    /// How far an end lies from the nominal value, as a share of it; `None` without limit.
+    fn deviation(&self, end: &End) -> Option<Rational> {
+        let distance = (end.value()? - &self.nominal).abs();
+        distance.checked_div(&self.nominal.abs())
+    }
 }
 
+/// With less room than so many percent of its nominal value, a quantity is critical.
+pub(crate) const CRITICAL: i64 = 10;
+/// Deviations that the ends of a bar can stand for, in percent.
+const SCALES: [i64; 7] = [1, 2, 5, 10, 20, 50, 100];
 /// Columns of the bar: the first of these that fits.
 const BARS: [usize; 3] = [11, 9, 7];
 /// Names up to this width have a column of their own even where the numbers stand below.
@@ -78,11 +100,17 @@ pub(crate) fn render(rows: &[Row], look: Look) -> String {
         },
     };
     let mut table = String::new();
+    let scale = scale(rows);
     let heading = numbers.heading(look.width.saturating_sub(layout.text + GAP));
-    let heading = format!("{:1$}{heading}", "", layout.text + GAP);
+    let mut heading = format!("{:1$}{heading}", "", layout.text + GAP);
+    if layout.bar > 0 {
+        let sign = if look.unicode { "±" } else { "+-" };
+        let span = format!("{sign}{scale}%");
+        let _ = write!(heading, "  {span:^width$}", width = layout.bar);
+    }
     push_line(&mut table, &styled(FAINT, heading.trim_end()));
     for (row, cells) in rows.iter().zip(&cells) {
-        layout.push_row(&mut table, row, cells, &numbers, look);
+        layout.push_row(&mut table, row, cells, (&numbers, scale), look);
     }
     table
 }
@@ -105,22 +133,26 @@ impl Layout {
         table: &mut String,
         row: &Row,
         cells: &Cells,
-        numbers: &Numbers,
+        (numbers, scale): (&Numbers, i64),
         look: Look,
     ) {
-        let name = styled(STRONG, &pad_right(&row.name, self.names));
-        let bar = bar(&row.nominal, &row.interval, self.bar, look.unicode);
+        let is_critical = row.is_critical();
+        let style = if is_critical { WARNING } else { STRONG };
+        let mark = if is_critical { '!' } else { ' ' };
+        let name = pad_right(&format!("{mark}{}", row.name), self.names + 1);
+        let name = styled(style, &name);
+        let bar = bar(row, scale, self.bar, look.unicode);
         let figures = numbers.line(cells);
         if self.stacked {
             let name_width = UnicodeWidthStr::width(&*row.name).max(self.names);
             let room = look.width.saturating_sub(1 + name_width + GAP);
             let quantity = shorten(&row.quantity, room.max(12), look.unicode);
-            push_line(table, &format!(" {name}  {quantity}"));
+            push_line(table, &format!("{name}  {quantity}"));
             let indent = self.text + GAP;
             push_line(table, &format!("{:indent$}{figures}  {bar}", ""));
         } else {
             let quantity = pad_right(&row.quantity, self.text - 1 - self.names - GAP);
-            push_line(table, &format!(" {name}  {quantity}  {figures}  {bar}"));
+            push_line(table, &format!("{name}  {quantity}  {figures}  {bar}"));
         }
     }
 }
@@ -262,9 +294,22 @@ impl Numbers {
     }
 }
 
-/// Where the nominal value sits in its interval: `|--o-----|`, `|--o----->` where it has no end.
-fn bar(nominal: &Rational, interval: &Interval, width: usize, unicode: bool) -> String {
-    if width == 0 {
+/// How many percent of the nominal values the ends of the bars stand for: as few as can be with all
+/// ends in the picture, and at most 100.
+fn scale(rows: &[Row]) -> i64 {
+    let ends = rows.iter().flat_map(|row| {
+        let ends = [&row.interval.lower, &row.interval.upper];
+        ends.into_iter().filter_map(|end| row.deviation(end))
+    });
+    let greatest = ends.max().unwrap_or(Rational::ONE);
+    let fits = |percent: &i64| greatest <= Rational::new(*percent, 100);
+    SCALES.into_iter().find(fits).unwrap_or(100)
+}
+
+/// The interval around the nominal value, which stands in the middle: `|--o---|`, `|--o---->` where
+/// it goes on beyond the scale. Empty where the nominal value is 0, of which there are no shares.
+fn bar(row: &Row, scale: i64, width: usize, unicode: bool) -> String {
+    if width == 0 || row.nominal.is_zero() {
         return String::new();
     }
     let [left, right, endless_left, endless_right, line, dot] = if unicode {
@@ -272,53 +317,36 @@ fn bar(nominal: &Rational, interval: &Interval, width: usize, unicode: bool) -> 
     } else {
         ['|', '|', '<', '>', '-', 'o']
     };
-    let last = width - 1;
-    let below = interval.lower.value().map(|lower| nominal - lower);
-    let above = interval.upper.value().map(|upper| upper - nominal);
-    let position = match (&below, &above) {
-        (Some(below), Some(above)) => {
-            let Some(share) = below.checked_div(&(below + above)) else {
-                // A single value: a dot without a line.
-                return format!("{:1$}{dot}", "", last / 2);
-            };
-            place(&share, last)
+    let middle = width / 2;
+    let side = |end: &End, limit: char, endless: char| -> Vec<char> {
+        let columns = row.deviation(end).and_then(|share| columns(&share, scale, middle));
+        let mut side = vec![line; columns.unwrap_or(middle)];
+        if let Some(last) = side.last_mut() {
+            *last = if columns.is_none() { endless } else { limit };
         }
-        (Some(below), None) if below.is_zero() => 0,
-        (None, Some(above)) if above.is_zero() => last,
-        (Some(_), None) => last / 3,
-        (None, Some(_)) => last - last / 3,
-        (None, None) => last / 2,
+        side
     };
-    let mut text = String::new();
-    for column in 0..width {
-        text.push(match column {
-            _ if column == position => dot,
-            0 if below.is_none() => endless_left,
-            0 => left,
-            _ if column == last && above.is_none() => endless_right,
-            _ if column == last => right,
-            _ => line,
-        });
-    }
-    text
+    let below = side(&row.interval.lower, left, endless_left);
+    let above = side(&row.interval.upper, right, endless_right);
+    let blank = " ".repeat(middle - below.len());
+    let below: String = below.into_iter().rev().collect();
+    let above: String = above.into_iter().collect();
+    format!("{blank}{below}{dot}{above}")
 }
 
-/// The column for a share between 0 and 1; the first and the last mean exactly 0 and 1.
-fn place(share: &Rational, last: usize) -> usize {
-    if share.is_zero() {
-        return 0;
-    }
-    if *share == Rational::ONE {
-        return last;
-    }
+/// The number of columns that a share of the nominal value takes, the nearest one; `None` if it is
+/// more than the scale has.
+fn columns(share: &Rational, scale: i64, middle: usize) -> Option<usize> {
     // Few columns, so a linear search says it best.
-    let steps = i64::try_from(last).expect("a narrow bar");
-    (1..last)
-        .find(|&column| {
-            let column = i64::try_from(column).expect("a narrow bar");
-            *share <= Rational::new(2 * column + 1, 2 * steps)
-        })
-        .unwrap_or(last - 1)
+    let steps = i64::try_from(middle).expect("a narrow bar");
+    let part = (share * &Rational::from(100)).checked_div(&Rational::from(scale))?;
+    if part > Rational::ONE {
+        return None;
+    }
+    (0..=middle).find(|&column| {
+        let column = i64::try_from(column).expect("a narrow bar");
+        part < Rational::new(2 * column + 1, 2 * steps)
+    })
 }
 
 fn widest<'a>(texts: impl Iterator<Item = &'a str>) -> usize {

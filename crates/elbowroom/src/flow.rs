@@ -12,14 +12,14 @@ use elbowroom_plan::parametrize::{ParametrizeError, VarySpec, parametrize, vary}
 use elbowroom_plan::{NodeId, ParametrizedPlan};
 use elbowroom_stn::ConsistentNetwork;
 
-use crate::answers::envelope::envelope;
+use crate::answers::envelope::{Search, envelope};
 use crate::answers::{EnvelopeOutcome, EnvelopeRequest, RequestError, Unwatched};
 use crate::room;
 
 /// The quantities to vary, and the parameters of the search.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// What to leave open; all durations if empty.
+    /// What to leave open; all durations that the domain fixes if empty.
     pub vary: Vec<VarySpec>,
     /// What to guarantee inside the envelope.
     pub guarantee: Guarantee,
@@ -28,12 +28,13 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// All durations, the dynamic guarantee, precision 1.
+    /// All durations that the domain fixes, the dynamic guarantee, precision a hundredth of each
+    /// nominal value.
     fn default() -> Self {
         Self {
             vary: Vec::new(),
             guarantee: Guarantee::default(),
-            search: elbowroom_envelope::Settings::default(),
+            search: Search::default().settings(),
         }
     }
 }

@@ -181,6 +181,7 @@ pub use elbowroom_report as report;
 pub use elbowroom_sim as sim;
 pub use elbowroom_stn as stn;
 pub use elbowroom_text as text;
+pub use elbowroom_verify as verify;
 pub use execute::execute;
 pub use explain::{Explainer, Explanation, Shortfall};
 pub use makespan::earliest_end;

@@ -18,6 +18,8 @@ use toml::{Table, Value};
 const LAYERS: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("num", &[]),
+    // The checker of certificates knows neither search nor what has searched.
+    ("verify", &["num"]),
     ("model", &["num"]),
     ("stn", &["num"]),
     ("network", &["text", "num", "stn"]),
@@ -49,6 +51,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "sim",
             "report",
             "learning",
+            "verify",
         ],
     ),
     (

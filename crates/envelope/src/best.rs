@@ -109,6 +109,22 @@ pub struct BestProof {
     pub cuts: Vec<Cut>,
     /// How the best value follows.
     pub reasons: Reasons,
+    /// What can be moved, and how far it is in the best box; none without a box.
+    pub variables: Vec<Moved>,
+}
+
+/// What moves one end, or both ends of an interval if boxes are symmetric.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Moved {
+    /// The ends.
+    pub ends: Vec<BoxEnd>,
+    /// The size by which its slack is measured.
+    pub scale: Rational,
+    /// How far from the nominal value it can move the ends at most.
+    pub most: Rational,
+    /// How far it moves them in the best box. An end that reaches as far as counts, and that nothing
+    /// stops, is infinite in the box of the answer.
+    pub value: Rational,
 }
 
 /// How the best value follows from the cuts.
@@ -224,6 +240,21 @@ impl Variables {
         variables
     }
 
+    /// What moves in a box.
+    fn moved(&self, nominal: &DecoupledEnvelope, envelope: &DecoupledEnvelope) -> Vec<Moved> {
+        let all = self.ends.iter().zip(&self.scales).zip(&self.most);
+        all.map(|((ends, scale), most)| {
+            let far = ends[0].reach(envelope).zip(ends[0].reach(nominal));
+            Moved {
+                ends: ends.clone(),
+                scale: scale.clone(),
+                most: most.clone(),
+                value: far.map_or_else(|| most.clone(), |(far, near)| far - near),
+            }
+        })
+        .collect()
+    }
+
     pub(crate) fn count(&self) -> usize {
         self.ends.len()
     }
@@ -298,6 +329,7 @@ pub fn best(
         Objective::Widths => widths::widths(oracle, &plan, &variables, start, on_step)?,
     };
     if let Ok(envelope) = &mut run.envelope {
+        run.proof.variables = variables.moved(&nominal, envelope);
         *envelope = let_go(oracle, &plan, envelope, &variables)?;
     }
     run.checks = oracle.checks() - already;

@@ -79,7 +79,8 @@ pub mod soundness;
 
 pub use balance::{Balance, Share, balance};
 pub use best::{
-    BestProof, BestRun, BestSettings, BestStep, Case, Objective, Reasons, Source, Stopped, best,
+    BestProof, BestRun, BestSettings, BestStep, Case, Moved, Objective, Reasons, Source, Stopped,
+    best,
 };
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofWay};

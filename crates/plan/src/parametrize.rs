@@ -4,7 +4,7 @@
 //!
 //! | specification | leaves open |
 //! | --- | --- |
-//! | `durations` | the duration of every durative instance; what happens if nothing is specified |
+//! | `durations` | the duration of every durative instance |
 //! | `ACTIONS`, `duration ACTIONS` | the durations of these instances |
 //! | `constant ACTIONS FUNCTION [VALUE] [shared]` | a number in their effects on the function |
 //! | `condition ACTIONS FUNCTION [VALUE] [shared]` | a number that their conditions compare it with |
@@ -12,6 +12,9 @@
 //! | `deadline (PREDICATE object …)` | when timed initials make the fact false |
 //! | `timed (NAME object …)` | when timed initials change the fact or fluent in any way |
 //! | `?s=VALUE`, `n0.?r=VALUE` | a `:synth-parameters` number, nominally `VALUE` |
+//!
+//! If nothing is specified, those durations are left open that the domain fixes: where it leaves an
+//! interval, the executor chooses.
 //!
 //! `ACTIONS` is the name of an action (all its instances), a label (that instance), or
 //! `(NAME object …)`: every instance with these arguments, where `_` stands for any object. A
@@ -50,7 +53,9 @@ use opening::Opening;
 
 /// Leaves quantities of a plan open.
 ///
-/// Numbers that the domain itself leaves open become parameters in any case. `nominal` is a
+/// Without specifications, these are all durations but those that the domain leaves to the executor
+/// ([`ParametrizedPlan::told`]). Numbers that the domain itself leaves open become parameters in any
+/// case. `nominal` is a
 /// schedule of the plan; it says how long things take nominally.
 ///
 /// # Errors
@@ -70,14 +75,13 @@ pub fn parametrize(
         )
     };
     if specs.iter().any(names_a_quantity) {
-        vary(task, plan, nominal, specs)
-    } else {
-        let all: Vec<_> = [durations]
-            .into_iter()
-            .chain(specs.iter().cloned())
-            .collect();
-        vary(task, plan, nominal, &all)
+        return vary(task, plan, nominal, specs);
     }
+    let all = [durations].into_iter().chain(specs.iter().cloned());
+    let mut opening = Opening::new(task, plan, nominal)?;
+    opening.leave_to_executor();
+    opening.apply_all(&all.collect::<Vec<_>>())?;
+    opening.finish()
 }
 
 /// Leaves more quantities open, of a plan that may have parameters already.
@@ -91,13 +95,7 @@ pub fn vary(
     specs: &[VarySpec],
 ) -> Result<ParametrizedPlan, ParametrizeError> {
     let mut opening = Opening::new(task, plan, nominal)?;
-    // What the executor chooses is not opened, wherever in the list that stands.
-    let (controllable, open): (Vec<_>, Vec<_>) = specs
-        .iter()
-        .partition(|spec| matches!(spec.target, Target::Controllable(_)));
-    for spec in controllable.into_iter().chain(open) {
-        opening.apply(spec)?;
-    }
+    opening.apply_all(specs)?;
     opening.finish()
 }
 

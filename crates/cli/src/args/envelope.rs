@@ -22,8 +22,9 @@ pub(crate) struct EnvelopeArgs {
     /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
     #[arg(value_name = "PLAN|FILE.stn")]
     pub(crate) plan: PathBuf,
-    /// A quantity that may deviate; may be repeated. By default all durations, or the parameters of
-    /// the STN plan file or of the domain (`:synth-parameters`)
+    /// A quantity that may deviate; may be repeated. By default all durations that the domain fixes
+    /// (what it leaves open is the executor's choice), or the parameters of the STN plan file or of
+    /// the domain (`:synth-parameters`)
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
     /// The algorithm; `best` if --objective, --symmetric or --cap is given, otherwise `irr`
@@ -114,7 +115,8 @@ impl EnvelopeArgs {
 
 const VARY_HELP: &str = "\
 What --vary can name:
-  durations                           all durations (the default)
+  durations                           all durations, those that the executor
+                                      chooses included
   duration ACTIONS                    the durations of these
   constant ACTIONS FUNCTION [VALUE]   a number in their effects on the function
   condition ACTIONS FUNCTION [VALUE]  a number in their conditions on it

@@ -75,7 +75,8 @@ pub(crate) struct RunArgs {
         conflicts_with = "world_process"
     )]
     pub(crate) seed: u64,
-    /// A quantity that may deviate, see `elbowroom help envelope`; by default all durations
+    /// A quantity that may deviate, see `elbowroom help envelope`; by default all durations that
+    /// the domain fixes
     #[arg(long, value_name = "SPEC")]
     pub(crate) vary: Vec<String>,
     /// An action whose duration the executor chooses, see `elbowroom help envelope`
@@ -84,9 +85,10 @@ pub(crate) struct RunArgs {
     /// The guarantee that holds inside the envelopes
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
     pub(crate) guarantee: Guarantee,
-    /// Step size at which the search for an envelope ends
-    #[arg(long, value_name = "B", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
-    pub(crate) precision: Rational,
+    /// Step size at which the search for an envelope ends, in the unit of the plan; by default a
+    /// hundredth of each nominal value
+    #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
+    pub(crate) precision: Option<Rational>,
     /// What happens to running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,

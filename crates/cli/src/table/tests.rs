@@ -1,4 +1,4 @@
-use elbowroom::num::{End, Interval, Rational};
+use elbowroom::num::{End, Interval};
 use insta::assert_snapshot;
 use unicode_width::UnicodeWidthStr;
 
@@ -90,15 +90,40 @@ fn the_table_of_no_parameters_is_empty() {
 }
 
 #[test]
-fn the_dot_touches_an_end_of_the_bar_only_when_the_value_does() {
-    let at = |nominal: &str| {
-        let row = row("x", "", nominal, "0", "1000");
-        super::bar(&row.nominal, &row.interval, 11, false)
+fn all_bars_have_one_scale_with_the_nominal_value_in_the_middle() {
+    let bar = |lower: &str, upper: &str, scale: i64| {
+        super::bar(&row("x", "", "1000", lower, upper), scale, 11, false)
     };
-    assert_eq!(at("0"), "o---------|");
-    assert_eq!(at("1"), "|o--------|");
-    assert_eq!(at("500"), "|----o----|");
-    assert_eq!(at("999"), "|--------o|");
-    assert_eq!(at("1000"), "|---------o");
-    let _ = Rational::ONE;
+    assert_eq!(bar("0", "2000", 100), "|----o----|");
+    assert_eq!(bar("500", "1200", 100), "  |--o|");
+    assert_eq!(bar("1000", "1000", 100), "     o");
+    assert_eq!(bar("1000", "2001", 100), "     o---->");
+    assert_eq!(bar("inf", "inf", 100), "<----o---->");
+    assert_eq!(bar("950", "1100", 10), "  |--o----|");
+    // Less than half a column is not drawn.
+    assert_eq!(bar("901", "1099", 100), "     o");
+    assert_eq!(bar("900", "1100", 100), "    |o|");
+}
+
+#[test]
+fn the_scale_is_the_least_that_has_room_for_all_ends() {
+    let scale = |upper: &str| super::scale(&[row("x", "", "1000", "1000", upper)]);
+    assert_eq!(scale("1000"), 1);
+    assert_eq!(scale("1010"), 1);
+    assert_eq!(scale("1011"), 2);
+    assert_eq!(scale("1500"), 50);
+    assert_eq!(scale("9000"), 100);
+    assert_eq!(scale("inf"), 1);
+}
+
+#[test]
+fn what_may_hardly_deviate_in_one_direction_is_critical() {
+    let is_critical = |nominal: &str, lower: &str, upper: &str| {
+        row("x", "", nominal, lower, upper).is_critical()
+    };
+    assert!(is_critical("10", "0", "10.9"));
+    assert!(!is_critical("10", "9", "11"));
+    assert!(is_critical("10", "9.1", "inf"));
+    assert!(is_critical("0", "0", "5"));
+    assert!(!is_critical("0", "inf", "inf"));
 }

@@ -3,6 +3,7 @@
 mod answer;
 mod balance;
 mod best;
+mod certificate;
 mod conditions;
 mod foresight;
 mod inequalities;
@@ -25,7 +26,7 @@ use crate::flow::{self, FlowError};
 use crate::{AnyPlan, parse_box};
 
 pub use answer::{
-    Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
+    Chosen, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
     Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
 pub use balance::{Balance, Deviation};
@@ -44,7 +45,8 @@ pub struct EnvelopeRequest {
     pub plan: AnyPlan,
     /// What the plan is called in the answer, such as its file.
     pub name: String,
-    /// What to leave open; all durations if empty. An STN plan may leave something open itself.
+    /// What to leave open; all durations that the domain fixes if empty. An STN plan may leave
+    /// something open itself.
     pub vary: Vec<VarySpec>,
     /// What to guarantee inside the envelope.
     pub guarantee: Guarantee,
@@ -95,7 +97,7 @@ impl Default for Search {
 
 impl Search {
     /// The settings of the search for a box.
-    fn settings(&self) -> elbowroom_envelope::Settings {
+    pub(crate) fn settings(&self) -> elbowroom_envelope::Settings {
         elbowroom_envelope::Settings {
             precision: self.precision.clone(),
             relative: self.relative.clone(),
@@ -120,7 +122,7 @@ pub struct EnvelopeOutcome {
 }
 
 impl EnvelopeRequest {
-    /// The envelope of a plan, all durations open, with the default search.
+    /// The envelope of a plan, all durations open that the domain fixes, with the default search.
     pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
         Self {
             task: Arc::clone(task),

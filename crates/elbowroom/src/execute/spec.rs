@@ -73,14 +73,16 @@ pub struct RunSpec {
     pub planner_states: u64,
     /// How many of them for a better plan than the first.
     pub improve_states: u64,
-    /// What to leave open; all durations if empty.
+    /// What to leave open; all durations that the domain fixes if empty.
     #[serde(with = "listed")]
     pub vary: Vec<VarySpec>,
     /// What is guaranteed inside envelopes.
     pub guarantee: Guarantee,
-    /// How close to its limit each end of an envelope should come.
-    #[serde(with = "positive")]
-    pub precision: Rational,
+    /// How close to its limit each end of an envelope should come; left out where that is a hundredth
+    /// of each nominal value.
+    #[serde(default, with = "positive::option")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub precision: Option<Rational>,
     /// What becomes of running actions when a new plan is made.
     #[serde(with = "as_text")]
     pub running: RunningRule,
@@ -158,7 +160,7 @@ impl RunSpec {
             improve_states: planner.improve_states,
             vary: flow.vary,
             guarantee: flow.guarantee,
-            precision: flow.search.precision,
+            precision: None,
             running: settings.running,
             planning_time: PlanningTime::Seconds(Rational::ZERO),
             realtime: None,
@@ -186,7 +188,10 @@ impl RunSpec {
             guarantee: self.guarantee,
             ..flow::Settings::default()
         };
-        flow.search.precision = self.precision.clone();
+        if let Some(precision) = &self.precision {
+            flow.search.precision = precision.clone();
+            flow.search.relative = None;
+        }
         flow
     }
 

@@ -91,6 +91,7 @@ pub(super) fn fill(
         proof: BestProof {
             reasons: Reasons::Levels(levels.collect()),
             cuts: fill.cuts,
+            variables: Vec::new(),
         },
     })
 }

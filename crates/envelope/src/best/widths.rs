@@ -135,6 +135,7 @@ pub(super) fn widths(
         proof: BestProof {
             cuts: search.cuts,
             reasons: Reasons::Tree(search.tree),
+            variables: Vec::new(),
         },
     })
 }

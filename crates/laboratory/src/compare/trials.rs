@@ -319,6 +319,7 @@ impl Setting<'_> {
             ..flow::Settings::default()
         };
         flow.search.precision = self.experiment.precision.clone();
+        flow.search.relative = None;
         flow
     }
 

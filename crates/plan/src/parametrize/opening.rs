@@ -56,7 +56,25 @@ impl<'a> Opening<'a> {
         })
     }
 
-    pub(super) fn apply(&mut self, spec: &VarySpec) -> Result<(), ParametrizeError> {
+    /// Leaves to the executor what the domain does: no duration that it does not fix is opened.
+    pub(super) fn leave_to_executor(&mut self) {
+        let told = self.told();
+        self.controllable.extend(told.into_keys());
+    }
+
+    /// Applies all specifications.
+    pub(super) fn apply_all(&mut self, specs: &[VarySpec]) -> Result<(), ParametrizeError> {
+        // What the executor chooses is not opened, wherever in the list that stands.
+        let (controllable, open): (Vec<_>, Vec<_>) = specs
+            .iter()
+            .partition(|spec| matches!(spec.target, Target::Controllable(_)));
+        for spec in controllable.into_iter().chain(open) {
+            self.apply(spec)?;
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self, spec: &VarySpec) -> Result<(), ParametrizeError> {
         match &spec.target {
             Target::Durations => {
                 let plan = &self.plan.plan;

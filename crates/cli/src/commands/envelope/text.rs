@@ -5,7 +5,7 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    Balance, Best, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
+    Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
     Failing, Foresight, Makespans, QuantityKind, Range, Room, Stop,
 };
 
@@ -111,6 +111,7 @@ fn envelope(
         makespans,
         timeline: _,
         inequalities: _,
+        chosen,
         stop,
         checks,
         widenings,
@@ -131,6 +132,9 @@ fn envelope(
     let mut text = format!("{}\n\n", styled(STRONG, &title));
     if rows.is_empty() {
         text.push_str(" Nothing in this plan is left open. It works as it is.\n");
+        if let Some(chosen) = executor_chooses(chosen) {
+            push_paragraph(&mut text, &chosen, look.width);
+        }
         return text;
     }
     if let Some(balance) = balance {
@@ -139,7 +143,10 @@ fn envelope(
     }
     text.push_str(&table::render(&rows, look));
     text.push('\n');
-    push_paragraph(&mut text, meaning(&rows), look.width);
+    push_paragraph(&mut text, &meaning(&rows), look.width);
+    if let Some(chosen) = executor_chooses(chosen) {
+        push_paragraph(&mut text, &chosen, look.width);
+    }
     text.push('\n');
     let limits = limits::render(&outcome.answer.limits(), look);
     if !limits.is_empty() {
@@ -276,13 +283,41 @@ fn quantity(range: &Range) -> &str {
     }
 }
 
-fn meaning(rows: &[Row]) -> &'static str {
-    if rows.len() == 1 {
+fn meaning(rows: &[Row]) -> String {
+    let mut meaning = if rows.len() == 1 {
         "The plan works for any value in the interval."
     } else {
         "The plan works as long as each of these stays inside its interval, whatever the others do \
          in theirs."
     }
+    .to_owned();
+    let critical = rows.iter().filter(|row| row.is_critical()).count();
+    if critical > 0 {
+        let _ = write!(
+            meaning,
+            " Critical (!), with less room than {} %: {critical} of {}.",
+            table::CRITICAL,
+            rows.len()
+        );
+    }
+    meaning
+}
+
+/// Which durations do not vary because the executor chooses them.
+fn executor_chooses(chosen: &[Chosen]) -> Option<String> {
+    /// Of a long list only the first are named.
+    const MOST_NAMED: usize = 4;
+    let mut named: Vec<String> = chosen
+        .iter()
+        .take(MOST_NAMED)
+        .map(|one| format!("{} {}", one.action, number::nearest(&one.duration.0)))
+        .collect();
+    if chosen.len() > MOST_NAMED {
+        named.push(format!("and {} more", chosen.len() - MOST_NAMED));
+    }
+    let named = named.join(", ");
+    (!chosen.is_empty())
+        .then(|| format!("Chosen by the executor, so not varied unless --vary names it: {named}."))
 }
 
 /// The makespan of the plan, with everything started as early as possible.

@@ -79,6 +79,9 @@ pub enum EnvelopeFinding {
     Envelope {
         /// What is left open, and how far each may deviate.
         parameters: Vec<Room>,
+        /// Durations that the domain leaves to the executor, and that do not vary.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        chosen: Vec<Chosen>,
         /// Why the search ended.
         stop: Stop,
         /// The number of boxes checked.
@@ -157,6 +160,10 @@ pub struct Quantity {
     pub quantity: String,
     /// Which sort of quantity it is.
     pub kind: QuantityKind,
+    /// The action whose duration or number it is: `(drive rover depot shelf)`; `None` if it belongs
+    /// to no single action.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub action: Option<String>,
     /// The value in the original plan.
     #[serde(with = "exact")]
     pub nominal: Rational,
@@ -189,6 +196,17 @@ pub struct Room {
     pub lower_limit: Option<String>,
     /// What keeps the upper end.
     pub upper_limit: Option<String>,
+}
+
+/// A duration that the executor chooses when the action starts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Chosen {
+    /// The label of the action's instance.
+    pub instance: String,
+    /// The action.
+    pub action: String,
+    /// How long it takes as planned.
+    pub duration: Exact,
 }
 
 /// The kind of quantity that a parameter stands for.
@@ -436,6 +454,12 @@ impl Subject<'_> {
                 name: parameter.name.clone(),
                 quantity: self.explainer.quantity(ParameterId::from(index)),
                 kind: parameter.kind.into(),
+                action: match parameter.kind {
+                    ParameterKind::Duration(of) | ParameterKind::Constant(of) => {
+                        Some(self.plan.plan.instance(of).action.name.clone())
+                    }
+                    _ => None,
+                },
                 nominal: parameter.nominal.clone(),
                 weight: parameter.weight.clone(),
             })
@@ -452,6 +476,20 @@ impl Subject<'_> {
                 upper: interval.upper.clone(),
             })
             .collect()
+    }
+
+    /// The durations that the executor chooses.
+    pub(super) fn chosen(&self) -> Vec<Chosen> {
+        let told = self.plan.told.iter();
+        told.map(|(id, duration)| {
+            let instance = self.plan.plan.instance(*id);
+            Chosen {
+                instance: instance.label.clone(),
+                action: instance.action.name.clone(),
+                duration: Exact(duration.clone()),
+            }
+        })
+        .collect()
     }
 
     /// The same with what limits it.

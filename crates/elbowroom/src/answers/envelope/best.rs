@@ -2,12 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use elbowroom_envelope::{Objection, Objective, Oracle};
+use elbowroom_envelope::{Objection, Objective, Oracle, Reasons};
 use elbowroom_num::Rational;
 use elbowroom_plan::DecoupledEnvelope;
+use elbowroom_verify::Certificate;
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
+use super::certificate::certificate;
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
 use crate::flow::FlowError;
 
@@ -31,6 +33,10 @@ pub struct Best {
     /// Whether it is proved that there is no better box.
     #[serde(rename = "proved")]
     pub is_proved: bool,
+    /// Why no box has more than `bound`, for [`elbowroom_verify`] to check; `None` if the search was
+    /// ended before it was done, or if that could not be told of all ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
 }
 
 /// The best box, or why the plan does not even work as planned; what the box is the best of; and why
@@ -64,7 +70,13 @@ pub(super) fn best(
         }
     });
     let run = run.map_err(FlowError::Refused)?;
+    let has_certificate = run.envelope.is_ok()
+        && !run.is_cancelled
+        && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
     let best = Best {
+        certificate: has_certificate
+            .then(|| certificate(subject, settings, &run.proof))
+            .flatten(),
         objective: settings.objective,
         symmetric: settings.symmetric,
         most: settings.most.clone(),

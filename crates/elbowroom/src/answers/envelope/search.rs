@@ -83,6 +83,7 @@ pub(super) fn search(
     };
     let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
         parameters: subject.rooms(&envelope, limits),
+        chosen: subject.chosen(),
         stop,
         checks,
         seconds,

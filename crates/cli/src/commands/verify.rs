@@ -1,0 +1,91 @@
+//! `elbowroom verify`: is that box really the largest?
+
+use elbowroom::verify::{AnswerError, Verified, verify_answer};
+use serde_json::{Value, json};
+
+use crate::args::VerifyArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::limits::push_wrapped;
+use crate::look::{BAD, GOOD, Look, styled};
+use crate::output::{self, Output};
+use crate::{input, number};
+
+/// Checks an answer, and says what that proves.
+pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
+    let source = input::source(&arguments.answer, "answer")?;
+    let name = source.name();
+    match verify_answer(source.text()) {
+        Ok(verified) => {
+            if arguments.json {
+                output.json(&document(Ok(&verified)))?;
+            } else {
+                output::print(&proven(name, &verified, Look::of_stdout()))?;
+            }
+            Ok(Exit::Yes)
+        }
+        Err(AnswerError::Unreadable(error)) => Err(Failure::new(
+            AnswerError::Unreadable(error),
+            "`elbowroom envelope DOMAIN PROBLEM PLAN --method best --json` makes one",
+        )),
+        Err(wrong) => {
+            if arguments.json {
+                output.json(&document(Err(&wrong)))?;
+            } else {
+                let mut text = format!("{}: {name}\n", styled(BAD, "not proved"));
+                push_wrapped(&mut text, &format!("{wrong}."), 2, Look::of_stdout().width);
+                output::print(&text)?;
+            }
+            Ok(Exit::No)
+        }
+    }
+}
+
+/// The verdict as a document.
+fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
+    let exact = |value: &elbowroom::num::Rational| json!({ "exact": value.to_string(), "decimal": value.to_f64() });
+    let mut document = json!({ "format": "elbowroom-verified", "version": 1 });
+    let members = match verdict {
+        Ok(verified) => json!({
+            "proved": true,
+            "value": exact(&verified.value),
+            "bound": exact(&verified.bound),
+            "proofs": verified.proofs,
+            "assumed": verified.assumed,
+        }),
+        Err(wrong) => json!({ "proved": false, "reason": wrong.to_string() }),
+    };
+    if let (Value::Object(document), Value::Object(members)) = (&mut document, members) {
+        document.extend(members);
+    }
+    document
+}
+
+fn proven(name: &str, verified: &Verified, look: Look) -> String {
+    let mut text = format!("{}: {name}\n", styled(GOOD, "proved"));
+    let value = number::nearest(&verified.value);
+    let bound = number::nearest(&verified.bound);
+    let claim = if verified.value == verified.bound {
+        format!("No box inside the envelope is better than this one ({value}).")
+    } else {
+        format!("No box inside the envelope has more than {bound}; this one has {value}.")
+    };
+    push_wrapped(&mut text, &claim, 2, look.width);
+    let proofs = match verified.proofs {
+        1 => "1 inequality".to_owned(),
+        proofs => format!("{proofs} inequalities"),
+    };
+    let assumed = match verified.assumed {
+        0 => String::new(),
+        assumed => format!(
+            ", but for {assumed} about conditions on numbers, which the certificate only states"
+        ),
+    };
+    let how = format!(
+        "It follows from {proofs}, each added up from bounds of the plan's network{assumed}."
+    );
+    push_wrapped(&mut text, &how, 2, look.width);
+    let rest = "That the network is that of the plan, and that the box is inside, is not part of the \
+                certificate: `elbowroom envelope … --contains` checks the box.";
+    push_wrapped(&mut text, &rest.replace('…', "..."), 2, look.width);
+    text
+}

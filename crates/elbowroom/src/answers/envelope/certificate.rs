@@ -1,0 +1,319 @@
+//! The proof that a box is the largest, in the form that `elbowroom-verify` checks.
+
+use std::collections::BTreeMap;
+
+use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, ProofPart, ProofWay};
+use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
+use elbowroom_verify::{
+    Case, Certificate, Constraint, End, Exact, Limit, Multiplier, Parameter, Part, Proof, Reasons,
+    Source, Stopped, Sum, Term, Total, Way, added_up,
+};
+
+use super::Subject;
+
+/// The certificate of a proof, with those of its cuts, and of the plan's constraints, that are used.
+pub(super) fn certificate(
+    subject: &Subject<'_>,
+    settings: &BestSettings,
+    proof: &BestProof,
+) -> Option<Certificate> {
+    let plan = subject.plan;
+    let guarantee = subject.request.guarantee;
+    let mut cuts = Cuts::default();
+    let reasons = match &proof.reasons {
+        KnownReasons::Levels(levels) => {
+            let variable = |ends: &[_]| proof.variables.iter().position(|own| own.ends == ends);
+            let stopped = levels.iter().filter_map(|level| {
+                Some(Stopped {
+                    variable: variable(&level.ends)?,
+                    proof: level.cut.map(|cut| cuts.place(cut)),
+                    over: Vec::new(),
+                })
+            });
+            Reasons::LeastSlack(stopped.collect())
+        }
+        KnownReasons::Tree(tree) => {
+            Reasons::Widths(tree.iter().map(|case| cuts.case(case)).collect())
+        }
+    };
+    let proofs = cuts.used.iter();
+    let mut proofs: Vec<Proof> = proofs
+        .map(|&cut| proof_of(subject, &proof.cuts[cut]))
+        .collect();
+    let constraints = used_constraints(constraints(plan, guarantee), &mut proofs);
+    let is_used = used_limits(&reasons, proof.variables.len());
+    let limit = |side: Side, parameter: usize| {
+        let moves = |end: &BoxEnd| end.parameter.index() == parameter && end.side == side;
+        let variable = proof.variables.iter().position(|own| own.ends.iter().any(moves))?;
+        is_used[variable].then(|| Exact(proof.variables[variable].most.clone()))
+    };
+    let scale = |parameter: usize| {
+        let moves = |end: &BoxEnd| end.parameter.index() == parameter;
+        let own = proof.variables.iter().find(|own| own.ends.iter().any(moves))?;
+        Some(own.scale.clone())
+    };
+    let parameters = plan.parameters.iter().enumerate().map(|(index, own)| {
+        Some(Parameter {
+            name: own.name.clone(),
+            nominal: own.nominal.clone(),
+            scale: scale(index)?,
+            weight: own.weight.clone(),
+            most_below: limit(Side::Lower, index),
+            most_above: limit(Side::Upper, index),
+        })
+    });
+    let certificate = Certificate {
+        guarantee: match guarantee {
+            Guarantee::Weak => elbowroom_verify::Guarantee::Weak,
+            Guarantee::Dynamic => elbowroom_verify::Guarantee::Dynamic,
+            Guarantee::Strong => elbowroom_verify::Guarantee::Strong,
+            // A guarantee that the checker does not know.
+            _ => return None,
+        },
+        parameters: parameters.collect::<Option<_>>()?,
+        points: plan.plan.nodes().map(|(node, _)| plan.plan.node_label(node)).collect(),
+        constraints,
+        symmetric: settings.symmetric,
+        counted: settings.most.clone(),
+        slacks: proof.variables.iter().map(|own| Exact(own.value.clone())).collect(),
+        proofs,
+        reasons,
+    };
+    added_up(certificate).ok()
+}
+
+/// Which variables the reasons need to know a limit of.
+fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
+    let mut is_used = vec![false; variables];
+    match reasons {
+        Reasons::LeastSlack(stopped) => {
+            for one in stopped {
+                is_used[one.variable] |= one.proof.is_none();
+            }
+        }
+        Reasons::Widths(cases) => {
+            for case in cases {
+                if let Case::Sum(total) | Case::Impossible(total) = case {
+                    for own in &total.of {
+                        if let Source::Most(variable) = own.source {
+                            is_used[variable] = true;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    is_used
+}
+
+/// Those constraints that proofs are about; the proofs get their new positions. A proof about times
+/// that are fixed in advance is also about all durations that are not.
+fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constraint> {
+    let mut is_used = vec![false; all.len()];
+    for proof in proofs.iter_mut() {
+        if matches!(proof, Proof::Fixed(_)) {
+            let observed = all.iter().map(|constraint| constraint.observed);
+            for (is_used, is_observed) in is_used.iter_mut().zip(observed) {
+                *is_used |= is_observed;
+            }
+        }
+        each_constraint(proof, &mut |index| is_used[*index] = true);
+    }
+    let mut places = vec![0; all.len()];
+    let mut used = Vec::new();
+    for (index, constraint) in all.into_iter().enumerate() {
+        if is_used[index] {
+            places[index] = used.len();
+            used.push(constraint);
+        }
+    }
+    for proof in proofs {
+        each_constraint(proof, &mut |index| *index = places[*index]);
+    }
+    used
+}
+
+/// Visits the positions of constraints in a proof.
+fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize)) {
+    match proof {
+        Proof::Cycle(parts) | Proof::Fixed(parts) => each_in_parts(parts, visit),
+        Proof::Semireducible(ways) => {
+            for way in ways {
+                each_in_way(way, visit);
+            }
+        }
+        Proof::Assumed { .. } => {}
+    }
+}
+
+fn each_in_way(way: &mut Way, visit: &mut dyn FnMut(&mut usize)) {
+    each_in_parts(&mut way.parts, visit);
+    if let Some(index) = &mut way.unlabelled {
+        visit(index);
+    }
+}
+
+fn each_in_parts(parts: &mut [Part], visit: &mut dyn FnMut(&mut usize)) {
+    for part in parts {
+        match part {
+            Part::Beginning => {}
+            Part::Least(index) | Part::Most(index) | Part::Early(index) | Part::Late(index) => {
+                visit(index);
+            }
+            Part::Way(way) => each_in_way(way, visit),
+        }
+    }
+}
+
+/// The cuts that are used, in the order in which they first are.
+#[derive(Default)]
+struct Cuts {
+    used: Vec<usize>,
+    places: BTreeMap<usize, usize>,
+}
+
+impl Cuts {
+    /// The place of a cut among those that are used.
+    fn place(&mut self, cut: usize) -> usize {
+        let used = &mut self.used;
+        *self.places.entry(cut).or_insert_with(|| {
+            used.push(cut);
+            used.len() - 1
+        })
+    }
+
+    fn case(&mut self, case: &KnownCase) -> Case {
+        match case {
+            KnownCase::Either { cut, cases } => Case::Either {
+                proof: self.place(*cut),
+                cases: cases.clone(),
+            },
+            KnownCase::Bounded {
+                multipliers,
+                is_impossible,
+            } => {
+                let used = multipliers.iter().filter(|(_, factor)| !factor.is_zero());
+                let multipliers = used.map(|(source, factor)| Multiplier {
+                    source: match *source {
+                        KnownSource::Row(cut, row) => Source::Row(self.place(cut), row),
+                        KnownSource::Most(variable) => Source::Most(variable),
+                        KnownSource::Least(variable) => Source::Least(variable),
+                    },
+                    factor: factor.clone(),
+                });
+                let total = Total {
+                    of: multipliers.collect(),
+                    bound: Rational::ZERO,
+                };
+                if *is_impossible {
+                    Case::Impossible(total)
+                } else {
+                    Case::Sum(total)
+                }
+            }
+        }
+    }
+}
+
+/// The plan's constraints, as an executor with this guarantee has to see to them.
+fn constraints(plan: &ParametrizedPlan, guarantee: Guarantee) -> Vec<Constraint> {
+    let nominal = DecoupledEnvelope::point(&plan.nominal());
+    // Without knowledge of the future it matters who decides on a difference.
+    let (is_weak, network) = match guarantee {
+        Guarantee::Weak => (true, None),
+        _ => (false, plan.uncertain_network(&nominal).ok()),
+    };
+    let observed = network.map(|network| network.links).unwrap_or_default();
+    let limit = |bound: &Bound| match bound {
+        Bound::Infinite => Limit::None,
+        Bound::Finite(value) => Limit::Number(Exact(value.clone())),
+        Bound::Parameter(id) => Limit::Parameter(id.index()),
+    };
+    let all = plan.plan.constraints.iter().enumerate();
+    all.map(|(index, constraint)| {
+        let told = plan.told_by(constraint).filter(|_| !is_weak);
+        let told = told.map(|planned| Limit::Number(Exact(planned.clone())));
+        Constraint {
+            from: constraint.from.index(),
+            to: constraint.to.index(),
+            lower: told.clone().unwrap_or_else(|| limit(&constraint.lower)),
+            upper: told.unwrap_or_else(|| limit(&constraint.upper)),
+            observed: observed.contains(&index),
+        }
+    })
+    .collect()
+}
+
+/// Why one of the rows of a cut holds in every box inside the envelope.
+fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
+    match &cut.ground {
+        Ground::Cycle(origins) => Proof::Cycle(origins.iter().map(bound).collect()),
+        // Which durations count at their ends follows from the bounds.
+        Ground::Fixed(parts) => Proof::Fixed(
+            parts
+                .iter()
+                .filter(|part| matches!(part, ProofPart::Bound(_)))
+                .map(part)
+                .collect(),
+        ),
+        Ground::Semireducible(ways) => Proof::Semireducible(ways.iter().map(way).collect()),
+        Ground::Condition(broken) => Proof::Assumed {
+            why: subject.explainer.requirement(&broken.requirement),
+            sums: sums(cut),
+        },
+        Ground::Box(_) => Proof::Assumed {
+            why: "the plan does not work everywhere in a box that breaks all of these".to_owned(),
+            sums: sums(cut),
+        },
+    }
+}
+
+fn bound(origin: &Origin) -> Part {
+    match *origin {
+        Origin::Beginning => Part::Beginning,
+        Origin::AtLeast(index) => Part::Least(index),
+        Origin::AtMost(index) => Part::Most(index),
+    }
+}
+
+fn part(part: &ProofPart) -> Part {
+    match part {
+        ProofPart::Bound(origin) => bound(origin),
+        ProofPart::Early(index) => Part::Early(*index),
+        ProofPart::Late(index) => Part::Late(*index),
+        ProofPart::Way(inner) => Part::Way(way(inner)),
+    }
+}
+
+fn way(way: &ProofWay) -> Way {
+    Way {
+        parts: way.parts.iter().map(part).collect(),
+        unlabelled: way.unlabelled,
+    }
+}
+
+/// The rows of a cut as sums that are not negative.
+fn sums(cut: &Cut) -> Vec<Sum> {
+    let sum = |row: &elbowroom_envelope::Row| Sum {
+        constant: row.bound.clone(),
+        terms: row
+            .factors
+            .iter()
+            .map(|(end, factor)| Term {
+                parameter: end.parameter.index(),
+                end: match end.side {
+                    Side::Lower => End::Lower,
+                    Side::Upper => End::Upper,
+                },
+                // A lower end reaches out as it gets less.
+                factor: match end.side {
+                    Side::Lower => factor.clone(),
+                    Side::Upper => &Rational::ZERO - factor,
+                },
+            })
+            .collect(),
+    };
+    cut.rows.iter().map(sum).collect()
+}

@@ -1,0 +1,323 @@
+//! From a proof to what it proves: that one of some sums of bounds is not negative.
+
+use elbowroom_num::Rational;
+
+use crate::bounds::Ends;
+use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Proof, Sum, Way};
+use crate::check::Flaw;
+
+/// The limit on the sums of one proof.
+const MOST_SUMS: usize = 256;
+
+/// Sums of which one is not negative in every box inside the envelope.
+///
+/// # Errors
+/// When the proof proves nothing of the kind.
+pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw> {
+    let reader = Reader { certificate };
+    let mut sums = match proof {
+        Proof::Cycle(parts) => vec![reader.cycle(parts)?],
+        Proof::Fixed(parts) if certificate.guarantee == Guarantee::Strong => {
+            vec![reader.fixed(parts)?]
+        }
+        Proof::Semireducible(ways) if certificate.guarantee != Guarantee::Weak => {
+            reader.semireducible(ways)?
+        }
+        Proof::Fixed(_) | Proof::Semireducible(_) => return Err(Flaw::WrongGuarantee),
+        Proof::Assumed { sums, .. } => sums.iter().map(stated).collect(),
+    };
+    // Each once, so that alternatives have their positions.
+    let mut each: Vec<Ends> = Vec::new();
+    for sum in sums.drain(..) {
+        if !each.contains(&sum) {
+            each.push(sum);
+        }
+    }
+    Ok(each)
+}
+
+/// A sum as the certificate has it.
+fn stated(sum: &Sum) -> Ends {
+    let mut ends = Ends::number(sum.constant.clone());
+    for term in &sum.terms {
+        let end = 2 * term.parameter + usize::from(term.end == End::Upper);
+        ends.add(end, &term.factor);
+    }
+    ends
+}
+
+struct Reader<'a> {
+    certificate: &'a Certificate,
+}
+
+impl Reader<'_> {
+    fn constraint(&self, index: usize) -> Result<&Constraint, Flaw> {
+        let constraint = self.certificate.constraints.get(index);
+        constraint.ok_or(Flaw::NoSuch("constraint", index))
+    }
+
+    /// A constraint whose difference the world decides on, and its parameter.
+    fn observed(&self, index: usize) -> Result<(&Constraint, usize), Flaw> {
+        let constraint = self.constraint(index)?;
+        match (&constraint.lower, &constraint.upper) {
+            (Limit::Parameter(lower), Limit::Parameter(upper))
+                if lower == upper && constraint.observed =>
+            {
+                Ok((constraint, *lower))
+            }
+            _ => Err(Flaw::NotObserved(index)),
+        }
+    }
+
+    /// Where a part of a way leads from and to; a beginning leads from anywhere.
+    fn points(&self, part: &Part) -> Result<(Option<usize>, usize), Flaw> {
+        Ok(match part {
+            Part::Beginning => (None, 0),
+            Part::Least(index) | Part::Late(index) => {
+                let constraint = self.constraint(*index)?;
+                (Some(constraint.to), constraint.from)
+            }
+            Part::Most(index) | Part::Early(index) => {
+                let constraint = self.constraint(*index)?;
+                (Some(constraint.from), constraint.to)
+            }
+            Part::Way(way) => self.ends_of(&way.parts)?,
+        })
+    }
+
+    /// Where parts lead from and to, each from where the one before ends.
+    fn ends_of(&self, parts: &[Part]) -> Result<(Option<usize>, usize), Flaw> {
+        let first = parts.first().ok_or(Flaw::Empty)?;
+        let (begin, mut at) = self.points(first)?;
+        for part in &parts[1..] {
+            let (from, to) = self.points(part)?;
+            if from.is_some_and(|from| from != at) {
+                return Err(Flaw::Broken);
+            }
+            at = to;
+        }
+        Ok((begin, at))
+    }
+
+    /// That parts lead back to where they begin.
+    fn is_circle(&self, parts: &[Part]) -> Result<(), Flaw> {
+        match self.ends_of(parts)? {
+            (Some(begin), end) if begin != end => Err(Flaw::Broken),
+            _ => Ok(()),
+        }
+    }
+
+    /// The sum of a cycle at the worst values: each parameter counts with one sign in all.
+    fn cycle(&self, parts: &[Part]) -> Result<Ends, Flaw> {
+        self.is_circle(parts)?;
+        let count = self.certificate.parameters.len();
+        let mut counts = vec![0_i64; count];
+        let mut constant = Rational::ZERO;
+        for part in parts {
+            let (limit, sign) = match part {
+                Part::Beginning => continue,
+                Part::Least(index) => (&self.constraint(*index)?.lower, -1),
+                Part::Most(index) => (&self.constraint(*index)?.upper, 1),
+                Part::Early(_) | Part::Late(_) | Part::Way(_) => return Err(Flaw::Rule),
+            };
+            match limit {
+                Limit::None => return Err(Flaw::NoLimit),
+                Limit::Number(number) => constant += &number.0 * &Rational::from(sign),
+                Limit::Parameter(parameter) => *counts
+                    .get_mut(*parameter)
+                    .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign,
+            }
+        }
+        let mut sum = Ends::number(constant);
+        for (parameter, &count) in counts.iter().enumerate() {
+            let end = match count {
+                0 => continue,
+                1.. => 2 * parameter,
+                _ => 2 * parameter + 1,
+            };
+            sum = sum.plus(&Ends::end(end, count));
+        }
+        Ok(sum)
+    }
+
+    /// A bound that has to be kept whatever its parameter is.
+    fn requirement(&self, part: &Part) -> Result<Ends, Flaw> {
+        let (index, is_most) = match part {
+            Part::Beginning => return Ok(Ends::default()),
+            Part::Least(index) => (*index, false),
+            Part::Most(index) => (*index, true),
+            _ => return Err(Flaw::Rule),
+        };
+        let constraint = self.constraint(index)?;
+        if constraint.observed {
+            return Err(Flaw::Rule);
+        }
+        let (limit, sign) = if is_most {
+            (&constraint.upper, 1)
+        } else {
+            (&constraint.lower, -1)
+        };
+        match limit {
+            Limit::None => Err(Flaw::NoLimit),
+            Limit::Number(number) => Ok(Ends::number(&number.0 * &Rational::from(sign))),
+            // An upper bound at its least value, a lower one at its greatest.
+            Limit::Parameter(parameter) if *parameter < self.certificate.parameters.len() => {
+                Ok(Ends::end(2 * parameter + usize::from(!is_most), sign))
+            }
+            Limit::Parameter(parameter) => Err(Flaw::NoSuch("parameter", *parameter)),
+        }
+    }
+
+    /// The durations between a point and the one, chosen by the executor, from which they count.
+    fn chain(&self, point: usize) -> Result<(usize, Vec<usize>), Flaw> {
+        let mut links = Vec::new();
+        let mut root = point;
+        loop {
+            let ending = |constraint: &Constraint| constraint.observed && constraint.to == root;
+            let Some(link) = self.certificate.constraints.iter().position(ending) else {
+                links.reverse();
+                return Ok((root, links));
+            };
+            if links.contains(&link) {
+                return Err(Flaw::Broken);
+            }
+            links.push(link);
+            root = self.constraint(link)?.from;
+        }
+    }
+
+    /// The sum of a cycle of bounds between points that the executor chooses, each for the worst
+    /// durations between them and the points that it is about.
+    fn fixed(&self, parts: &[Part]) -> Result<Ends, Flaw> {
+        let mut sum = Ends::default();
+        let mut way: Option<(Option<usize>, usize)> = None;
+        for part in parts {
+            sum = sum.plus(&self.requirement(part)?);
+            let (from, to) = self.points(part)?;
+            let (to_root, to_links) = self.chain(to)?;
+            let (from_root, from_links) = match from {
+                Some(from) => {
+                    let (root, links) = self.chain(from)?;
+                    (Some(root), links)
+                }
+                // Whatever point it is that comes at 0 or later: one that the executor chooses.
+                None => (None, Vec::new()),
+            };
+            let shared = from_links
+                .iter()
+                .zip(&to_links)
+                .take_while(|(one, other)| one == other)
+                .count();
+            for &link in &from_links[shared..] {
+                sum = sum.plus(&Ends::end(2 * self.observed(link)?.1, 1));
+            }
+            for &link in &to_links[shared..] {
+                sum = sum.plus(&Ends::end(2 * self.observed(link)?.1 + 1, -1));
+            }
+            way = match way {
+                None => Some((from_root, to_root)),
+                Some((begin, at)) if from_root.is_none_or(|from| from == at) => {
+                    Some((begin, to_root))
+                }
+                Some(_) => return Err(Flaw::Broken),
+            };
+        }
+        match way {
+            None => Err(Flaw::Empty),
+            Some((Some(begin), end)) if begin != end => Err(Flaw::Broken),
+            Some(_) => Ok(sum),
+        }
+    }
+
+    /// Sums of a semi-reducible cycle: its own, and those of what has to be negative for it to be one.
+    fn semireducible(&self, ways: &[Way]) -> Result<Vec<Ends>, Flaw> {
+        let parts: Vec<Part> = ways.iter().cloned().map(Part::Way).collect();
+        self.is_circle(&parts)?;
+        let mut legal = Vec::new();
+        let mut total = vec![Ends::default()];
+        let mut flat = Ends::default();
+        for way in ways {
+            if way.unlabelled.is_some() {
+                return Err(Flaw::Rule);
+            }
+            let lengths = self.lengths(way, &mut legal)?;
+            total = all_sums(&total, &lengths)?;
+            flat = flat.plus(&self.flat(way)?);
+        }
+        if !flat.tears() {
+            // At these ends, one for each parameter, the network has no schedule at all.
+            return Ok(vec![flat]);
+        }
+        legal.extend(total);
+        Ok(legal)
+    }
+
+    /// The sum of all bounds on a way, no wait being cut short.
+    fn flat(&self, way: &Way) -> Result<Ends, Flaw> {
+        let mut sum = Ends::default();
+        for part in &way.parts {
+            sum = sum.plus(&match part {
+                Part::Early(index) => Ends::end(2 * self.observed(*index)?.1, 1),
+                Part::Late(index) => Ends::end(2 * self.observed(*index)?.1 + 1, -1),
+                Part::Way(way) => self.flat(way)?,
+                requirement => self.requirement(requirement)?,
+            });
+        }
+        Ok(sum)
+    }
+
+    /// What a way can be as long as: the greatest of these. Adds to `legal` what has to be negative
+    /// for the rules to apply.
+    fn lengths(&self, way: &Way, legal: &mut Vec<Ends>) -> Result<Vec<Ends>, Flaw> {
+        self.ends_of(&way.parts)?;
+        let waits_for = match way.parts.last() {
+            Some(Part::Late(index)) => Some(*index),
+            _ => None,
+        };
+        let mut lengths = vec![Ends::default()];
+        for (place, part) in way.parts.iter().enumerate().rev() {
+            let is_last = place + 1 == way.parts.len();
+            let own = match part {
+                // Nothing may follow at the last place, and no wait may be for the same end.
+                Part::Early(index) if !is_last && Some(*index) != waits_for => {
+                    legal.extend(lengths.iter().cloned());
+                    vec![Ends::end(2 * self.observed(*index)?.1, 1)]
+                }
+                Part::Late(index) if is_last => {
+                    vec![Ends::end(2 * self.observed(*index)?.1 + 1, -1)]
+                }
+                Part::Early(_) | Part::Late(_) => return Err(Flaw::Rule),
+                Part::Way(inner) => {
+                    let ends_late = matches!(inner.parts.last(), Some(Part::Late(_)));
+                    if ends_late && inner.unlabelled.is_none() {
+                        return Err(Flaw::Rule);
+                    }
+                    self.lengths(inner, legal)?
+                }
+                requirement => vec![self.requirement(requirement)?],
+            };
+            lengths = all_sums(&lengths, &own)?;
+            if legal.len() > MOST_SUMS {
+                return Err(Flaw::TooLong);
+            }
+        }
+        if let Some(link) = way.unlabelled {
+            if waits_for != Some(link) {
+                return Err(Flaw::Rule);
+            }
+            lengths.push(Ends::end(2 * self.observed(link)?.1, -1));
+        }
+        Ok(lengths)
+    }
+}
+
+/// All sums of one of these and one of those.
+fn all_sums(some: &[Ends], others: &[Ends]) -> Result<Vec<Ends>, Flaw> {
+    if some.len() * others.len() > MOST_SUMS {
+        return Err(Flaw::TooLong);
+    }
+    let sums = some
+        .iter()
+        .flat_map(|one| others.iter().map(move |other| one.plus(other)));
+    Ok(sums.collect())
+}
