@@ -10,6 +10,7 @@ use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 
 /// A clock since the start, with the reasons for which a computation ends early.
+#[derive(Clone)]
 pub(crate) struct Stopwatch {
     clock: Clock,
     interrupt: Interrupt,

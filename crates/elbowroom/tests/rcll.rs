@@ -5,6 +5,7 @@
 
 mod shared;
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,6 +76,7 @@ fn upper_limit(case: &Case, parameter: usize) -> String {
         &mut oracle,
         &sharp,
         &vec![Rational::ONE; sharp.intervals().len()],
+        &mut || ControlFlow::Continue(()),
     );
     let limit: &Limit = all[parameter][1].as_ref().expect("something limits it");
     Explainer::new(&case.task, &case.plan)

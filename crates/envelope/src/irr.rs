@@ -240,11 +240,13 @@ fn widen(
 }
 
 /// What keeps each end of a box where it is: lower and upper, parameter by parameter. An end that
-/// can still move by less than its parameter's `step` is asked what would stop it there.
+/// can still move by less than its parameter's `step` is asked what would stop it there. `flow` can
+/// end that at any end; nothing is known of those that come after.
 pub fn limits(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     steps: &[Rational],
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Vec<[Option<Limit>; 2]> {
     let plan = Arc::clone(oracle.plan());
     let mut limits = Vec::with_capacity(plan.parameters.len());
@@ -255,7 +257,9 @@ pub fn limits(
                 parameter: ParameterId::from(index),
                 side,
             };
-            pair[side.index()] = limit(oracle, envelope, parameter, end, &steps[index]);
+            if flow().is_continue() {
+                pair[side.index()] = limit(oracle, envelope, parameter, end, &steps[index]);
+            }
         }
         limits.push(pair);
     }

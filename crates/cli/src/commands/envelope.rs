@@ -6,7 +6,7 @@ mod watch;
 use std::sync::Arc;
 
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Search};
-use elbowroom::answers::{RequestError, envelope};
+use elbowroom::answers::RequestError;
 use elbowroom::envelope as library;
 use elbowroom::plan::parametrize::VarySpec;
 
@@ -20,7 +20,7 @@ use watch::Watch;
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let (method, best) = arguments.method()?;
-    let mut watch = Watch::start(arguments);
+    let watch = Watch::start(arguments);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
@@ -51,9 +51,9 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         },
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
-    let outcome = envelope::envelope(&request, &mut watch).map_err(failure)?;
+    let request = Arc::new(request);
     // The line on the terminal goes before the answer comes.
-    drop(watch);
+    let outcome = watch.answer(&request).map_err(failure)?;
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {

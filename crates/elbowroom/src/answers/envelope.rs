@@ -10,6 +10,7 @@ mod inequalities;
 mod limits;
 mod search;
 pub mod timeline;
+mod worth;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use elbowroom_num::Rational;
 use elbowroom_plan::parametrize::VarySpec;
 use elbowroom_plan::{DecoupledEnvelope, ParametrizedPlan};
 
-use super::{Event, RequestError, Watcher};
+use super::{Event, Halt, RequestError, Watcher};
 use crate::explain::{Explainer, Explanation};
 use crate::flow::{self, FlowError};
 use crate::{AnyPlan, parse_box};
@@ -35,6 +36,7 @@ pub use conditions::Conditions;
 pub use foresight::Foresight;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use timeline::Timeline;
+pub use worth::{Relax, Worth};
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.
 #[derive(Clone, Debug)]
@@ -201,6 +203,48 @@ pub fn envelope(
             Ok(subject.outcome(EnvelopeFinding::None { stop: halt.into() }))
         }
     }
+}
+
+/// What had been found when somebody could wait no longer, for those who have no time to hear what limits
+/// it: the box so far, of a plan and after so many checks and seconds, as a watcher was told it last.
+pub fn so_far(
+    request: &EnvelopeRequest,
+    found: Option<(&Arc<ParametrizedPlan>, &DecoupledEnvelope, usize)>,
+    halt: Halt,
+    seconds: f64,
+) -> EnvelopeOutcome {
+    let stop = halt.into();
+    let Some((plan, envelope, checks)) = found else {
+        return EnvelopeOutcome {
+            answer: EnvelopeAnswer::new(request, EnvelopeFinding::None { stop }),
+            plan: None,
+            envelope: None,
+            why_not: None,
+        };
+    };
+    let subject = Subject {
+        request,
+        plan,
+        enforced: 0,
+        explainer: Explainer::new(&request.task, plan),
+    };
+    let unknown = vec![[None, None]; plan.parameters.len()];
+    let mut outcome = subject.outcome(EnvelopeFinding::Envelope {
+        parameters: subject.rooms(envelope, unknown),
+        chosen: subject.chosen(),
+        stop,
+        checks,
+        seconds,
+        widenings: Vec::new(),
+        balance: None,
+        best: None,
+        conditions: Conditions::default(),
+        foresight: None,
+        timeline: None,
+        makespans: None,
+    });
+    outcome.envelope = Some(envelope.clone());
+    outcome
 }
 
 /// The plan with what is left open.

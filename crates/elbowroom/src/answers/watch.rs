@@ -1,6 +1,7 @@
 //! Watching a request that takes long.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Duration;
 
 use elbowroom_model::validate::Violation;
@@ -58,11 +59,13 @@ pub enum Event<'a> {
 #[derive(Clone, Debug)]
 pub struct EnvelopeProgress<'a> {
     /// The plan whose parameters the box is about.
-    pub plan: &'a ParametrizedPlan,
+    pub plan: &'a Arc<ParametrizedPlan>,
     /// The box so far. The plan is guaranteed to work in all of it.
     pub envelope: &'a DecoupledEnvelope,
     /// How often it has grown.
     pub widenings: usize,
+    /// The number of boxes checked.
+    pub checks: usize,
     /// The number of steps that have been tried.
     pub steps: usize,
 }

@@ -68,7 +68,7 @@ impl Explainer<'_> {
     }
 
     /// A constraint of the plan in words.
-    pub(super) fn constraint(&self, index: usize) -> String {
+    pub(crate) fn constraint(&self, index: usize) -> String {
         let plan = &self.plan.plan;
         let constraint = &plan.constraints[index];
         let node = |id: NodeId| plan.node_words(self.task, id);

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
     Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
-    Failing, Foresight, Makespans, QuantityKind, Range, Room, Stop,
+    Failing, Foresight, Makespans, QuantityKind, Range, Relax, Room, Stop, Worth,
 };
 
 use elbowroom::envelope::Objective;
@@ -161,6 +161,9 @@ fn envelope(
     }
     if let Some(met) = met(conditions) {
         push_paragraph(&mut text, &met, look.width);
+    }
+    if let Some(worth) = best.as_ref().and_then(gained) {
+        push_paragraph(&mut text, &worth, look.width);
     }
     let course = format!(
         "{} {}, {}, {}.",
@@ -381,6 +384,28 @@ fn ended(
             "Interrupted before the search was done; the intervals could be wider".to_owned()
         }
     }
+}
+
+/// Which bounds it would be worth most to relax.
+fn gained(best: &Best) -> Option<String> {
+    /// Of a long list only the first are named.
+    const MOST_NAMED: usize = 3;
+    let gain = |worth: &Worth| match best.objective {
+        Objective::LeastSlack => {
+            let percent = &worth.gain * &Rational::from(100);
+            format!("{} % of least deviation", number::rounded(&percent, 2, Rounding::Down))
+        }
+        _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
+    };
+    let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
+        let relax = match worth.relax {
+            Relax::More => "more",
+            Relax::Less => "less",
+        };
+        format!("1 {relax} of {} gains {}", worth.bound, gain(worth))
+    });
+    let named: Vec<String> = named.collect();
+    (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
 }
 
 /// How good the box is.

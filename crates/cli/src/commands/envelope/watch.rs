@@ -1,10 +1,18 @@
 //! Watches the clock and Ctrl-C while an envelope is computed, and shows how far it has come.
+//!
+//! A single question to the library can take long, and it looks at no clock. So it works on a thread of
+//! its own: when it has not come to an end soon after its time is up, what it told last is the answer.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::Duration;
 
-use elbowroom::answers::{Event, Halt, Watcher};
+use elbowroom::answers::envelope::{EnvelopeOutcome, EnvelopeRequest, envelope, so_far};
+use elbowroom::answers::{Event, Halt, RequestError, Watcher};
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
 
 use crate::args::EnvelopeArgs;
 use crate::input;
@@ -12,11 +20,25 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::stopwatch::{Stopwatch, duration};
 
+/// How often the clock is looked at.
+const TICK: Duration = Duration::from_millis(10);
+/// How long the library has for an answer when its time is up: more than most of its steps take.
+const GRACE: Duration = Duration::from_millis(50);
+/// As much as the main thread has.
+const STACK: usize = 64 << 20;
+
 /// Ends the work never, at a time limit, or at Ctrl-C.
 pub(super) struct Watch {
     stopwatch: Stopwatch,
-    progress: Progress,
     plan: PathBuf,
+}
+
+/// What the library has told.
+#[derive(Default)]
+struct Told {
+    found: Option<(Arc<ParametrizedPlan>, DecoupledEnvelope)>,
+    widenings: usize,
+    checks: usize,
 }
 
 impl Watch {
@@ -25,13 +47,67 @@ impl Watch {
         let limit = arguments.time_limit.as_ref().map(duration);
         Self {
             stopwatch: Stopwatch::start(&Interrupt::listen()).until(limit),
-            progress: Progress::new(),
             plan: arguments.plan.clone(),
+        }
+    }
+
+    /// The answer, or what had been found when there was no more time for it.
+    pub(super) fn answer(
+        mut self,
+        request: &Arc<EnvelopeRequest>,
+    ) -> Result<EnvelopeOutcome, RequestError> {
+        let told = Arc::new(Mutex::new(Told::default()));
+        let mut listener = Listener {
+            stopwatch: self.stopwatch.clone(),
+            plan: self.plan.clone(),
+            told: Arc::clone(&told),
+        };
+        let (sender, receiver) = mpsc::channel();
+        let theirs = Arc::clone(request);
+        let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
+            // Nobody listens any more when there was no time left.
+            let _ = sender.send(envelope(&theirs, &mut listener));
+        });
+        if worker.is_err() {
+            // A system without threads to spare: the limit is kept between the steps.
+            return envelope(request, &mut self.stopwatch);
+        }
+        let mut progress = Progress::new();
+        let mut late: Option<(Halt, Duration)> = None;
+        loop {
+            match receiver.recv_timeout(TICK) {
+                Ok(answer) => return answer,
+                // A thread that is gone without an answer has panicked, which has ended the program.
+                Err(RecvTimeoutError::Disconnected) => return envelope(request, &mut self.stopwatch),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            let elapsed = self.stopwatch.elapsed();
+            if let (ControlFlow::Break(halt), None) = (self.stopwatch.flow(), late) {
+                late = Some((halt, elapsed));
+            }
+            let told = told.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((halt, since)) = late
+                && elapsed >= since + GRACE
+            {
+                let found = told.found.as_ref();
+                let found = found.map(|(plan, envelope)| (plan, envelope, told.checks));
+                return Ok(so_far(request, found, halt, elapsed.as_secs_f64()));
+            }
+            let widenings = told.widenings;
+            drop(told);
+            progress.show(elapsed, || format!("{widenings} widenings"));
         }
     }
 }
 
-impl Watcher for Watch {
+/// What watches on the library's thread.
+struct Listener {
+    stopwatch: Stopwatch,
+    plan: PathBuf,
+    told: Arc<Mutex<Told>>,
+}
+
+impl Watcher for Listener {
     fn elapsed(&mut self) -> Duration {
         self.stopwatch.elapsed()
     }
@@ -44,9 +120,12 @@ impl Watcher for Watch {
         match event {
             Event::Repaired(violation) => input::tell_repair(&self.plan, violation),
             Event::Envelope(progress) => {
-                let (elapsed, widenings) = (self.elapsed(), progress.widenings);
-                self.progress
-                    .show(elapsed, || format!("{widenings} widenings"));
+                let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+                if told.found.is_none() || told.widenings != progress.widenings {
+                    told.found = Some((Arc::clone(progress.plan), progress.envelope.clone()));
+                    told.widenings = progress.widenings;
+                    told.checks = progress.checks;
+                }
             }
             _ => {}
         }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use super::certificate::certificate;
+use super::worth::{Worth, worths};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
 use crate::flow::FlowError;
 
@@ -37,6 +38,9 @@ pub struct Best {
     /// ended before it was done, or if that could not be told of all ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
+    /// What it would be worth to relax bounds of the plan, the most first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub worth: Vec<Worth>,
 }
 
 /// The best box, or why the plan does not even work as planned; what the box is the best of; and why
@@ -59,6 +63,7 @@ pub(super) fn best(
             plan: subject.plan,
             envelope: step.envelope,
             widenings: steps,
+            checks: step.checks,
             steps,
         }));
         match watcher.flow() {
@@ -74,6 +79,7 @@ pub(super) fn best(
         && !run.is_cancelled
         && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
     let best = Best {
+        worth: if run.is_proved { worths(subject, &run.proof) } else { Vec::new() },
         certificate: has_certificate
             .then(|| certificate(subject, settings, &run.proof))
             .flatten(),

@@ -39,7 +39,7 @@ pub(super) fn what_limits(
             *distance = near.min(distance.clone());
         }
     }
-    let mut words = at_distance(subject, oracle, envelope, &distances);
+    let mut words = at_distance(subject, oracle, envelope, &distances, watcher);
     for _ in 0..FARTHER {
         // An end that has room for this step may still be stopped by the next larger one.
         if flow(watcher).is_break() || words.iter().flatten().all(Option::is_some) {
@@ -48,7 +48,7 @@ pub(super) fn what_limits(
         for distance in &mut distances {
             *distance = &*distance + &*distance;
         }
-        let farther = at_distance(subject, oracle, envelope, &distances);
+        let farther = at_distance(subject, oracle, envelope, &distances, watcher);
         for (known, found) in words
             .iter_mut()
             .flatten()
@@ -68,8 +68,9 @@ fn at_distance(
     oracle: &mut Oracle,
     envelope: &DecoupledEnvelope,
     distances: &[Rational],
+    watcher: &mut dyn Watcher,
 ) -> Vec<[Option<String>; 2]> {
-    let limits = limits(oracle, envelope, distances);
+    let limits = limits(oracle, envelope, distances, &mut || flow(watcher));
     let words = |id, side, limit: &Option<Limit>| {
         let limit = limit.as_ref()?;
         subject.explainer.limit(id, side, limit)

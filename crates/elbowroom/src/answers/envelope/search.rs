@@ -34,6 +34,7 @@ pub(super) fn search(
         envelope: DecoupledEnvelope::point(&subject.plan.nominal()),
         widenings: &mut widenings,
         steps: 0,
+        checks: 0,
         halt: None,
     };
     let search = irr(&mut oracle, &settings, &mut |widening| {
@@ -118,6 +119,8 @@ struct History<'a> {
     widenings: &'a mut Vec<Widened>,
     /// The number of steps that have been tried.
     steps: usize,
+    /// The number of boxes checked when the box grew last.
+    checks: usize,
     /// Why the watcher wanted no more.
     halt: Option<Halt>,
 }
@@ -131,11 +134,13 @@ impl History<'_> {
             self.widenings
                 .push(Widened::of(plan, widening, seconds.as_secs_f64()));
             self.envelope.clone_from(widening.envelope);
+            self.checks = widening.checks;
         }
         self.watcher.notice(&Event::Envelope(EnvelopeProgress {
             plan: self.subject.plan,
             envelope: &self.envelope,
             widenings: self.widenings.len(),
+            checks: self.checks,
             steps: self.steps,
         }));
         match self.watcher.flow() {
