@@ -319,7 +319,9 @@ fn bar(row: &Row, scale: i64, width: usize, unicode: bool) -> String {
     };
     let middle = width / 2;
     let side = |end: &End, limit: char, endless: char| -> Vec<char> {
-        let columns = row.deviation(end).and_then(|share| columns(&share, scale, middle));
+        let columns = row
+            .deviation(end)
+            .and_then(|share| columns(&share, scale, middle));
         let mut side = vec![line; columns.unwrap_or(middle)];
         if let Some(last) = side.last_mut() {
             *last = if columns.is_none() { endless } else { limit };

@@ -28,14 +28,18 @@ const OBJECTIVES: [Objective; 2] = [Objective::LeastSlack, Objective::Widths];
 
 /// A case of this repository.
 fn case(name: &str) -> (Arc<Task>, AnyPlan) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases").join(name);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../cases")
+        .join(name);
     let source = |file: &str| {
         let text = std::fs::read_to_string(folder.join(file)).expect("a file of the case");
         pddl::Source::new(file, text)
     };
     let read = pddl::read_problem(&source("domain.pddl"), &source("problem.pddl"));
     let task = Arc::new(Task::new(read.expect("a case without mistakes").0));
-    let plan = read_plan(&source("plan.plan"), &task).expect("a plan without mistakes").0;
+    let plan = read_plan(&source("plan.plan"), &task)
+        .expect("a plan without mistakes")
+        .0;
     (task, plan.into())
 }
 
@@ -65,7 +69,13 @@ fn written(outcome: &EnvelopeOutcome) -> String {
 fn certificates_of_all_cases_are_accepted() {
     let (mut accepted, mut assumed, mut without) = (0, 0, 0);
     for name in [
-        "battery", "delivery", "hatchery", "lamp", "match", "paintshop", "tank",
+        "battery",
+        "delivery",
+        "hatchery",
+        "lamp",
+        "match",
+        "paintshop",
+        "tank",
     ] {
         let (task, plan) = case(name);
         for guarantee in GUARANTEES {
@@ -80,7 +90,10 @@ fn certificates_of_all_cases_are_accepted() {
                     let best = best.as_ref().expect("a largest box");
                     match verify_answer(&written(&outcome)) {
                         Ok(verified) => {
-                            assert_eq!((&verified.value, &verified.bound), (&best.value, &best.bound));
+                            assert_eq!(
+                                (&verified.value, &verified.bound),
+                                (&best.value, &best.bound)
+                            );
                             accepted += 1;
                             assumed += usize::from(verified.assumed > 0);
                         }
@@ -94,7 +107,9 @@ fn certificates_of_all_cases_are_accepted() {
             }
         }
     }
-    println!("{accepted} certificates accepted, {assumed} of them with assumptions; {without} boxes without");
+    println!(
+        "{accepted} certificates accepted, {assumed} of them with assumptions; {without} boxes without"
+    );
     assert!(accepted > 60);
 }
 
@@ -103,8 +118,16 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(members) => {
             for (name, member) in members {
-                if !["widenings", "timeline", "balance", "foresight", "decimal", "settings", "checks"]
-                    .contains(&name.as_str())
+                if ![
+                    "widenings",
+                    "timeline",
+                    "balance",
+                    "foresight",
+                    "decimal",
+                    "settings",
+                    "checks",
+                ]
+                .contains(&name.as_str())
                 {
                     numbers(member, &format!("{path}/{name}"), found);
                 }
@@ -180,7 +203,10 @@ impl Watcher for Patience {
 
 /// Searches a published plan, and checks the certificate: accepted, with how many assumptions, in how
 /// many seconds.
-#[allow(clippy::disallowed_methods, reason = "how long a check takes is worth seeing")]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "how long a check takes is worth seeing"
+)]
 fn of_published(
     instance: &Instance,
     guarantee: Guarantee,

@@ -129,7 +129,10 @@ pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
             room.name == own.name && room.nominal.exact == own.nominal,
             &format!("parameter {index}"),
         )?;
-        same(room.weight.exact == own.weight, &format!("the weight of {}", own.name))?;
+        same(
+            room.weight.exact == own.weight,
+            &format!("the weight of {}", own.name),
+        )?;
         let size = own.nominal.abs();
         same(
             size.is_zero() || own.scale == size,

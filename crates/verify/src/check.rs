@@ -234,9 +234,17 @@ impl<'a> Checker<'a> {
             let parameter = self.certificate.parameters.get(end / 2);
             let parameter = parameter.ok_or(Flaw::NoSuch("parameter", end / 2))?;
             bound += &parameter.nominal * factor;
-            let variable = if self.certificate.symmetric { end / 2 } else { end };
+            let variable = if self.certificate.symmetric {
+                end / 2
+            } else {
+                end
+            };
             // A lower end is the nominal value less the variable, an upper one that and more.
-            factors[variable] += &if end % 2 == 0 { factor.clone() } else { -factor };
+            factors[variable] += &if end % 2 == 0 {
+                factor.clone()
+            } else {
+                -factor
+            };
         }
         Ok(Inequality { factors, bound })
     }

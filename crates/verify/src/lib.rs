@@ -29,7 +29,7 @@ pub mod row;
 pub use answer::{AnswerError, verify_answer};
 pub use bounds::Ends;
 pub use certificate::{
-    Case, Certificate, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter, Part, Proof,
-    Reasons, Source, Stopped, Sum, Term, Total, Way,
+    Case, Certificate, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter, Part,
+    Proof, Reasons, Source, Stopped, Sum, Term, Total, Way,
 };
 pub use check::{Flaw, Verified, added_up, verify};

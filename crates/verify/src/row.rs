@@ -123,9 +123,11 @@ impl Reader<'_> {
             match limit {
                 Limit::None => return Err(Flaw::NoLimit),
                 Limit::Number(number) => constant += &number.0 * &Rational::from(sign),
-                Limit::Parameter(parameter) => *counts
-                    .get_mut(*parameter)
-                    .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign,
+                Limit::Parameter(parameter) => {
+                    *counts
+                        .get_mut(*parameter)
+                        .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign
+                }
             }
         }
         let mut sum = Ends::number(constant);

@@ -5,8 +5,8 @@ mod watch;
 
 use std::sync::Arc;
 
-use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Search};
 use elbowroom::answers::RequestError;
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest, Search};
 use elbowroom::envelope as library;
 use elbowroom::plan::parametrize::VarySpec;
 

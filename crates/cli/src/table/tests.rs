@@ -118,9 +118,8 @@ fn the_scale_is_the_least_that_has_room_for_all_ends() {
 
 #[test]
 fn what_may_hardly_deviate_in_one_direction_is_critical() {
-    let is_critical = |nominal: &str, lower: &str, upper: &str| {
-        row("x", "", nominal, lower, upper).is_critical()
-    };
+    let is_critical =
+        |nominal: &str, lower: &str, upper: &str| row("x", "", nominal, lower, upper).is_critical();
     assert!(is_critical("10", "0", "10.9"));
     assert!(!is_critical("10", "9", "11"));
     assert!(is_critical("10", "9.1", "inf"));

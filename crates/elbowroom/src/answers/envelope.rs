@@ -27,8 +27,8 @@ use crate::flow::{self, FlowError};
 use crate::{AnyPlan, parse_box};
 
 pub use answer::{
-    Chosen, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings, Failing,
-    Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
+    Chosen, Counterexample, EnvelopeAnswer, EnvelopeFinding, EnvelopeFormat, EnvelopeSettings,
+    Failing, Happening, LimitGroup, Makespans, Quantity, QuantityKind, Range, Room, Stop, Widened,
 };
 pub use balance::{Balance, Deviation};
 pub use best::Best;

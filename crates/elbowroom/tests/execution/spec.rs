@@ -53,7 +53,7 @@ fn unusual() -> RunSpec {
                 .expect("a correct test"),
         ],
         guarantee: elbowroom::envelope::Guarantee::Strong,
-        precision: Rational::new(1, 3),
+        precision: Some(Rational::new(1, 3)),
         running: "await".parse().expect("a correct test"),
         planning_time: "measured".parse().expect("a correct test"),
         realtime: Some(Rational::from(10)),
@@ -85,7 +85,7 @@ fn a_member_that_is_missing_or_unknown_is_a_mistake() {
         let mut less = whole.clone();
         less.as_object_mut().expect("an object").remove(member);
         let read = read_back(less);
-        if ["spoiler", "planner_time"].contains(&member.as_str()) {
+        if ["spoiler", "planner_time", "precision"].contains(&member.as_str()) {
             assert!(read.is_ok(), "{member} is left out where it says nothing");
         } else {
             let wrong = read.expect_err(member);

@@ -5,8 +5,8 @@ mod example;
 use std::fmt::Write as _;
 
 use elbowroom::answers::envelope::{
-    Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome, EnvelopeRequest,
-    Failing, Foresight, Makespans, QuantityKind, Range, Relax, Room, Stop, Worth,
+    Balance, Best, Chosen, Conditions, Deviation, EnvelopeFinding, EnvelopeOutcome,
+    EnvelopeRequest, Failing, Foresight, Makespans, QuantityKind, Range, Relax, Room, Stop, Worth,
 };
 
 use elbowroom::envelope::Objective;
@@ -393,7 +393,10 @@ fn gained(best: &Best) -> Option<String> {
     let gain = |worth: &Worth| match best.objective {
         Objective::LeastSlack => {
             let percent = &worth.gain * &Rational::from(100);
-            format!("{} % of least deviation", number::rounded(&percent, 2, Rounding::Down))
+            format!(
+                "{} % of least deviation",
+                number::rounded(&percent, 2, Rounding::Down)
+            )
         }
         _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
     };

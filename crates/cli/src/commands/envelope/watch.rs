@@ -78,7 +78,9 @@ impl Watch {
             match receiver.recv_timeout(TICK) {
                 Ok(answer) => return answer,
                 // A thread that is gone without an answer has panicked, which has ended the program.
-                Err(RecvTimeoutError::Disconnected) => return envelope(request, &mut self.stopwatch),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return envelope(request, &mut self.stopwatch);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let elapsed = self.stopwatch.elapsed();

@@ -79,7 +79,11 @@ pub(super) fn best(
         && !run.is_cancelled
         && (run.is_proved || matches!(run.proof.reasons, Reasons::Tree(_)));
     let best = Best {
-        worth: if run.is_proved { worths(subject, &run.proof) } else { Vec::new() },
+        worth: if run.is_proved {
+            worths(subject, &run.proof)
+        } else {
+            Vec::new()
+        },
         certificate: has_certificate
             .then(|| certificate(subject, settings, &run.proof))
             .flatten(),

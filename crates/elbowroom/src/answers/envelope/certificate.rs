@@ -46,12 +46,18 @@ pub(super) fn certificate(
     let is_used = used_limits(&reasons, proof.variables.len());
     let limit = |side: Side, parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter && end.side == side;
-        let variable = proof.variables.iter().position(|own| own.ends.iter().any(moves))?;
+        let variable = proof
+            .variables
+            .iter()
+            .position(|own| own.ends.iter().any(moves))?;
         is_used[variable].then(|| Exact(proof.variables[variable].most.clone()))
     };
     let scale = |parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter;
-        let own = proof.variables.iter().find(|own| own.ends.iter().any(moves))?;
+        let own = proof
+            .variables
+            .iter()
+            .find(|own| own.ends.iter().any(moves))?;
         Some(own.scale.clone())
     };
     let parameters = plan.parameters.iter().enumerate().map(|(index, own)| {
@@ -73,11 +79,19 @@ pub(super) fn certificate(
             _ => return None,
         },
         parameters: parameters.collect::<Option<_>>()?,
-        points: plan.plan.nodes().map(|(node, _)| plan.plan.node_label(node)).collect(),
+        points: plan
+            .plan
+            .nodes()
+            .map(|(node, _)| plan.plan.node_label(node))
+            .collect(),
         constraints,
         symmetric: settings.symmetric,
         counted: settings.most.clone(),
-        slacks: proof.variables.iter().map(|own| Exact(own.value.clone())).collect(),
+        slacks: proof
+            .variables
+            .iter()
+            .map(|own| Exact(own.value.clone()))
+            .collect(),
         proofs,
         reasons,
     };
