@@ -169,8 +169,8 @@ pub struct Way {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Part {
-    /// A point comes at time 0 or later: from there to time zero.
-    Beginning,
+    /// This point comes at time 0 or later: from there to time zero.
+    Beginning(usize),
     /// The lower bound of the constraint at this position: from its `to` to its `from`.
     Least(usize),
     /// The upper bound of the constraint at this position: from its `from` to its `to`.

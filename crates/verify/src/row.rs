@@ -69,29 +69,29 @@ impl Reader<'_> {
         }
     }
 
-    /// Where a part of a way leads from and to; a beginning leads from anywhere.
-    fn points(&self, part: &Part) -> Result<(Option<usize>, usize), Flaw> {
+    /// Where a part of a way leads from and to.
+    fn points(&self, part: &Part) -> Result<(usize, usize), Flaw> {
         Ok(match part {
-            Part::Beginning => (None, 0),
+            Part::Beginning(point) => (*point, 0),
             Part::Least(index) | Part::Late(index) => {
                 let constraint = self.constraint(*index)?;
-                (Some(constraint.to), constraint.from)
+                (constraint.to, constraint.from)
             }
             Part::Most(index) | Part::Early(index) => {
                 let constraint = self.constraint(*index)?;
-                (Some(constraint.from), constraint.to)
+                (constraint.from, constraint.to)
             }
             Part::Way(way) => self.ends_of(&way.parts)?,
         })
     }
 
     /// Where parts lead from and to, each from where the one before ends.
-    fn ends_of(&self, parts: &[Part]) -> Result<(Option<usize>, usize), Flaw> {
+    fn ends_of(&self, parts: &[Part]) -> Result<(usize, usize), Flaw> {
         let first = parts.first().ok_or(Flaw::Empty)?;
         let (begin, mut at) = self.points(first)?;
         for part in &parts[1..] {
             let (from, to) = self.points(part)?;
-            if from.is_some_and(|from| from != at) {
+            if from != at {
                 return Err(Flaw::Broken);
             }
             at = to;
@@ -101,10 +101,8 @@ impl Reader<'_> {
 
     /// That parts lead back to where they begin.
     fn is_circle(&self, parts: &[Part]) -> Result<(), Flaw> {
-        match self.ends_of(parts)? {
-            (Some(begin), end) if begin != end => Err(Flaw::Broken),
-            _ => Ok(()),
-        }
+        let (begin, end) = self.ends_of(parts)?;
+        (begin == end).then_some(()).ok_or(Flaw::Broken)
     }
 
     /// The sum of a cycle at the worst values: each parameter counts with one sign in all.
@@ -115,7 +113,7 @@ impl Reader<'_> {
         let mut constant = Rational::ZERO;
         for part in parts {
             let (limit, sign) = match part {
-                Part::Beginning => continue,
+                Part::Beginning(_) => continue,
                 Part::Least(index) => (&self.constraint(*index)?.lower, -1),
                 Part::Most(index) => (&self.constraint(*index)?.upper, 1),
                 Part::Early(_) | Part::Late(_) | Part::Way(_) => return Err(Flaw::Rule),
@@ -145,7 +143,7 @@ impl Reader<'_> {
     /// A bound that has to be kept whatever its parameter is.
     fn requirement(&self, part: &Part) -> Result<Ends, Flaw> {
         let (index, is_most) = match part {
-            Part::Beginning => return Ok(Ends::default()),
+            Part::Beginning(_) => return Ok(Ends::default()),
             Part::Least(index) => (*index, false),
             Part::Most(index) => (*index, true),
             _ => return Err(Flaw::Rule),
@@ -192,19 +190,12 @@ impl Reader<'_> {
     /// durations between them and the points that it is about.
     fn fixed(&self, parts: &[Part]) -> Result<Ends, Flaw> {
         let mut sum = Ends::default();
-        let mut way: Option<(Option<usize>, usize)> = None;
+        let mut way: Option<(usize, usize)> = None;
         for part in parts {
             sum = sum.plus(&self.requirement(part)?);
             let (from, to) = self.points(part)?;
             let (to_root, to_links) = self.chain(to)?;
-            let (from_root, from_links) = match from {
-                Some(from) => {
-                    let (root, links) = self.chain(from)?;
-                    (Some(root), links)
-                }
-                // Whatever point it is that comes at 0 or later: one that the executor chooses.
-                None => (None, Vec::new()),
-            };
+            let (from_root, from_links) = self.chain(from)?;
             let shared = from_links
                 .iter()
                 .zip(&to_links)
@@ -218,15 +209,13 @@ impl Reader<'_> {
             }
             way = match way {
                 None => Some((from_root, to_root)),
-                Some((begin, at)) if from_root.is_none_or(|from| from == at) => {
-                    Some((begin, to_root))
-                }
+                Some((begin, at)) if from_root == at => Some((begin, to_root)),
                 Some(_) => return Err(Flaw::Broken),
             };
         }
         match way {
             None => Err(Flaw::Empty),
-            Some((Some(begin), end)) if begin != end => Err(Flaw::Broken),
+            Some((begin, end)) if begin != end => Err(Flaw::Broken),
             Some(_) => Ok(sum),
         }
     }

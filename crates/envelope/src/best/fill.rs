@@ -76,6 +76,11 @@ pub(super) fn fill(
         .map(|(s, w)| s * w)
         .collect();
     let value = slacks.iter().min().cloned().unwrap_or_default();
+    // The least slack is no more than any variable can have at all.
+    let far = variables.most.iter().zip(&variables.scales);
+    let far = far.filter_map(|(most, scale)| most.checked_div(scale)).min();
+    let bound = bound.unwrap_or_default();
+    let bound = far.map_or(bound.clone(), |far| far.min(bound));
     let levels = fill.order.iter().map(|&variable| Stopped {
         ends: variables.ends[variable].clone(),
         slack: slacks[variable].clone(),
@@ -83,7 +88,7 @@ pub(super) fn fill(
     });
     Ok(BestRun {
         envelope: Ok(variables.envelope(plan, &values)),
-        bound: bound.unwrap_or_default().max(value.clone()),
+        bound: bound.max(value.clone()),
         value,
         is_proved: fill.is_proved && !fill.is_cancelled,
         checks: 0,

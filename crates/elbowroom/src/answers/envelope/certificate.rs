@@ -42,7 +42,11 @@ pub(super) fn certificate(
     let mut proofs: Vec<Proof> = proofs
         .map(|&cut| proof_of(subject, &proof.cuts[cut]))
         .collect();
-    let constraints = used_constraints(constraints(plan, guarantee), &mut proofs);
+    let constraints = constraints(plan, guarantee);
+    for proof in &mut proofs {
+        begin(proof, &constraints);
+    }
+    let constraints = used_constraints(constraints, &mut proofs);
     let is_used = used_limits(&reasons, proof.variables.len());
     let limit = |side: Side, parameter: usize| {
         let moves = |end: &BoxEnd| end.parameter.index() == parameter && end.side == side;
@@ -122,10 +126,12 @@ fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
     is_used
 }
 
-/// Those constraints that proofs are about; the proofs get their new positions. A proof about times
+/// Those constraints that proofs are about, without numbers that no proof uses; the proofs get their
+/// new positions. A proof about times
 /// that are fixed in advance is also about all durations that are not.
 fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constraint> {
     let mut is_used = vec![false; all.len()];
+    let mut sides = vec![[false; 2]; all.len()];
     for proof in proofs.iter_mut() {
         if matches!(proof, Proof::Fixed(_)) {
             let observed = all.iter().map(|constraint| constraint.observed);
@@ -133,24 +139,100 @@ fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constrain
                 *is_used |= is_observed;
             }
         }
-        each_constraint(proof, &mut |index| is_used[*index] = true);
+        each_constraint(proof, &mut |index, _| is_used[*index] = true);
+        each_constraint(proof, &mut |index, side| sides[*index][side.index()] = true);
     }
     let mut places = vec![0; all.len()];
     let mut used = Vec::new();
-    for (index, constraint) in all.into_iter().enumerate() {
+    for (index, mut constraint) in all.into_iter().enumerate() {
         if is_used[index] {
             places[index] = used.len();
+            let [is_lower, is_upper] = sides[index];
+            for (limit, is_used) in [
+                (&mut constraint.lower, is_lower),
+                (&mut constraint.upper, is_upper),
+            ] {
+                if !is_used && !constraint.observed {
+                    *limit = Limit::None;
+                }
+            }
             used.push(constraint);
         }
     }
     for proof in proofs {
-        each_constraint(proof, &mut |index| *index = places[*index]);
+        each_constraint(proof, &mut |index, _| *index = places[*index]);
     }
     used
 }
 
-/// Visits the positions of constraints in a proof.
-fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize)) {
+/// Fills in which points come at 0 or later: those at which what comes before ends.
+fn begin(proof: &mut Proof, constraints: &[Constraint]) {
+    match proof {
+        Proof::Cycle(parts) => {
+            let last = parts.last().map_or(0, |part| end_of(part, constraints));
+            begin_parts(parts, last, constraints);
+        }
+        Proof::Fixed(parts) => {
+            // The point that the executor chooses, and from which the time of this one counts.
+            let root = |mut point: usize| {
+                let ending = |point: usize| {
+                    let ends = |own: &&Constraint| own.observed && own.to == point;
+                    constraints.iter().find(ends)
+                };
+                while let Some(link) = ending(point) {
+                    point = link.from;
+                }
+                point
+            };
+            let mut at = parts.last().map_or(0, |part| end_of(part, constraints));
+            for part in parts {
+                if let Part::Beginning(point) = part {
+                    *point = root(at);
+                }
+                at = end_of(part, constraints);
+            }
+        }
+        Proof::Semireducible(ways) => {
+            let last = ways.last().and_then(|way| way.parts.last());
+            let mut at = last.map_or(0, |part| end_of(part, constraints));
+            for way in ways {
+                at = begin_parts(&mut way.parts, at, constraints);
+            }
+        }
+        Proof::Assumed { .. } => {}
+    }
+}
+
+/// The same of parts that begin at a point; the point at which they end.
+fn begin_parts(parts: &mut [Part], mut at: usize, constraints: &[Constraint]) -> usize {
+    for part in parts {
+        match part {
+            Part::Beginning(point) => *point = at,
+            Part::Way(way) => {
+                begin_parts(&mut way.parts, at, constraints);
+            }
+            _ => {}
+        }
+        at = end_of(part, constraints);
+    }
+    at
+}
+
+/// Where a part of a proof leads to.
+fn end_of(part: &Part, constraints: &[Constraint]) -> usize {
+    match part {
+        Part::Beginning(_) => 0,
+        Part::Least(index) | Part::Late(index) => constraints[*index].from,
+        Part::Most(index) | Part::Early(index) => constraints[*index].to,
+        Part::Way(way) => way
+            .parts
+            .last()
+            .map_or(0, |part| end_of(part, constraints)),
+    }
+}
+
+/// Visits the positions of constraints in a proof, with the bound that is used.
+fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize, Side)) {
     match proof {
         Proof::Cycle(parts) | Proof::Fixed(parts) => each_in_parts(parts, visit),
         Proof::Semireducible(ways) => {
@@ -162,20 +244,19 @@ fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize)) {
     }
 }
 
-fn each_in_way(way: &mut Way, visit: &mut dyn FnMut(&mut usize)) {
+fn each_in_way(way: &mut Way, visit: &mut dyn FnMut(&mut usize, Side)) {
     each_in_parts(&mut way.parts, visit);
     if let Some(index) = &mut way.unlabelled {
-        visit(index);
+        visit(index, Side::Lower);
     }
 }
 
-fn each_in_parts(parts: &mut [Part], visit: &mut dyn FnMut(&mut usize)) {
+fn each_in_parts(parts: &mut [Part], visit: &mut dyn FnMut(&mut usize, Side)) {
     for part in parts {
         match part {
-            Part::Beginning => {}
-            Part::Least(index) | Part::Most(index) | Part::Early(index) | Part::Late(index) => {
-                visit(index);
-            }
+            Part::Beginning(_) => {}
+            Part::Least(index) | Part::Early(index) => visit(index, Side::Lower),
+            Part::Most(index) | Part::Late(index) => visit(index, Side::Upper),
             Part::Way(way) => each_in_way(way, visit),
         }
     }
@@ -286,7 +367,8 @@ fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
 
 fn bound(origin: &Origin) -> Part {
     match *origin {
-        Origin::Beginning => Part::Beginning,
+        // Which point it is follows from what comes before it.
+        Origin::Beginning => Part::Beginning(0),
         Origin::AtLeast(index) => Part::Least(index),
         Origin::AtMost(index) => Part::Most(index),
     }
