@@ -108,7 +108,12 @@ pub enum Proof {
     /// The same for times that are fixed in advance.
     Fixed(Vec<Part>),
     /// A semi-reducible cycle, for an executor that learns the values as they come about.
-    Semireducible(Vec<Way>),
+    Semireducible {
+        /// All ways that it consists of; the parts of each mention only earlier ones.
+        ways: Vec<Way>,
+        /// The cycle: ways by position, each of which begins where the one before ends.
+        cycle: Vec<usize>,
+    },
     /// No proof from the network: one of these sums is not negative because of something that the
     /// network does not show.
     Assumed {
@@ -180,8 +185,9 @@ pub enum Part {
     Early(usize),
     /// It is the longest: from its `to` to its `from`.
     Late(usize),
-    /// A way that counts as one bound.
-    Way(Way),
+    /// The way at this position, which counts as one bound. (Not the way itself: they are nested as
+    /// deeply as a proof is long.)
+    Way(usize),
 }
 
 /// How it follows from the inequalities that no box is better.

@@ -72,6 +72,9 @@ pub enum Flaw {
     /// A variable is stopped never, or twice.
     #[error("variable {0} is to be stopped exactly once")]
     Stopped(usize),
+    /// Ways are no tree.
+    #[error("way {0} is mentioned twice, or before it is told")]
+    NoTree(usize),
     /// Cases are no tree.
     #[error("case {0} is reached never or twice")]
     Tree(usize),

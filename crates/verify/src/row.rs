@@ -14,16 +14,21 @@ const MOST_SUMS: usize = 256;
 /// # Errors
 /// When the proof proves nothing of the kind.
 pub fn sums(certificate: &Certificate, proof: &Proof) -> Result<Vec<Ends>, Flaw> {
-    let reader = Reader { certificate };
+    let reader = Reader {
+        certificate,
+        ways: &[],
+    };
     let mut sums = match proof {
         Proof::Cycle(parts) => vec![reader.cycle(parts)?],
         Proof::Fixed(parts) if certificate.guarantee == Guarantee::Strong => {
             vec![reader.fixed(parts)?]
         }
-        Proof::Semireducible(ways) if certificate.guarantee != Guarantee::Weak => {
-            reader.semireducible(ways)?
+        Proof::Semireducible { ways, cycle } if certificate.guarantee != Guarantee::Weak => {
+            let reader = Reader { certificate, ways };
+            reader.is_tree(cycle)?;
+            reader.semireducible(cycle)?
         }
-        Proof::Fixed(_) | Proof::Semireducible(_) => return Err(Flaw::WrongGuarantee),
+        Proof::Fixed(_) | Proof::Semireducible { .. } => return Err(Flaw::WrongGuarantee),
         Proof::Assumed { sums, .. } => sums.iter().map(stated).collect(),
     };
     // Each once, so that alternatives have their positions.
@@ -48,9 +53,33 @@ fn stated(sum: &Sum) -> Ends {
 
 struct Reader<'a> {
     certificate: &'a Certificate,
+    /// What parts of the proof mention by position.
+    ways: &'a [Way],
 }
 
 impl Reader<'_> {
+    fn way(&self, index: usize) -> Result<&Way, Flaw> {
+        self.ways.get(index).ok_or(Flaw::NoSuch("way", index))
+    }
+
+    /// That each way is mentioned once, by the cycle or by a later way.
+    fn is_tree(&self, cycle: &[usize]) -> Result<(), Flaw> {
+        let mut is_mentioned = vec![false; self.ways.len()];
+        let inner = self.ways.iter().enumerate().flat_map(|(place, way)| {
+            way.parts.iter().filter_map(move |part| match part {
+                Part::Way(index) => Some((*index, place)),
+                _ => None,
+            })
+        });
+        let outer = cycle.iter().map(|&index| (index, self.ways.len()));
+        for (index, place) in inner.chain(outer) {
+            if index >= place || std::mem::replace(&mut is_mentioned[index], true) {
+                return Err(Flaw::NoTree(index));
+            }
+        }
+        Ok(())
+    }
+
     fn constraint(&self, index: usize) -> Result<&Constraint, Flaw> {
         let constraint = self.certificate.constraints.get(index);
         constraint.ok_or(Flaw::NoSuch("constraint", index))
@@ -81,7 +110,7 @@ impl Reader<'_> {
                 let constraint = self.constraint(*index)?;
                 (constraint.from, constraint.to)
             }
-            Part::Way(way) => self.ends_of(&way.parts)?,
+            Part::Way(way) => self.ends_of(&self.way(*way)?.parts)?,
         })
     }
 
@@ -221,13 +250,14 @@ impl Reader<'_> {
     }
 
     /// Sums of a semi-reducible cycle: its own, and those of what has to be negative for it to be one.
-    fn semireducible(&self, ways: &[Way]) -> Result<Vec<Ends>, Flaw> {
-        let parts: Vec<Part> = ways.iter().cloned().map(Part::Way).collect();
+    fn semireducible(&self, cycle: &[usize]) -> Result<Vec<Ends>, Flaw> {
+        let parts: Vec<Part> = cycle.iter().copied().map(Part::Way).collect();
         self.is_circle(&parts)?;
         let mut legal = Vec::new();
         let mut total = vec![Ends::default()];
         let mut flat = Ends::default();
-        for way in ways {
+        for &way in cycle {
+            let way = self.way(way)?;
             if way.unlabelled.is_some() {
                 return Err(Flaw::Rule);
             }
@@ -250,7 +280,7 @@ impl Reader<'_> {
             sum = sum.plus(&match part {
                 Part::Early(index) => Ends::end(2 * self.observed(*index)?.1, 1),
                 Part::Late(index) => Ends::end(2 * self.observed(*index)?.1 + 1, -1),
-                Part::Way(way) => self.flat(way)?,
+                Part::Way(way) => self.flat(self.way(*way)?)?,
                 requirement => self.requirement(requirement)?,
             });
         }
@@ -279,6 +309,7 @@ impl Reader<'_> {
                 }
                 Part::Early(_) | Part::Late(_) => return Err(Flaw::Rule),
                 Part::Way(inner) => {
+                    let inner = self.way(*inner)?;
                     let ends_late = matches!(inner.parts.last(), Some(Part::Late(_)));
                     if ends_late && inner.unlabelled.is_none() {
                         return Err(Flaw::Rule);

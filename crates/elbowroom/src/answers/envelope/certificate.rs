@@ -169,8 +169,8 @@ fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constrain
 fn begin(proof: &mut Proof, constraints: &[Constraint]) {
     match proof {
         Proof::Cycle(parts) => {
-            let last = parts.last().map_or(0, |part| end_of(part, constraints));
-            begin_parts(parts, last, constraints);
+            let last = parts.last().map_or(0, |part| end_of(part, &[], constraints));
+            begin_parts(parts, last, &[], constraints);
         }
         Proof::Fixed(parts) => {
             // The point that the executor chooses, and from which the time of this one counts.
@@ -184,50 +184,63 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
                 }
                 point
             };
-            let mut at = parts.last().map_or(0, |part| end_of(part, constraints));
+            let mut at = parts.last().map_or(0, |part| end_of(part, &[], constraints));
             for part in parts {
                 if let Part::Beginning(point) = part {
                     *point = root(at);
                 }
-                at = end_of(part, constraints);
+                at = end_of(part, &[], constraints);
             }
         }
-        Proof::Semireducible(ways) => {
-            let last = ways.last().and_then(|way| way.parts.last());
-            let mut at = last.map_or(0, |part| end_of(part, constraints));
-            for way in ways {
-                at = begin_parts(&mut way.parts, at, constraints);
+        Proof::Semireducible { ways, cycle } => {
+            let mut at = cycle.last().map_or(0, |way| end_of(&Part::Way(*way), ways, constraints));
+            // Where each way begins, the later ones first, as these mention earlier ones.
+            let mut begins = vec![0; ways.len()];
+            for &way in cycle.iter() {
+                begins[way] = at;
+                at = end_of(&Part::Way(way), ways, constraints);
+            }
+            for place in (0..ways.len()).rev() {
+                let (earlier, own) = ways.split_at_mut(place);
+                let mentioned = begin_parts(&mut own[0].parts, begins[place], earlier, constraints);
+                for (way, at) in mentioned {
+                    begins[way] = at;
+                }
             }
         }
         Proof::Assumed { .. } => {}
     }
 }
 
-/// The same of parts that begin at a point; the point at which they end.
-fn begin_parts(parts: &mut [Part], mut at: usize, constraints: &[Constraint]) -> usize {
+/// The same of parts that begin at a point; where the ways that they mention begin.
+fn begin_parts(
+    parts: &mut [Part],
+    mut at: usize,
+    ways: &[Way],
+    constraints: &[Constraint],
+) -> Vec<(usize, usize)> {
+    let mut mentioned = Vec::new();
     for part in parts {
         match part {
             Part::Beginning(point) => *point = at,
-            Part::Way(way) => {
-                begin_parts(&mut way.parts, at, constraints);
-            }
+            Part::Way(way) => mentioned.push((*way, at)),
             _ => {}
         }
-        at = end_of(part, constraints);
+        at = end_of(part, ways, constraints);
     }
-    at
+    mentioned
 }
 
 /// Where a part of a proof leads to.
-fn end_of(part: &Part, constraints: &[Constraint]) -> usize {
+fn end_of(part: &Part, ways: &[Way], constraints: &[Constraint]) -> usize {
     match part {
         Part::Beginning(_) => 0,
         Part::Least(index) | Part::Late(index) => constraints[*index].from,
         Part::Most(index) | Part::Early(index) => constraints[*index].to,
-        Part::Way(way) => way
+        Part::Way(way) => ways[*way]
             .parts
             .last()
-            .map_or(0, |part| end_of(part, constraints)),
+            .map_or(0, |part| end_of(part, ways, constraints)),
     }
 }
 
@@ -235,29 +248,24 @@ fn end_of(part: &Part, constraints: &[Constraint]) -> usize {
 fn each_constraint(proof: &mut Proof, visit: &mut dyn FnMut(&mut usize, Side)) {
     match proof {
         Proof::Cycle(parts) | Proof::Fixed(parts) => each_in_parts(parts, visit),
-        Proof::Semireducible(ways) => {
+        Proof::Semireducible { ways, .. } => {
             for way in ways {
-                each_in_way(way, visit);
+                each_in_parts(&mut way.parts, visit);
+                if let Some(index) = &mut way.unlabelled {
+                    visit(index, Side::Lower);
+                }
             }
         }
         Proof::Assumed { .. } => {}
     }
 }
 
-fn each_in_way(way: &mut Way, visit: &mut dyn FnMut(&mut usize, Side)) {
-    each_in_parts(&mut way.parts, visit);
-    if let Some(index) = &mut way.unlabelled {
-        visit(index, Side::Lower);
-    }
-}
-
 fn each_in_parts(parts: &mut [Part], visit: &mut dyn FnMut(&mut usize, Side)) {
     for part in parts {
         match part {
-            Part::Beginning(_) => {}
+            Part::Beginning(_) | Part::Way(_) => {}
             Part::Least(index) | Part::Early(index) => visit(index, Side::Lower),
             Part::Most(index) | Part::Late(index) => visit(index, Side::Upper),
-            Part::Way(way) => each_in_way(way, visit),
         }
     }
 }
@@ -349,11 +357,17 @@ fn proof_of(subject: &Subject<'_>, cut: &Cut) -> Proof {
         Ground::Fixed(parts) => Proof::Fixed(
             parts
                 .iter()
-                .filter(|part| matches!(part, ProofPart::Bound(_)))
-                .map(part)
+                .filter_map(|part| match part {
+                    ProofPart::Bound(origin) => Some(bound(origin)),
+                    _ => None,
+                })
                 .collect(),
         ),
-        Ground::Semireducible(ways) => Proof::Semireducible(ways.iter().map(way).collect()),
+        Ground::Semireducible(cycle) => {
+            let mut ways = Vec::new();
+            let cycle = cycle.iter().map(|way| told(way, &mut ways)).collect();
+            Proof::Semireducible { ways, cycle }
+        }
         Ground::Condition(broken) => Proof::Assumed {
             why: subject.explainer.requirement(&broken.requirement),
             sums: sums(cut),
@@ -374,20 +388,24 @@ fn bound(origin: &Origin) -> Part {
     }
 }
 
-fn part(part: &ProofPart) -> Part {
+/// A part of a way, after those ways that it mentions.
+fn part(part: &ProofPart, ways: &mut Vec<Way>) -> Part {
     match part {
         ProofPart::Bound(origin) => bound(origin),
         ProofPart::Early(index) => Part::Early(*index),
         ProofPart::Late(index) => Part::Late(*index),
-        ProofPart::Way(inner) => Part::Way(way(inner)),
+        ProofPart::Way(inner) => Part::Way(told(inner, ways)),
     }
 }
 
-fn way(way: &ProofWay) -> Way {
-    Way {
-        parts: way.parts.iter().map(part).collect(),
+/// Appends a way, and before it those that it mentions; its position.
+fn told(way: &ProofWay, ways: &mut Vec<Way>) -> usize {
+    let parts = way.parts.iter().map(|inner| part(inner, ways)).collect();
+    ways.push(Way {
+        parts,
         unlabelled: way.unlabelled,
-    }
+    });
+    ways.len() - 1
 }
 
 /// The rows of a cut as sums that are not negative.
