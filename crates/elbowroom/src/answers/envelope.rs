@@ -240,6 +240,7 @@ pub fn so_far(
         best: None,
         conditions: Conditions::default(),
         foresight: None,
+        inequalities: None,
         timeline: None,
         makespans: None,
     });
