@@ -17,7 +17,7 @@ from elbowroom import _native
 
 
 def test_numbers_are_fractions_and_infinity(problem: elbowroom.Problem, plan: Path) -> None:
-    envelope = problem.envelope(plan, precision=1)
+    envelope = problem.envelope(plan)
     assert [(r.name, r.lower, r.upper) for r in envelope.rows()] == [
         ("dur_0", Fraction(5, 64), 20),
         ("dur_1", 0, Fraction(879, 16)),
