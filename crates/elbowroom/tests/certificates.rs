@@ -10,14 +10,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, envelope};
+use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Relax, envelope};
 use elbowroom::answers::{EnvelopeOutcome, Halt, Unwatched, Watcher};
 use elbowroom::envelope::{BestSettings, Guarantee, Method, Objective};
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl::read_plan;
 use elbowroom::plan::ParametrizedPlan;
-use elbowroom::verify::{AnswerError, verify_answer};
+use elbowroom::verify::{AnswerError, Flaw, verify_answer};
 use elbowroom::{AnyPlan, pddl};
 use serde_json::Value;
 use shared::case::Case;
@@ -113,22 +113,21 @@ fn certificates_of_all_cases_are_accepted() {
     assert!(accepted > 60);
 }
 
-/// The places of all numbers of the certificate, and of those of the answer that it is about.
+/// What the claim is about, in an answer: the box, how good it is, and what no box exceeds.
+const CLAIM: [&str; 5] = [
+    "/parameters",
+    "/best/most",
+    "/best/value",
+    "/best/bound",
+    "/best/certificate",
+];
+
+/// The places of all numbers inside a value; a number's decimal form is for people.
 fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(members) => {
             for (name, member) in members {
-                if ![
-                    "widenings",
-                    "timeline",
-                    "balance",
-                    "foresight",
-                    "decimal",
-                    "settings",
-                    "checks",
-                ]
-                .contains(&name.as_str())
-                {
+                if name != "decimal" {
                     numbers(member, &format!("{path}/{name}"), found);
                 }
             }
@@ -139,7 +138,7 @@ fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
             }
         }
         Value::String(text) if text.parse::<Rational>().is_ok() => found.push(path.to_owned()),
-        Value::Number(_) if path.contains("/certificate/") => found.push(path.to_owned()),
+        Value::Number(_) => found.push(path.to_owned()),
         _ => {}
     }
 }
@@ -172,7 +171,9 @@ fn each_number_that_is_changed_in_turn_makes_a_certificate_refused() {
         let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
         verify_answer(&answer.to_string()).expect("it is right as it is");
         let mut places = Vec::new();
-        numbers(&answer, "", &mut places);
+        for place in CLAIM {
+            numbers(answer.pointer(place).expect("a member"), place, &mut places);
+        }
         assert!(places.len() > 20, "{places:?}");
         for place in places {
             let mut broken = answer.clone();
@@ -186,6 +187,91 @@ fn each_number_that_is_changed_in_turn_makes_a_certificate_refused() {
     }
     assert!(unnoticed.is_empty(), "of {count}: {unnoticed:#?}");
     println!("{count} changed numbers were noticed");
+}
+
+#[test]
+fn durations_that_follow_each_other_in_a_circle_or_end_together_are_refused() {
+    let (task, plan) = case("hatchery");
+    let (guarantee, objective) = (Guarantee::Dynamic, Objective::Widths);
+    let outcome = largest(&task, &plan, guarantee, objective, false);
+    let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
+    let constraints = "/best/certificate/constraints";
+    let all = answer.pointer(constraints).and_then(Value::as_array);
+    let all = all.expect("a list").iter().enumerate();
+    let observed = all.filter(|(_, own)| own["observed"] == true);
+    let places: Vec<usize> = observed.map(|(place, _)| place).collect();
+    let [one, other] = places[..] else {
+        panic!("the brooding and the shot: {answer}");
+    };
+    let with = |changes: &[(usize, &str, usize, &str)]| {
+        let mut broken = answer.clone();
+        for (place, member, source, from) in changes {
+            let value = answer.pointer(&format!("{constraints}/{source}/{from}"));
+            broken.pointer_mut(constraints).expect("a list")[*place][*member] =
+                value.expect("a point").clone();
+        }
+        verify_answer(&broken.to_string())
+    };
+    for changes in [
+        &[(one, "from", other, "to"), (other, "from", one, "to")][..],
+        &[(one, "to", other, "to")],
+        &[(one, "to", one, "from")],
+    ] {
+        let refused = with(changes);
+        assert!(
+            matches!(refused, Err(AnswerError::Flaw(Flaw::NoDuration(_)))),
+            "{changes:?}: {refused:?}"
+        );
+    }
+}
+
+#[test]
+fn a_claim_that_says_more_than_is_proved_is_refused() {
+    let (task, plan) = case("tank");
+    let (guarantee, objective) = (Guarantee::Dynamic, Objective::Widths);
+    let outcome = largest(&task, &plan, guarantee, objective, false);
+    let answer: Value = serde_json::from_str(&written(&outcome)).expect("a document");
+    let verified = verify_answer(&answer.to_string()).expect("it is right as it is");
+    assert_eq!(verified.assumes.len(), 2 + verified.assumed);
+    for place in 0..verified.assumes.len() {
+        let mut bold = answer.clone();
+        let assumes = bold.pointer_mut("/best/certificate/assumes");
+        let assumes = assumes.and_then(Value::as_array_mut).expect("a list");
+        assumes.remove(place);
+        let refused = verify_answer(&bold.to_string());
+        assert!(
+            matches!(refused, Err(AnswerError::Flaw(Flaw::Claim))),
+            "{place}: {refused:?}"
+        );
+    }
+}
+
+#[test]
+fn a_bound_is_worth_what_is_gained_when_it_is_relaxed() {
+    let relaxed = |closing: &str, objective| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/delivery");
+        let text = |file: &str| std::fs::read_to_string(folder.join(file)).expect("a file");
+        let problem = text("problem.pddl").replace("(at 60 ", &format!("(at {closing} "));
+        let domain = pddl::Source::new("domain.pddl", text("domain.pddl"));
+        let read = pddl::read_problem(&domain, &pddl::Source::new("problem.pddl", problem));
+        let task = Arc::new(Task::new(read.expect("no mistakes").0));
+        let plan = pddl::Source::new("plan.plan", text("plan.plan"));
+        let plan = read_plan(&plan, &task).expect("no mistakes").0;
+        let outcome = largest(&task, &plan.into(), Guarantee::Dynamic, objective, false);
+        let EnvelopeFinding::Envelope { best, .. } = outcome.answer.finding else {
+            panic!("an envelope");
+        };
+        best.expect("a largest box")
+    };
+    for objective in OBJECTIVES {
+        // Early enough for the deadline to be what limits the least slack.
+        let (before, after) = (relaxed("35", objective), relaxed("36", objective));
+        assert!(before.is_proved && after.is_proved);
+        let deadline = before.worth.iter().find(|own| own.bound.contains("35"));
+        let deadline = deadline.unwrap_or_else(|| panic!("{:?}", before.worth));
+        assert_eq!(deadline.relax, Relax::More);
+        assert_eq!(after.value - before.value, deadline.gain);
+    }
 }
 
 /// Ends a search after some steps.

@@ -4,7 +4,8 @@ use elbowroom_num::Rational;
 use serde::Deserialize;
 
 use crate::certificate::{Certificate, Guarantee, Reasons};
-use crate::check::{Flaw, Verified, verify};
+use crate::check::{Verified, verify};
+use crate::flaw::Flaw;
 use crate::number;
 
 /// Why nothing can be said of an answer, or what is wrong with it.

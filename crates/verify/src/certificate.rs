@@ -9,6 +9,10 @@ use crate::number;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
+    /// What it proves, in words.
+    pub proves: String,
+    /// What it takes for granted, in words: each is to be known from elsewhere.
+    pub assumes: Vec<String>,
     /// What is guaranteed inside the envelope.
     pub guarantee: Guarantee,
     /// What is left open.

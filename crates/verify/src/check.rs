@@ -6,7 +6,8 @@ use crate::bounds::Ends;
 use crate::certificate::{
     Case, Certificate, Exact, Multiplier, Proof, Reasons, Source, Stopped, Total,
 };
-use crate::row;
+use crate::flaw::Flaw;
+use crate::{claim, network, row};
 
 /// What a certificate proves.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,76 +21,10 @@ pub struct Verified {
     pub proofs: usize,
     /// How many of these are not proved from the network, but taken from the certificate.
     pub assumed: usize,
-}
-
-/// What is wrong with a certificate: the first thing that is found.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Flaw {
-    /// Something is mentioned that does not exist.
-    #[error("there is no {0} {1}")]
-    NoSuch(&'static str, usize),
-    /// A list has another length than what it is about.
-    #[error("there are {found} {what}, but {wanted} are needed")]
-    Count {
-        /// What is counted.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-        /// How many there should be.
-        wanted: usize,
-    },
-    /// A number is out of its range.
-    #[error("{0} {1} is out of range")]
-    Range(&'static str, usize),
-    /// A proof is of a guarantee that is not asked for.
-    #[error("a proof is about another guarantee")]
-    WrongGuarantee,
-    /// A proof uses a duration that the world does not decide on.
-    #[error("constraint {0} is no duration that the world decides on")]
-    NotObserved(usize),
-    /// A proof uses a bound that is not there.
-    #[error("a proof uses a bound that is not there")]
-    NoLimit,
-    /// A proof has no parts.
-    #[error("a proof has no parts")]
-    Empty,
-    /// The parts of a proof do not follow each other.
-    #[error("the parts of a proof do not follow each other in a circle")]
-    Broken,
-    /// A rule is used where it may not be.
-    #[error("a proof uses a rule where it does not apply")]
-    Rule,
-    /// A proof has too many alternatives to be added up.
-    #[error("a proof has too many alternatives")]
-    TooLong,
-    /// Whether a variable is stopped does not follow.
-    #[error("it does not follow that variable {0} can have no more slack")]
-    NotStopped(usize),
-    /// It is said wrongly by how much inequalities are broken.
-    #[error("the inequalities at place {0} of the reasons are not broken by what is said")]
-    Over(usize),
-    /// A variable is stopped never, or twice.
-    #[error("variable {0} is to be stopped exactly once")]
-    Stopped(usize),
-    /// Ways are no tree.
-    #[error("way {0} is mentioned twice, or before it is told")]
-    NoTree(usize),
-    /// Cases are no tree.
-    #[error("case {0} is reached never or twice")]
-    Tree(usize),
-    /// A sum of inequalities is not what it should be.
-    #[error("the inequalities of case {0} do not add up to its bound")]
-    Sum(usize),
-    /// A multiplier is negative.
-    #[error("a multiplier in case {0} is negative")]
-    Negative(usize),
-    /// A case uses an inequality that does not hold in it.
-    #[error("case {0} uses an inequality that does not hold in it")]
-    NotThere(usize),
-    /// The answer says something else than its certificate.
-    #[error("the answer and its certificate differ in {0}")]
-    Differs(String),
+    /// What is proved, in words.
+    pub proves: String,
+    /// What is taken for granted, in words.
+    pub assumes: Vec<String>,
 }
 
 /// `Σ factor · variable <= bound`.
@@ -103,6 +38,11 @@ struct Inequality {
 /// # Errors
 /// The first thing in it that is not so.
 pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
+    let proves = claim::proves(certificate);
+    let assumes = claim::assumes(certificate);
+    if certificate.proves != proves || certificate.assumes != assumes {
+        return Err(Flaw::Claim);
+    }
     let checker = Checker::new(certificate)?;
     let bound = match &certificate.reasons {
         Reasons::LeastSlack(stopped) => checker.least_slack(stopped)?,
@@ -118,11 +58,13 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
         value,
         proofs: certificate.proofs.len(),
         assumed: certificate.proofs.iter().filter(is_assumed).count(),
+        proves: proves.to_owned(),
+        assumes,
     })
 }
 
 /// The certificate with what its inequalities add up to filled in ([`Stopped::over`],
-/// [`Total::bound`]), whatever it says there.
+/// [`Total::bound`]), and with what it proves and assumes, whatever it says there.
 ///
 /// # Errors
 /// When nothing can be added up. Whether the certificate proves anything is not asked.
@@ -153,6 +95,8 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
         }
     }
     certificate.reasons = reasons;
+    certificate.proves = claim::proves(&certificate).to_owned();
+    certificate.assumes = claim::assumes(&certificate);
     Ok(certificate)
 }
 
@@ -169,12 +113,7 @@ struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     fn new(certificate: &'a Certificate) -> Result<Self, Flaw> {
-        for (index, constraint) in certificate.constraints.iter().enumerate() {
-            let points = certificate.points.len();
-            if constraint.from >= points || constraint.to >= points {
-                return Err(Flaw::Range("constraint", index));
-            }
-        }
+        network::is_well_formed(certificate)?;
         let mut scales = Vec::new();
         let mut most = Vec::new();
         let mut worths = Vec::new();

@@ -23,6 +23,9 @@ mod answer;
 mod bounds;
 mod certificate;
 mod check;
+mod claim;
+mod flaw;
+mod network;
 mod number;
 pub mod row;
 
@@ -32,4 +35,5 @@ pub use certificate::{
     Case, Certificate, Constraint, End, Exact, Guarantee, Limit, Multiplier, Parameter, Part,
     Proof, Reasons, Source, Stopped, Sum, Term, Total, Way,
 };
-pub use check::{Flaw, Verified, added_up, verify};
+pub use check::{Verified, added_up, verify};
+pub use flaw::Flaw;

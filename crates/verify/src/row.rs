@@ -4,7 +4,7 @@ use elbowroom_num::Rational;
 
 use crate::bounds::Ends;
 use crate::certificate::{Certificate, Constraint, End, Guarantee, Limit, Part, Proof, Sum, Way};
-use crate::check::Flaw;
+use crate::flaw::Flaw;
 
 /// The limit on the sums of one proof.
 const MOST_SUMS: usize = 256;
@@ -197,7 +197,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The durations between a point and the one, chosen by the executor, from which they count.
+    /// The durations between a point and the one, chosen by the executor, from which they count. There
+    /// is such a point: durations follow each other in no circle ([`crate::network`]).
     fn chain(&self, point: usize) -> Result<(usize, Vec<usize>), Flaw> {
         let mut links = Vec::new();
         let mut root = point;
@@ -207,9 +208,6 @@ impl Reader<'_> {
                 links.reverse();
                 return Ok((root, links));
             };
-            if links.contains(&link) {
-                return Err(Flaw::Broken);
-            }
             links.push(link);
             root = self.constraint(link)?.from;
         }

@@ -51,6 +51,8 @@ fn document(verdict: Result<&Verified, &AnswerError>) -> Value {
             "bound": exact(&verified.bound),
             "proofs": verified.proofs,
             "assumed": verified.assumed,
+            "proves": verified.proves,
+            "assumes": verified.assumes,
         }),
         Err(wrong) => json!({ "proved": false, "reason": wrong.to_string() }),
     };

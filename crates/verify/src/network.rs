@@ -1,0 +1,40 @@
+//! That a certificate's constraints are a network with durations that the world decides on.
+
+use crate::certificate::{Certificate, Constraint};
+use crate::flaw::Flaw;
+
+/// Checks that constraints are about points that there are, and that observed ones are durations:
+/// each leads to a point of its own, not to time zero, and they follow each other in no circle. The theorems
+/// about such networks take that for granted.
+///
+/// # Errors
+/// The first constraint that is not so.
+pub(crate) fn is_well_formed(certificate: &Certificate) -> Result<(), Flaw> {
+    let points = certificate.points.len();
+    // Of each point the observed constraint that ends there.
+    let mut ended_by: Vec<Option<usize>> = vec![None; points];
+    for (index, constraint) in certificate.constraints.iter().enumerate() {
+        let &Constraint { from, to, .. } = constraint;
+        if from >= points || to >= points {
+            return Err(Flaw::Range("constraint", index));
+        }
+        if constraint.observed && (to == 0 || ended_by[to].replace(index).is_some()) {
+            return Err(Flaw::NoDuration(index));
+        }
+    }
+    for (index, constraint) in certificate.constraints.iter().enumerate() {
+        if !constraint.observed {
+            continue;
+        }
+        let mut point = constraint.from;
+        let mut before = 0;
+        while let Some(earlier) = ended_by[point] {
+            before += 1;
+            if before > points {
+                return Err(Flaw::NoDuration(index));
+            }
+            point = certificate.constraints[earlier].from;
+        }
+    }
+    Ok(())
+}
