@@ -62,7 +62,9 @@ fn assert_stored<T: Serialize + DeserializeOwned>(answer: &T) -> String {
 fn answers_can_be_stored_and_read_again() {
     for case in CASES {
         let (task, plan) = read(case);
-        let request = EnvelopeRequest::new(&task, plan.clone());
+        let mut request = EnvelopeRequest::new(&task, plan.clone());
+        // In some cases the domain leaves all durations to the executor.
+        request.vary = vec!["durations".parse().expect("a specification")];
         let found = asked(&request);
         assert_stored(&found.answer);
         let opened = found.plan.expect("a valid plan");

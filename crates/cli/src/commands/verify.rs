@@ -72,19 +72,22 @@ fn proven(name: &str, verified: &Verified, look: Look) -> String {
         format!("No box inside the envelope has more than {bound}; this one has {value}.")
     };
     push_wrapped(&mut text, &claim, 2, look.width);
-    let proofs = match verified.proofs {
-        1 => "1 inequality".to_owned(),
-        proofs => format!("{proofs} inequalities"),
-    };
     let assumed = match verified.assumed {
         0 => String::new(),
         assumed => format!(
             ", but for {assumed} about conditions on numbers, which the certificate only states"
         ),
     };
-    let how = format!(
-        "It follows from {proofs}, each added up from bounds of the plan's network{assumed}."
-    );
+    let how = match verified.proofs {
+        0 => "Each end is as far out as counts.".to_owned(),
+        1 => format!(
+            "It follows from 1 inequality, added up from bounds of the plan's network{assumed}."
+        ),
+        proofs => format!(
+            "It follows from {proofs} inequalities, each added up from bounds of the plan's \
+             network{assumed}."
+        ),
+    };
     push_wrapped(&mut text, &how, 2, look.width);
     let rest = "That the network is that of the plan, and that the box is inside, is not part of the \
                 certificate: `elbowroom envelope … --contains` checks the box.";
