@@ -12,5 +12,5 @@ pub(crate) mod run;
 pub(crate) mod shell;
 pub(crate) mod stn;
 pub(crate) mod val;
-pub(crate) mod world_check;
 pub(crate) mod verify;
+pub(crate) mod world_check;

@@ -78,7 +78,9 @@ pub(super) fn fill(
     let value = slacks.iter().min().cloned().unwrap_or_default();
     // The least slack is no more than any variable can have at all.
     let far = variables.most.iter().zip(&variables.scales);
-    let far = far.filter_map(|(most, scale)| most.checked_div(scale)).min();
+    let far = far
+        .filter_map(|(most, scale)| most.checked_div(scale))
+        .min();
     let bound = bound.unwrap_or_default();
     let bound = far.map_or(bound.clone(), |far| far.min(bound));
     let levels = fill.order.iter().map(|&variable| Stopped {

@@ -172,7 +172,9 @@ fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constrain
 fn begin(proof: &mut Proof, constraints: &[Constraint]) {
     match proof {
         Proof::Cycle(parts) => {
-            let last = parts.last().map_or(0, |part| end_of(part, &[], constraints));
+            let last = parts
+                .last()
+                .map_or(0, |part| end_of(part, &[], constraints));
             begin_parts(parts, last, &[], constraints);
         }
         Proof::Fixed(parts) => {
@@ -187,7 +189,9 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
                 }
                 point
             };
-            let mut at = parts.last().map_or(0, |part| end_of(part, &[], constraints));
+            let mut at = parts
+                .last()
+                .map_or(0, |part| end_of(part, &[], constraints));
             for part in parts {
                 if let Part::Beginning(point) = part {
                     *point = root(at);
@@ -196,7 +200,9 @@ fn begin(proof: &mut Proof, constraints: &[Constraint]) {
             }
         }
         Proof::Semireducible { ways, cycle } => {
-            let mut at = cycle.last().map_or(0, |way| end_of(&Part::Way(*way), ways, constraints));
+            let mut at = cycle
+                .last()
+                .map_or(0, |way| end_of(&Part::Way(*way), ways, constraints));
             // Where each way begins, the later ones first, as these mention earlier ones.
             let mut begins = vec![0; ways.len()];
             for &way in cycle.iter() {
