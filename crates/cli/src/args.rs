@@ -153,7 +153,8 @@ pub(crate) struct ValArgs {
     #[arg(short, long)]
     pub(crate) verbose: bool,
     /// Times closer than this count as equal; VAL's own default is 0.01
-    #[arg(short, long, value_name = "T", default_value = "0.01", value_parser = positive_or_zero, allow_negative_numbers = true)]
+    #[arg(short, long, value_name = "T", default_value = "0.01", value_parser = positive_or_zero)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) tolerance: Rational,
 }
 
@@ -162,8 +163,9 @@ pub(crate) struct ValArgs {
 The page is one HTML file that needs no network. It shows the plan with its envelope, the run beside its \
 plan, or the rates of the experiment; docs/pages.md says what is on it.")]
 pub(crate) struct ReportArgs {
-    /// The trace of a run (`run --trace`), an answer (`envelope --json`, `plan --json`, `run --json`), the
-    /// results of an experiment (`results.json`), or the folder that has them (`compare -o DIR`)
+    /// The trace of a run (`run --trace`), an answer (`envelope --json`, `plan --json`, `run
+    /// --json`), the results of an experiment (`results.json`), or the folder that has them
+    /// (`compare -o DIR`)
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
     /// Write the page there instead of to standard output
@@ -223,19 +225,20 @@ pub(crate) struct CheckArgs {
     /// problem are checked
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// Validate like VAL with `-t T`: times closer than T count as equal, and interfering happenings
-    /// need only differ in time
+    /// Validate like VAL with `-t T`: times closer than T count as equal, and interfering
+    /// happenings need only differ in time
     #[arg(long, value_name = "T", value_parser = positive_or_zero, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<Rational>,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     #[arg(conflicts_with = "tolerance")]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
-    /// How to print what is wrong in a text: `text`, with an excerpt, or also `lines` on standard output,
-    /// one `FILE: line: N: Error: message` for each mistake
+    /// How to print what is wrong in a text: `text`, with an excerpt, or also `lines` on standard
+    /// output, one `FILE: line: N: Error: message` for each mistake
     #[arg(long, value_name = "FORM", value_enum, default_value_t = DiagnosticsForm::Text)]
     #[arg(hide_possible_values = true, conflicts_with = "json")]
     pub(crate) diagnostics: DiagnosticsForm,
@@ -264,7 +267,8 @@ pub(crate) struct StnArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) dot: Option<PathBuf>,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
     /// Print the network as one JSON document
     #[arg(long)]

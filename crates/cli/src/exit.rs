@@ -27,13 +27,13 @@ pub(crate) enum Exit {
 /// Why there is no answer: the input cannot be understood, or the outside world failed.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Failure {
-    /// What is wrong, in lower case.
+    /// The error message, in lower case.
     message: String,
-    /// What to do.
+    /// Advice: what the user can do about it.
     advice: Option<String>,
     /// Where it is wrong, if it is a text.
     diagnostics: Vec<Record>,
-    /// What a terminal shows.
+    /// The message as a terminal shows it.
     #[serde(skip)]
     text: String,
 }
@@ -88,7 +88,7 @@ impl Failure {
         self
     }
 
-    /// What `--json` prints.
+    /// The document that `--json` prints.
     pub(crate) fn document(&self) -> FailureDocument<'_> {
         FailureDocument {
             format: "elbowroom-failure",

@@ -141,7 +141,7 @@ pub(crate) fn source(path: &Path, what: &str) -> Result<Source, Failure> {
     Ok(Source::from_bytes(path.display().to_string(), &bytes))
 }
 
-/// What to do about a file that cannot be read.
+/// Advice on a file that cannot be read.
 fn advice(path: &Path, what: &str, error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => {

@@ -1,8 +1,8 @@
 //! Journals: traces that survive whatever ends the program, `docs/formats/journal.md`.
 //!
-//! A record is a line of a trace with eight hexadecimal digits and a space before it: the CRC-32 of the
-//! digits of the record before it (zeros before the first) and of the line. So a record that is damaged,
-//! missing or out of place is noticed.
+//! A record is a line of a trace with eight hexadecimal digits and a space before it: the CRC-32 of
+//! the digits of the record before it (zeros before the first) and of the line. So a record that is
+//! damaged, missing or out of place is noticed.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Seek as _, SeekFrom, Write as _};
@@ -69,7 +69,8 @@ impl JournalFile {
         })
     }
 
-    /// Goes on behind what is whole of a journal; `before` is how many bytes the file had before that was read.
+    /// Goes on behind what is whole of a journal; `before` is how many bytes the file had before
+    /// that was read.
     pub(crate) fn go_on(path: &Path, journal: &Journal, before: u64) -> Result<Self, Failure> {
         let open = || OpenOptions::new().write(true).open(path);
         let mut file = open().map_err(|error| cannot_write(path, &error))?;
@@ -122,8 +123,8 @@ impl JournalFile {
     }
 }
 
-/// Keeps every other program from writing this journal, until this one ends, however it does. Where files cannot
-/// be locked, nothing is kept.
+/// Keeps every other program from writing this journal, until this one ends, however it does. Where
+/// files cannot be locked, nothing is kept.
 fn claim(path: &Path, file: &File) -> Result<(), Failure> {
     #[cfg(unix)]
     {
@@ -168,7 +169,8 @@ impl Journal {
     /// Reads a journal. What is not whole at its end is left out.
     ///
     /// # Errors
-    /// In words, when there are whole records behind one that is not: then it was damaged, not cut off.
+    /// In words, when there are whole records behind one that is not: then it was damaged, not cut
+    /// off.
     pub(crate) fn read(text: &str) -> Result<Self, String> {
         let mut journal = Self {
             text: String::with_capacity(text.len()),

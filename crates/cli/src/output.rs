@@ -21,7 +21,7 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
     survive(written, "standard output")
 }
 
-/// What a command has said so far, for the document that `--json` asks for.
+/// The output of a command so far, for the document that `--json` asks for.
 #[derive(Debug, Default)]
 pub(crate) struct Output {
     /// The warnings that were printed.

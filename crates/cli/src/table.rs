@@ -6,8 +6,8 @@
 //! !d1  (unlock office)                  6       6       9     0%  +50%       o-|
 //! ```
 //!
-//! All bars have one scale, that of their heading: deviations in relation to the nominal value, which
-//! stands in the middle. An arrow goes on beyond it. What has little room is marked (`!`).
+//! All bars have one scale, that of their heading: deviations in relation to the nominal value,
+//! which stands in the middle. An arrow goes on beyond it. What has little room is marked (`!`).
 //!
 //! What is shown never promises more than what is known: lower ends are rounded up, upper ends
 //! down, and slack towards zero.
@@ -25,7 +25,7 @@ use crate::number::{self, Rounding};
 pub(crate) struct Row {
     /// The parameter's name.
     pub(crate) name: String,
-    /// What it is in plain words.
+    /// The quantity in plain words.
     pub(crate) quantity: String,
     /// Its value in the original plan.
     pub(crate) nominal: Rational,

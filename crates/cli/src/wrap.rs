@@ -2,8 +2,8 @@
 
 use unicode_width::UnicodeWidthStr;
 
-/// The text in lines of at most `width` columns, where words allow it. The first line is indented by
-/// `indent`, the others by two more.
+/// The text in lines of at most `width` columns, where words allow it. The first line is indented
+/// by `indent`, the others by two more.
 pub(crate) fn wrapped(text: &str, width: usize, indent: usize) -> String {
     let mut lines = Vec::new();
     let mut line = " ".repeat(indent);

@@ -1,6 +1,7 @@
 //! Runs that are killed at any moment, executive and world, and go on with `--resume`.
 //!
-//! `ELBOWROOM_KILLS=1000 cargo test --workspace --test kills -- --nocapture` makes a thousand of them.
+//! `ELBOWROOM_KILLS=1000 cargo test --workspace --test kills -- --nocapture` makes a thousand of
+//! them.
 
 #![allow(
     clippy::print_stdout,
@@ -262,8 +263,8 @@ fn when_the_disk_is_full_the_run_ends_in_order_and_can_go_on() {
     let folder = folder("fills");
     let journal = folder.join("journal").display().to_string();
     let program = env!("CARGO_BIN_EXE_elbowroom");
-    // In the shell's units, so that the first record fits and not all of them do. The signal that would end
-    // the program is ignored, and writing fails.
+    // In the shell's units, so that the first record fits and not all of them do. The signal that
+    // would end the program is ignored, and writing fails.
     let line = beginning(&folder, &journal)
         .iter()
         .map(|word| format!("'{word}'"))

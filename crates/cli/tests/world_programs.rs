@@ -1,5 +1,5 @@
-//! Programs that are worlds: what is wrong with them is named, and the library for Python makes right
-//! ones.
+//! Programs that are worlds: what is wrong with them is named, and the library for Python makes
+//! right ones.
 
 mod command;
 #[path = "../../../testing/skipped.rs"]

@@ -207,8 +207,8 @@ fn a_text_where_a_number_belongs_is_told_in_words() {
     assert!(!said.contains("u64"), "{said}");
 }
 
-/// The sliding-tile puzzle with two tiles exchanged: no plan exists, and finding that out takes more
-/// than a megabyte.
+/// The sliding-tile puzzle with two tiles exchanged: no plan exists, and finding that out takes
+/// more than a megabyte.
 #[test]
 fn a_memory_limit_is_told_in_megabytes_and_is_no_proof() {
     let domain = Temporary::new(

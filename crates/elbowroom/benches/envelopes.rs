@@ -4,8 +4,8 @@
 //! `first_widening` stops when the box has grown for the first time. Without the benchmark files
 //! beside the repository these have nothing to measure.
 //!
-//! These are boxes of the weak guarantee, which the paper's are. The group `dynamic` searches the same
-//! with the dynamic one.
+//! These are boxes of the weak guarantee, which the paper's are. The group `dynamic` searches the
+//! same with the dynamic one.
 //!
 //! `rounds` and `rounds_first_widening` are deliveries of our own with all durations left open, by
 //! the number of parameters.

@@ -4,10 +4,11 @@ use elbowroom_num::{End, Interval, Rational};
 use elbowroom_plan::{DecoupledEnvelope, Parameter, ParameterId, ParameterKind, ParametrizedPlan};
 use elbowroom_text::nearest;
 
-/// What stands for every parameter.
+/// The name that stands for every parameter.
 const ALL: &str = "all";
 
-/// So many parameters are listed where a name is unknown; of more only a similar one is told.
+/// Up to this number of parameters, all are listed where a name is unknown; otherwise only a
+/// similar one is suggested.
 const MOST_LISTED: usize = 12;
 
 /// A text is not a box of this plan's parameters.
@@ -19,7 +20,7 @@ pub enum BoxTextError {
          dur_0=[1/2,7.5], dur_0=[0,inf] or all=±10%"
     )]
     Syntax {
-        /// What was found.
+        /// The text that was found.
         text: String,
     },
     /// No parameter has that name.

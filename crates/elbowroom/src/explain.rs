@@ -36,7 +36,7 @@ pub struct Explanation {
     pub valuation: Valuation,
     /// A time for each node at which it goes wrong; `None` if there is no schedule at all.
     pub schedule: Option<Schedule>,
-    /// What the judge says about that schedule.
+    /// The judge's verdict on that schedule.
     pub verdict: Option<String>,
     /// Where there is a schedule for all values, but none that can be found in time: how the world
     /// beats an executor that starts everything early, and one that starts everything late.
@@ -109,7 +109,8 @@ impl<'a> Explainer<'a> {
         }
     }
 
-    /// What keeps an end of a parameter's interval where it is; `None` if nothing does.
+    /// The reason why an end of a parameter's interval cannot move further; `None` if there is
+    /// none.
     pub fn limit(&self, id: ParameterId, side: Side, limit: &Limit) -> Option<String> {
         match limit {
             Limit::Unbounded => None,

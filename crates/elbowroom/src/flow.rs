@@ -21,7 +21,7 @@ use crate::room;
 pub struct Settings {
     /// What to leave open; all durations that the domain fixes if empty.
     pub vary: Vec<VarySpec>,
-    /// What to guarantee inside the envelope.
+    /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// How to search.
     pub search: elbowroom_envelope::Settings,
@@ -158,7 +158,7 @@ pub fn open_more(
     vary(task, plan, &schedule.into(), specs)
 }
 
-/// What the judge says of a plan.
+/// The judge's verdict on a plan.
 pub(crate) fn judge(task: &Task, plan: &TimeTriggeredPlan) -> Verdict {
     validate::validate(task, plan, &validate::Settings::default())
 }

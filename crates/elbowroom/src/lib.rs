@@ -1,9 +1,9 @@
 //! Temporal plans on robots: planning, validation, robustness envelopes, execution.
 //!
-//! Elbowroom reads PDDL 2.1 problems with durative actions. It finds plans for them, computes how far
-//! each duration, rate or deadline may deviate while a plan is still guaranteed to work, and
-//! executes plans with dispatching, monitoring and replanning. All arithmetic that decides something
-//! is exact.
+//! Elbowroom reads PDDL 2.1 problems with durative actions. It finds plans for them, computes how
+//! far each duration, rate or deadline may deviate while a plan is still guaranteed to work, and
+//! executes plans with dispatching, monitoring and replanning. All arithmetic that decides
+//! something is exact.
 //!
 //! # Planning
 //!
@@ -119,15 +119,16 @@
 //!
 //! # Contents
 //!
-//! The [`tutorial`] goes through planning, envelopes, execution and probability. Each
-//! question of the command line is a request with an answer in [`answers`]; an answer is plain data,
-//! and its JSON is the document that `docs/formats` describes.
+//! The [`tutorial`] goes through planning, envelopes, execution and probability. Each question of
+//! the command line is a request with an answer in [`answers`]; an answer is plain data, and its
+//! JSON is the document that `docs/formats` describes.
 //!
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
 //! - [`flow`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
 //! - [`graph`]: networks as graphs for Graphviz.
-//! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches it.
+//! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
+//!   it.
 //! - [`Explainer`]: explains what limits an envelope, and why a plan fails ([`Explanation`],
 //!   [`Shortfall`]).
 //! - [`parse_box`], [`write_box`]: boxes as text ([`BoxTextError`]).
@@ -141,7 +142,8 @@
 //! - [`model`]: problems, plans with fixed times, and validation ([`model::validate()`]).
 //! - [`pddl`]: reads and writes PDDL and plans.
 //! - [`stn`]: simple temporal networks, with and without uncertainty.
-//! - [`network`]: reads the field's formats of temporal networks, and decides their controllability.
+//! - [`network`]: reads the field's formats of temporal networks, and decides their
+//!   controllability.
 //! - [`plan`]: networks of plans, and their parameters.
 //! - [`envelope`]: decides whether a box is inside the envelope, and searches for a large one.
 //! - [`probability`]: success probabilities, and the best order of a plan's actions.

@@ -1,5 +1,5 @@
-//! The yardstick on a clock: how likely the best of all executors is to reach the goal in a world of
-//! which everything is known but what will happen.
+//! The yardstick on a clock: how likely the best of all executors is to reach the goal in a world
+//! of which everything is known but what will happen.
 //!
 //! The world is a semi-Markov decision process. Its state is the truth of all facts, the actions
 //! under way with the time since each began, what has happened by itself, and the clock. The agent
@@ -7,19 +7,20 @@
 //! under way, or wait. What it does not see is the future: how long an action will take, whether it
 //! fails, when something happens by itself, are drawn from the world file's distributions, given
 //! what has been seen so far. It succeeds as soon as the goal holds. Any action of the problem is
-//! available at any time, and deciding takes no time, so no executor, however it plans, does better.
+//! available at any time, and deciding takes no time, so no executor, however it plans, does
+//! better.
 //!
 //! What the process leaves out: interfering happenings may be as close as one likes (ε is nothing),
-//! and happenings that coincide take place one after the other. A start that fails costs no time and
-//! can be tried again at once.
+//! and happenings that coincide take place one after the other. A start that fails costs no time
+//! and can be tried again at once.
 //!
 //! **Bounds.** The best value is bounded from both sides on a grid of time: cells of one length.
 //!
 //! - *Above*, `Side::Above`: the agent is told at the beginning of a cell what will end or happen
 //!   in it, and chooses the order within the cell. What began in cell c and takes n whole cells and
-//!   something ends in cell c + n or in the next one; the agent chooses that, too. An agent in the real
-//!   world that knows less can be imitated step by step, with the remainders drawn at random, so
-//!   this is at least as good as the best.
+//!   something ends in cell c + n or in the next one; the agent chooses that, too. An agent in the
+//!   real world that knows less can be imitated step by step, with the remainders drawn at random,
+//!   so this is at least as good as the best.
 //! - *Below*, `Side::Below`: the agent decides only at the boundaries of cells, and what happens
 //!   between them happens in the order that is worst for it. That is a way to act in the real
 //!   world, so the best is at least as good.

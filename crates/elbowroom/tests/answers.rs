@@ -321,8 +321,8 @@ fn a_watcher_sees_the_box_grow_and_can_end_the_search_at_any_moment() {
     assert_stored(&outcome.answer);
 }
 
-/// The windows of a timeline are compared with those of the network at every corner of the box, which is
-/// where the extremes of a plan with this one deadline lie.
+/// The windows of a timeline are compared with those of the network at every corner of the box,
+/// which is where the extremes of a plan with this one deadline lie.
 #[test]
 fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
     let (task, plan) = read("delivery");

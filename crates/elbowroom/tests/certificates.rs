@@ -288,8 +288,8 @@ impl Watcher for Patience {
     }
 }
 
-/// Searches a published plan, and checks the certificate: accepted, with how many assumptions, in how
-/// many seconds.
+/// Searches a published plan, and checks the certificate: accepted, with how many assumptions, in
+/// how many seconds.
 #[allow(
     clippy::disallowed_methods,
     reason = "how long a check takes is worth seeing"

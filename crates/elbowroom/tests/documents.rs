@@ -7,8 +7,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// All Markdown files at the root and under `docs`, and the chapters of the tutorial, which stand in
-/// the packages that compile them.
+/// All Markdown files at the root and under `docs`, and the chapters of the tutorial, which stand
+/// in the packages that compile them.
 fn documents() -> Vec<PathBuf> {
     let folders = ["docs", "crates/elbowroom/docs", "crates/laboratory/docs"];
     let mut folders: Vec<PathBuf> = folders.map(|folder| root().join(folder)).into();

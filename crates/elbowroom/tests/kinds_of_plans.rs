@@ -171,8 +171,8 @@ fn each_kind_has_an_envelope_that_the_judge_accepts_and_that_holds_the_plan() {
     }
 }
 
-/// Widening one end of one interval after the other, against an oracle that knows nothing of the box
-/// before.
+/// Widening one end of one interval after the other, against an oracle that knows nothing of the
+/// box before.
 #[test]
 fn an_oracle_that_remembers_says_what_one_says_that_does_not() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);

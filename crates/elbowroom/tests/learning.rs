@@ -1,5 +1,5 @@
-//! What is learnt from logs of worlds that are known: distributions, failures, and intervals that hold as
-//! often as they promise.
+//! What is learnt from logs of worlds that are known: distributions, failures, and intervals that
+//! hold as often as they promise.
 
 use std::sync::Arc;
 
@@ -187,8 +187,8 @@ fn what_was_cut_off_counts() {
     assert!(without < 9.2, "{without}");
 }
 
-/// The intervals hold all durations of the next run as often as promised, and no oftener than the number of
-/// samples explains.
+/// The intervals hold all durations of the next run as often as promised, and no oftener than the
+/// number of samples explains.
 #[test]
 fn conformal_intervals_hold_the_next_run() {
     let (task, plan) = problem();

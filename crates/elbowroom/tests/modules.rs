@@ -1,8 +1,8 @@
 //! Which modules of a crate use each other in a circle.
 //!
 //! Nothing in Rust forbids circles inside a crate. What stands in one cannot be read, tested or
-//! moved without the rest of it, so each circle among a crate's top-level modules is listed here with
-//! the reason why it stays; any other fails.
+//! moved without the rest of it, so each circle among a crate's top-level modules is listed here
+//! with the reason why it stays; any other fails.
 //!
 //! Read from the sources: paths that begin with `crate::`, or with as many `super::` as lead to the
 //! root of the crate, outside tests, comments and texts. What the root re-exports counts as its

@@ -162,8 +162,8 @@ fn the_odds_say_where_and_why_worlds_are_lost() {
         ]
     );
     let action = &odds.order.actions[0];
-    // After each failed attempt the lamp must be whole still: nothing asks for it, but breaking it is
-    // noticed at the start's over-all condition.
+    // After each failed attempt the lamp must be whole still: nothing asks for it, but breaking it
+    // is noticed at the start's over-all condition.
     let retried: f64 = (0..200)
         .map(|n| 0.5_f64.powi(n) * 0.75_f64.powi(n))
         .sum::<f64>()

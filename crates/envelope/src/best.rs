@@ -1,12 +1,13 @@
 //! The largest box inside an envelope, with a proof that there is no larger one.
 //!
 //! The boxes inside an envelope are found from outside. What the oracle has against a box that it
-//! refuses is a [`Cut`]: one linear inequality in the ends of all boxes, or several of which one holds.
-//! The best box that satisfies all cuts known so far is at least as good as the best one inside the
-//! envelope; the first such box that the oracle accepts is the best one, and the cuts prove it.
+//! refuses is a [`Cut`]: one linear inequality in the ends of all boxes, or several of which one
+//! holds. The best box that satisfies all cuts known so far is at least as good as the best one
+//! inside the envelope; the first such box that the oracle accepts is the best one, and the cuts
+//! prove it.
 //!
-//! - [`Objective::LeastSlack`]: all ends move out together, in relation to their nominal values, until
-//!   one is stopped; then the others go on. No linear program is needed ([`fill`]).
+//! - [`Objective::LeastSlack`]: all ends move out together, in relation to their nominal values,
+//!   until one is stopped; then the others go on. No linear program is needed ([`fill`]).
 //! - [`Objective::Widths`]: a linear program over the cuts, with branch and bound where a cut has
 //!   alternatives ([`widths`]).
 
@@ -29,7 +30,7 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
-/// What a box is to be the greatest of.
+/// The objective of a largest box.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -63,7 +64,7 @@ impl fmt::Display for Objective {
 /// Which box is wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BestSettings {
-    /// What it is the greatest of.
+    /// The objective.
     pub objective: Objective,
     /// Whether both ends of an interval are equally far from the nominal value.
     pub symmetric: bool,
@@ -89,10 +90,11 @@ pub struct BestRun {
     pub envelope: Result<DecoupledEnvelope, Objection>,
     /// The value of the objective: the least slack, or the sum of widths.
     pub value: Rational,
-    /// What no box exceeds; the same as `value` if the box is proved to be the best.
+    /// An upper bound on the objective of all boxes; equal to `value` if the box is proved to be
+    /// the largest.
     pub bound: Rational,
-    /// Whether there is no better box. With [`Objective::LeastSlack`] that also says that the second
-    /// least slack is the greatest there can be, and so on.
+    /// Whether there is no better box. With [`Objective::LeastSlack`] that also says that the
+    /// second least slack is the greatest there can be, and so on.
     pub is_proved: bool,
     /// The number of boxes checked.
     pub checks: usize,
@@ -105,7 +107,7 @@ pub struct BestRun {
 /// Why no box is better.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BestProof {
-    /// What is known of all boxes inside the envelope.
+    /// Cuts: inequalities that all boxes inside the envelope satisfy.
     pub cuts: Vec<Cut>,
     /// How the best value follows.
     pub reasons: Reasons,
@@ -122,8 +124,8 @@ pub struct Moved {
     pub scale: Rational,
     /// How far from the nominal value it can move the ends at most.
     pub most: Rational,
-    /// How far it moves them in the best box. An end that reaches as far as counts, and that nothing
-    /// stops, is infinite in the box of the answer.
+    /// How far it moves them in the best box. An end that reaches as far as counts, and that
+    /// nothing stops, is infinite in the box of the answer.
     pub value: Rational,
 }
 
@@ -173,7 +175,7 @@ pub enum Case {
     },
 }
 
-/// What bounds a variable of the master problem, or a sum of some.
+/// The source of a bound on a variable of the master problem, or on a sum of variables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Source {
     /// A row of a cut: position of the cut, position of the row.

@@ -17,7 +17,7 @@ use elbowroom_stn::uncertain::{Conflict, Ground, LinkId, Recheck, StrongConflict
 /// knowing values before they are observed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControlConflict {
-    /// What stands against each other, in order.
+    /// The grounds of the conflict, in order.
     pub grounds: Vec<ControlGround>,
 }
 

@@ -24,8 +24,8 @@ pub enum Ground {
     /// The bounds of these constraints, which follow each other in a circle, add up to less than
     /// nothing for some values in a box that breaks the row: these have no schedule.
     Cycle(Vec<Origin>),
-    /// The same, of bounds that a schedule fixed in advance has to satisfy for the worst values: each
-    /// constraint with the constraints of the durations that end early or late before it.
+    /// The same, of bounds that a schedule fixed in advance has to satisfy for the worst values:
+    /// each constraint with the constraints of the durations that end early or late before it.
     Fixed(Vec<ProofPart>),
     /// A semi-reducible cycle: rule by rule, why no strategy exists in a box that breaks all rows.
     Semireducible(Vec<ProofWay>),
@@ -65,7 +65,8 @@ impl Cut {
     }
 }
 
-/// `constant + Σ factor · end`, where an end is the number itself: what a cycle of bounds adds up to.
+/// `constant + Σ factor · end`, where an end is the number itself: what a cycle of bounds adds up
+/// to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Ends {
     pub(crate) constant: Rational,

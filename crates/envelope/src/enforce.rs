@@ -11,8 +11,8 @@ use crate::soundness::earliest_schedule;
 /// The plan with constraints for all obligations that are bounds on the difference of two times,
 /// and how many there are that its network does not imply anyway.
 ///
-/// Paper 1 asks that *every* schedule of the plan be valid, also those that a dispatcher would never
-/// choose. Where what makes a schedule valid is a bound on the difference of two times, the
+/// Paper 1 asks that *every* schedule of the plan be valid, also those that a dispatcher would
+/// never choose. Where what makes a schedule valid is a bound on the difference of two times, the
 /// dispatcher can be told to keep to it; what is left to ask is that it can.
 ///
 /// # Errors
@@ -65,7 +65,7 @@ pub fn enforced(
     Ok((enforced, added))
 }
 
-/// What is less than it must be in a bad case that is nothing else.
+/// The difference that is too small in a bad case, if nothing else is wrong in it.
 fn avoidable(case: &BadCase) -> Option<&Difference> {
     match (case.differences.as_slice(), case.inequalities.as_slice()) {
         ([difference], []) if difference.is_strict => Some(difference),

@@ -287,7 +287,7 @@ impl Feasibility {
         ConsistentNetwork::try_from(network).ok()
     }
 
-    /// What an edge demands at a corner; `None` if nothing that matters.
+    /// The bound of an edge at a corner of the box; `None` if it does not matter.
     fn bound(
         &self,
         edge: &Edge,

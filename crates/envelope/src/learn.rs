@@ -3,8 +3,9 @@
 //! A conflict is a cycle of bounds whose length depends linearly on the ends of the box. Every box
 //! in which it is negative is refused for the same reason, so that all boxes inside the envelope
 //! satisfy "it is not negative". A semi-reducible cycle depends on more: what follows a duration
-//! taken at its lower end must be negative, and a wait counts for no less than the duration takes at
-//! least. So it is a disjunction: the cycle is not negative, or what follows one of these is not.
+//! taken at its lower end must be negative, and a wait counts for no less than the duration takes
+//! at least. So it is a disjunction: the cycle is not negative, or what follows one of these is
+//! not.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::uncertain::PlanNetwork;
@@ -20,7 +21,7 @@ use crate::cut::{Cut, Ends, Ground, ProofPart, ProofWay};
 /// The limit on the rows of a cut.
 const MOST_ROWS: usize = 64;
 
-/// What is known of a box.
+/// The outcome of a check, in terms of other boxes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Learnt {
     /// Nothing is against it.
@@ -77,7 +78,7 @@ pub(crate) fn without_schedule(
     learnt(vec![ends], Ground::Cycle(cycle), envelope)
 }
 
-/// What keeps the plan from being dynamically controllable in the box.
+/// The conflict that prevents dynamic controllability in the box.
 pub(crate) fn without_strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
@@ -121,7 +122,7 @@ pub(crate) fn without_strategy(plan: &ParametrizedPlan, envelope: &DecoupledEnve
     learnt(rows, Ground::Semireducible(ways), envelope)
 }
 
-/// What keeps a schedule fixed in advance from working in the box.
+/// The conflict that prevents strong controllability in the box.
 pub(crate) fn without_fixed_times(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Learnt {
     let Ok(network) = plan.uncertain_network(envelope) else {
         return Learnt::Unknown;
@@ -257,7 +258,7 @@ impl Reader<'_> {
         Some((ends, origin))
     }
 
-    /// What a cycle of ways adds up to if no wait is cut short.
+    /// The sum of a cycle of ways, if no wait is cut short.
     fn flat(&self, cycle: &[Way]) -> Option<Ends> {
         let mut total = Ends::default();
         for part in cycle.iter().flat_map(|way| &way.parts) {

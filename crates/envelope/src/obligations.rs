@@ -144,7 +144,7 @@ pub enum Requirement {
 /// A requirement with all the ways in which it can be violated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obligation {
-    /// What is required.
+    /// The requirement.
     pub requirement: Requirement,
     /// Violated exactly when one of these is the case.
     pub bad_cases: Vec<BadCase>,

@@ -40,7 +40,7 @@ pub struct Oracle {
     plan: Arc<ParametrizedPlan>,
     guarantee: Guarantee,
     controllability: Controllability,
-    /// What every schedule must satisfy; `None` while no values with a schedule are known.
+    /// The conditions on all schedules; `None` while no values with a schedule are known.
     soundness: Option<Soundness>,
     /// The values whose order of happenings `soundness` goes by; at first the nominal ones.
     around: Valuation,
@@ -65,8 +65,8 @@ enum Reason {
 }
 
 impl Oracle {
-    /// The oracle for a plan. If the plan has no schedule at its nominal values, that is what stands
-    /// against each box that holds them.
+    /// The oracle for a plan. If the plan has no schedule at its nominal values, that is what
+    /// stands against each box that holds them.
     ///
     /// # Errors
     /// When the plan holds something beyond exact linear reasoning; the message names it.

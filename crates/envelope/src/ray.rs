@@ -84,13 +84,13 @@ impl Ray {
         envelope
     }
 
-    /// The greatest number from `least` to `most` for which the box is inside the envelope. The box of
-    /// `least` is.
+    /// The greatest number from `least` to `most` for which the box is inside the envelope. The box
+    /// of `least` is.
     ///
-    /// A box that is refused says which others are; the greatest number that this leaves is the next
-    /// to be asked about, so that the first that is accepted is the answer. Where nothing linear is
-    /// known, the interval is halved. What is learnt is added to `cuts`; `on_step` is told the
-    /// greatest number so far before each box that is checked, and can end the search.
+    /// A box that is refused says which others are; the greatest number that this leaves is the
+    /// next to be asked about, so that the first that is accepted is the answer. Where nothing
+    /// linear is known, the interval is halved. What is learnt is added to `cuts`; `on_step` is
+    /// told the greatest number so far before each box that is checked, and can end the search.
     ///
     /// # Errors
     /// When there are too many cases to tell apart.

@@ -9,9 +9,9 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope};
 /// given by how far out its ends lie ([`BoxEnd::reach`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What each end counts; none is zero.
+    /// The factor of each end; none is zero.
     pub factors: BTreeMap<BoxEnd, Rational>,
-    /// What the sum does not exceed.
+    /// The upper bound of the sum.
     pub bound: Rational,
     /// Whether the bound itself is excluded.
     pub is_strict: bool,

@@ -9,7 +9,7 @@ use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParameterId, Side};
 use crate::irr::farthest;
 use crate::oracle::Oracle;
 
-/// What may be left between an end and its limit where the limit is not found exactly: 10⁻¹².
+/// The largest distance between an end and its limit where the limit is not found exactly: 10⁻¹².
 const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 
 /// The box with each end moved out until it touches its limit: upper before lower, parameter by
@@ -17,11 +17,11 @@ const RESOLUTION: (i64, i64) = (1, 1_000_000_000_000);
 ///
 /// A limit is a fraction, mostly one with a small denominator or few decimals. Halving encloses it;
 /// the simplest fraction and the shortest decimal that are enclosed are tried as well, and one of
-/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope in
-/// any case, and less than 10⁻¹² from the limit.
+/// them is the limit as soon as no simpler one is left. What is returned lies inside the envelope
+/// in any case, and less than 10⁻¹² from the limit.
 ///
-/// `None` if `envelope` is not inside the robustness envelope. `on_step` is called after every check
-/// and can end the work at any moment.
+/// `None` if `envelope` is not inside the robustness envelope. `on_step` is called after every
+/// check and can end the work at any moment.
 ///
 /// # Errors
 /// When there are too many cases to tell apart.

@@ -63,7 +63,7 @@ struct DirectCase {
 /// An obligation that some schedule of a box breaks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Broken {
-    /// What is required.
+    /// The requirement.
     pub requirement: Requirement,
     /// How it is broken.
     pub case: BadCase,
@@ -106,8 +106,8 @@ pub struct Conditions {
     /// Those that are bounds on the difference of two times: the network implies them, so that an
     /// executor that keeps to the network keeps to them.
     pub differences: usize,
-    /// Those on numbers, or on several differences at once: they hold in every schedule of the network,
-    /// so that an executor need not look at them.
+    /// Those on numbers, or on several differences at once: they hold in every schedule of the
+    /// network, so that an executor need not look at them.
     pub all_schedules: usize,
 }
 

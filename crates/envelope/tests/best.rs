@@ -17,7 +17,8 @@ use given::Given;
 const NOMINAL: i64 = 2;
 const MOST: i64 = 6;
 
-/// Three actions, the first two of which use up something, with bounds between their starts and ends.
+/// Three actions, the first two of which use up something, with bounds between their starts and
+/// ends.
 fn problem(bounds: &str) -> String {
     format!(
         "parameter a default {NOMINAL} lb 0 ub {MOST}; parameter b default {NOMINAL} lb 0 ub {MOST};

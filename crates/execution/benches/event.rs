@@ -1,5 +1,5 @@
-//! One event in a plan with 10,000 time points: taking note of it, moving the windows, deciding. The
-//! plan is that of [`robots`].
+//! One event in a plan with 10,000 time points: taking note of it, moving the windows, deciding.
+//! The plan is that of [`robots`].
 
 mod robots;
 

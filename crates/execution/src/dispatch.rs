@@ -79,7 +79,7 @@ pub(crate) struct Dispatch {
     /// The actions, with nominal values for what is left open.
     actions: Vec<Arc<Action>>,
     nominal: Schedule,
-    /// What the world's clock reads when the plan's reads 0.
+    /// The time on the world's clock when the plan's clock reads 0.
     origin: Rational,
     epsilon: Rational,
     horizon: Horizon,
@@ -327,7 +327,7 @@ impl Dispatch {
         self.ends[id.index()]
     }
 
-    /// What the plan's own bounds on an instance's duration are about.
+    /// The ground of the plan's own bounds on an instance's duration.
     fn duration_of(&self, id: InstanceId) -> About {
         if self.resumed.contains(&id) {
             About::RestOfDuration
@@ -341,7 +341,7 @@ impl Dispatch {
         self.progress.happened[node.index()].as_ref()
     }
 
-    /// What has started, or was told to, and has not ended.
+    /// The instances that have started, or were told to, and have not ended.
     pub(crate) fn running(&self) -> &BTreeSet<InstanceId> {
         &self.progress.running
     }
@@ -396,7 +396,7 @@ fn bounds_of(reading: Reading) -> Bounds {
     }
 }
 
-/// What holds if both do.
+/// The intersection of both.
 fn both(one: Bounds, other: Bounds) -> Bounds {
     let lower = one.0.into_iter().chain(other.0).max();
     (lower, one.1.into_iter().chain(other.1).min())

@@ -26,7 +26,7 @@ pub enum Command {
     Start {
         /// By which the world's reports refer to it.
         ticket: Ticket,
-        /// What to do.
+        /// The action.
         action: Arc<Action>,
         /// The planned duration; `None` for an instantaneous action.
         duration: Option<Rational>,
@@ -43,7 +43,7 @@ pub enum Command {
 pub struct Observation {
     /// The time at which it happened, by the world's clock. It may be reported later.
     pub time: Rational,
-    /// What happened.
+    /// The event.
     pub event: Event,
 }
 
@@ -91,9 +91,9 @@ pub enum Event {
     },
     /// The world has said something that cannot be understood.
     Unintelligible {
-        /// What it said, or how that begins.
+        /// The message, or its beginning.
         said: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         why: String,
     },
 }

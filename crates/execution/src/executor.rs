@@ -68,11 +68,11 @@ pub struct Planned {
 /// A plan made ready to be executed.
 #[derive(Clone, Debug)]
 pub struct Mission {
-    /// What is left to do, with a clock of its own.
+    /// The rest of the task, with a clock of its own.
     pub task: Arc<Task>,
-    /// What the world's clock reads when the task's reads 0.
+    /// The time on the world's clock when the task's clock reads 0.
     pub origin: Rational,
-    /// What the world's clock reads now; the plan cannot begin earlier.
+    /// The present time on the world's clock; the plan cannot begin earlier.
     pub now: Rational,
     /// The plan as the planner made it, on the task's clock.
     pub time_triggered: TimeTriggeredPlan,
@@ -89,18 +89,18 @@ pub struct Mission {
     /// The partial order of the plan's happenings, for those that need it
     /// ([`Need::PartialOrder`]).
     pub order: Option<PartialOrderPlan>,
-    /// What is running already, and goes on in the plan: see [`StepId`].
+    /// The actions under way, which go on in the plan: see [`StepId`].
     pub running: BTreeMap<StepId, Ticket>,
 }
 
 /// A moment at which to decide.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// What time it is, by the world's clock.
+    /// The present time, by the world's clock.
     pub now: &'a Rational,
-    /// What has been observed since the last decision.
+    /// The observations since the last decision.
     pub news: &'a [News],
-    /// What holds, as far as is known.
+    /// The believed state.
     pub belief: &'a Progression,
 }
 
@@ -149,9 +149,9 @@ pub enum News {
 /// An amount that was measured, and what the domain's expression for it reads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amount {
-    /// What was measured.
+    /// The quantity that was measured.
     pub measured: Measured,
-    /// What `?duration` stands for: how long the action took, or, at its start, is planned to take.
+    /// The value of `?duration`: the action's actual duration, or, at its start, the planned one.
     pub duration: Option<Rational>,
     /// The fluents in the expression, as they were before.
     pub values: Vec<(FluentId, Rational)>,
@@ -160,7 +160,7 @@ pub struct Amount {
 /// A decision with its reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decided {
-    /// What to do.
+    /// The decision.
     pub decision: Decision,
     /// The reason.
     pub reason: Reason,
@@ -189,7 +189,7 @@ pub enum Decision {
 pub struct Order {
     /// By which news refer to it.
     pub step: StepId,
-    /// What to do.
+    /// The action.
     pub action: Arc<Action>,
     /// The planned duration; `None` for an instantaneous action.
     pub duration: Option<Rational>,

@@ -47,15 +47,15 @@ pub const EXECUTORS: &[Registered] = &[
 pub struct Registered {
     /// Its name.
     pub name: &'static str,
-    /// What the number after its name and a colon means, if it takes one.
+    /// The meaning of the number after the name and a colon, if it takes one.
     pub argument: Option<&'static str>,
     /// Whether that number can be left out.
     pub is_optional: bool,
-    /// What it does, in one sentence.
+    /// A summary, in one sentence.
     pub summary: &'static str,
     /// Where it comes from.
     pub paper: &'static str,
-    /// What it needs to know of a plan.
+    /// The knowledge of a plan that it needs.
     pub need: Need,
     /// Makes one.
     make: fn(Option<Rational>, Means) -> Box<dyn Executor>,
@@ -72,7 +72,8 @@ pub struct Means {
     pub odds: Option<Box<dyn Odds>>,
     /// For `lookahead`: what it found out about the same problem and likelihoods in other runs.
     pub foresight: Foresight,
-    /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their plan.
+    /// For those that weigh each move ([`ExecutorSpec::asks_outlook`]); without, they go by their
+    /// plan.
     pub outlook: Option<Arc<dyn Outlook>>,
 }
 
@@ -112,17 +113,17 @@ pub enum UnknownExecutor {
     /// The name is none of the list.
     #[error("there is no executor `{name}`; choose one of {known}")]
     Name {
-        /// What was asked for.
+        /// The name that was asked for.
         name: String,
-        /// What there is.
+        /// The names that exist.
         known: String,
     },
     /// The number is missing, superfluous, or none.
     #[error("`{text}`: {problem}")]
     Argument {
-        /// What was asked for.
+        /// The text of the specification.
         text: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         problem: String,
     },
 }
@@ -244,7 +245,7 @@ impl Registered {
     }
 }
 
-/// What an executor says that has no plan.
+/// The decision of an executor that has no plan.
 fn without_plan() -> Decided {
     Decided {
         decision: Decision::Replan,

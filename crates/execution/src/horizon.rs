@@ -14,7 +14,7 @@ pub(crate) type Ends = (Option<Rational>, Option<Rational>);
 /// The time windows of time points, given those that have been executed.
 #[derive(Clone, Debug)]
 pub(crate) enum Horizon {
-    /// What follows from all constraints together.
+    /// Windows that follow from all constraints together.
     Whole(Box<MovingWindows>),
     /// What follows from each single constraint with a time point that has happened: what paper
     /// 1's dispatcher and `ROSPlan`'s see.
@@ -29,7 +29,7 @@ pub(crate) enum Horizon {
 pub(crate) enum NetworkLimit {
     /// A constraint of the network.
     Constraint(ConstraintId),
-    /// What the world may do.
+    /// A contingent link.
     Link(LinkId),
 }
 
@@ -135,7 +135,7 @@ impl Horizon {
         }
     }
 
-    /// What stands behind one end of a window, beginning far away from the node.
+    /// The grounds of one end of a window, beginning far away from the node.
     pub(crate) fn grounds(&self, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
         match self {
             Self::Whole(windows) => windows
@@ -157,7 +157,7 @@ impl Horizon {
     }
 }
 
-/// What stands behind one end of a window of a node, or behind its link if that says more.
+/// The grounds of one end of a window of a node, or of its link if that is tighter.
 fn behind(dispatcher: &Dispatcher, node: NodeId, end: WindowEnd) -> Vec<NetworkLimit> {
     let (earliest, latest) = dispatcher.window(node);
     let (least, most) = dispatcher.bounds(node);
@@ -201,7 +201,7 @@ impl OneHop {
         most.map(|(_, id)| id)
     }
 
-    /// What one constraint says, if the time point at its other end has happened.
+    /// The bound that one constraint sets, if the time point at its other end has happened.
     fn limit(&self, id: ConstraintId, end: WindowEnd) -> Option<Rational> {
         let Constraint { from, to, bound } = self.network.constraint(id);
         match end {

@@ -12,7 +12,8 @@
 //!
 //! What it needs from outside are ports, traits that it owns: [`World`] (a simulation, a robot),
 //! [`Planner`], [`Preparer`], [`Region`] (what a plan survives), [`Odds`] (how likely it is to
-//! succeed) and [`Outlook`] (how likely the goal is by each move). It does not depend on their implementations; in particular it cannot reach a solver.
+//! succeed) and [`Outlook`] (how likely the goal is by each move). It does not depend on their
+//! implementations; in particular it cannot reach a solver.
 //!
 //! ```
 //! use elbowroom_execution::executors::{EXECUTORS, ExecutorSpec};

@@ -19,9 +19,9 @@ pub struct Remainder<'a> {
     pub mission: &'a Mission,
     /// When each of its time points happened, on its own clock.
     pub happened: Vec<Option<Rational>>,
-    /// What time it is, by the world's clock.
+    /// The present time, by the world's clock.
     pub now: &'a Rational,
-    /// What holds, as far as is known.
+    /// The believed state.
     pub belief: &'a Progression,
 }
 

@@ -10,15 +10,15 @@ use crate::progression::Progression;
 /// Knows the probability to reach the goal in time, move by move, in a world of which it knows the
 /// distributions and not what will happen.
 ///
-/// It reckons in periods of one length, the first of which begins at time 0 of the world's clock; moves
-/// are made at their beginnings.
+/// It reckons in periods of one length, the first of which begins at time 0 of the world's clock;
+/// moves are made at their beginnings.
 pub trait Outlook: Send + Sync {
     /// The length of a period, in seconds.
     fn period(&self) -> &Rational;
 
-    /// What can be done at the beginning of a period, and what each move is worth. `None` where nothing
-    /// is known to lead to the goal: it is lost, later than anything that is known, or the world is not
-    /// the one that was expected.
+    /// What can be done at the beginning of a period, and what each move is worth. `None` where
+    /// nothing is known to lead to the goal: it is lost, later than anything that is known, or the
+    /// world is not the one that was expected.
     fn weigh(&self, standing: &Standing<'_>) -> Option<Weighed>;
 }
 
@@ -41,8 +41,8 @@ pub struct Standing<'a> {
 /// The moves that can be made, and what they are worth.
 #[derive(Clone, Debug)]
 pub struct Weighed {
-    /// Each with the probability to reach the goal in time by it; the best one first, and only such as
-    /// may be best. None if nothing leads to the goal unless what is overdue ends at once.
+    /// Each with the probability to reach the goal in time by it; the best one first, and only such
+    /// as may be best. None if nothing leads to the goal unless what is overdue ends at once.
     pub moves: Vec<(Move, f64)>,
     /// Whether something under way should be over by now.
     pub is_overdue: bool,

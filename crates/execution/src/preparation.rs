@@ -20,10 +20,11 @@ pub enum Need {
     /// Which orderings facts need. Nothing is left open, and where numbers matter, nothing is
     /// guaranteed: what `ROSPlan`'s dispatcher has.
     Orderings,
-    /// The same, and the partial order of the plan's happenings, whose layers can be executed in more
-    /// than one order.
+    /// The same, and the partial order of the plan's happenings, whose layers can be executed in
+    /// more than one order.
     PartialOrder,
-    /// The orderings, with as many differences of times fixed as it takes for every schedule to work.
+    /// The orderings, with as many differences of times fixed as it takes for every schedule to
+    /// work.
     Network,
     /// The same, with quantities left open, and for which values the plan is guaranteed to work if
     /// that can be found out.
@@ -66,7 +67,7 @@ pub enum PrepareError {
     /// The plan is not guaranteed to work even if nothing deviates.
     #[error("the plan is not guaranteed to work even if nothing deviates")]
     NoGuarantee,
-    /// Who knows what plans survive cannot tell of this one: why.
+    /// The analyst cannot decide about this plan: the reason.
     #[error("{0}")]
     Beyond(String),
 }

@@ -38,7 +38,7 @@ pub struct Progression {
     values: Vec<Option<Rational>>,
     /// The time of the present group: [`Progression::time`], or earlier for what is told late.
     group: Rational,
-    /// What was true on arrival at the present group, where that has changed since.
+    /// Facts that have changed since the beginning of the present group, as they were on arrival.
     facts_on_arrival: BTreeMap<FactId, bool>,
     /// The values on arrival, likewise.
     values_on_arrival: BTreeMap<FluentId, Option<Rational>>,
@@ -54,7 +54,7 @@ pub struct Progression {
 /// A durative action under way.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Underway {
-    /// What is being done.
+    /// The action.
     pub action: Arc<Action>,
     /// The time at which it started.
     pub start: Rational,
@@ -353,7 +353,7 @@ impl Progression {
         outcome
     }
 
-    /// What the continuous effects at work bring about.
+    /// The changes by the continuous effects under way.
     fn motion(&self) -> Result<Motion, Unreadable> {
         let mut rates = Vec::new();
         for underway in self.running.values() {

@@ -95,7 +95,7 @@ pub(crate) fn duration_parameters(
     })
 }
 
-/// What the domain, or the plan, says the amount is.
+/// The nominal amount by the domain, or by the plan.
 pub(crate) fn expression(action: &Action, is_end: bool, fluent: FluentId) -> Option<&Expression> {
     let effects: &[Effect] = match (&action.body, is_end) {
         (Body::Instantaneous(snap), _) => &snap.effects,

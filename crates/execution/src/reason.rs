@@ -14,15 +14,15 @@ pub use behind::{Behind, Changed};
 /// behind that, by how much it was missed, and since when. Times are the world's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reason {
-    /// What kind of reason.
+    /// The kind of reason.
     pub cause: Cause,
     /// The action it is about.
     pub action: Option<String>,
     /// The quantity, condition, moment or state of affairs that it is about.
     pub about: Option<About>,
-    /// What was observed: a duration, an amount, or the time of a happening.
+    /// The observed value: a duration, an amount, or the time of a happening.
     pub observed: Option<Rational>,
-    /// What is allowed.
+    /// The interval that is allowed.
     pub allowed: Option<Interval>,
     /// The constraints or events behind that; the one it begins with comes first.
     pub behind: Vec<Behind>,
@@ -30,7 +30,7 @@ pub struct Reason {
     pub by: Option<Rational>,
     /// Since when this has been so.
     pub since: Option<Rational>,
-    /// What is still promised of the rest of the plan, if the executor makes promises.
+    /// The promise for the rest of the plan, if the executor makes promises.
     pub promise: Option<Promise>,
 }
 
@@ -87,7 +87,7 @@ pub enum Cause {
     Surprise,
     /// Nothing has been heard of an action for too long.
     Silence,
-    /// What is left of the plan is no longer guaranteed to work.
+    /// The rest of the plan is no longer guaranteed to work.
     GuaranteeLost,
     /// No order of the plan's actions leads to the goal.
     NoOrder,

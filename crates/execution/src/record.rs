@@ -38,7 +38,7 @@ pub enum Entry<'a> {
     Decided {
         /// The time.
         now: &'a Rational,
-        /// What and why.
+        /// The decision and its reason.
         decided: &'a Decided,
     },
     /// The world was given a command.
@@ -54,16 +54,16 @@ pub enum Entry<'a> {
     Passed {
         /// Until when the world was asked to wait at most.
         until: &'a Rational,
-        /// What time it is now.
+        /// The present time.
         now: &'a Rational,
-        /// What the world reported.
+        /// The observations.
         observations: &'a [Observation],
     },
-    /// What the world reported when asked to look at the goal.
+    /// The observations made when the world was asked to look at the goal.
     Looked {
         /// The time.
         now: &'a Rational,
-        /// What it reported.
+        /// The observations.
         observations: &'a [Observation],
     },
     /// An observation, and what was made of it.

@@ -2,8 +2,8 @@
 //!
 //! A [`Run`] is a state machine. [`Run::next`] says what it needs of the world: a command carried
 //! out, time, or a look at something; [`Run::observe`] and [`Run::see`] take the answers. Whoever
-//! drives it decides how to wait, so that an event loop can. [`Run::go`] is the loop for a [`World`]
-//! that blocks.
+//! drives it decides how to wait, so that an event loop can. [`Run::go`] is the loop for a
+//! [`World`] that blocks.
 //!
 //! What happens when reports are wrong is defined here, so that no executor needs to know:
 //!
@@ -69,11 +69,11 @@ use progress::Progress;
 pub struct Ports<'a> {
     /// Where plans come from.
     pub planner: Box<dyn Planner + 'a>,
-    /// What makes them ready.
+    /// Prepares plans for the executor.
     pub preparer: Box<dyn Preparer + 'a>,
-    /// Who decides.
+    /// The executor.
     pub executor: Box<dyn Executor + 'a>,
-    /// Who takes the record.
+    /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
 }
 
@@ -85,7 +85,7 @@ pub struct Run<'a> {
     now: Rational,
     progress: Progress,
     belief: Progression,
-    /// What was started, and what became of it.
+    /// The actions that were started, and how they ended.
     account: Account,
     /// How many steps the present plan has.
     steps: usize,
@@ -94,18 +94,18 @@ pub struct Run<'a> {
     reasons: Vec<Reason>,
     /// The expected planning time.
     allowance: Rational,
-    /// What was observed and believed, in order.
+    /// All that was observed and believed, in order.
     history: Vec<Happened>,
     /// Asked whether to end.
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
-    /// What is to be done before the executor is asked again; what comes next is last.
+    /// The tasks before the executor is asked again; the next one is last.
     agenda: Vec<Todo>,
     /// The question that the world has not answered.
     asked: Option<Next>,
     /// How the run ends, while what is running is told to stop.
     closing: Option<Closing>,
-    /// What came of it.
+    /// The report, once the run is over.
     report: Option<Report>,
 }
 
@@ -164,18 +164,18 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The same run, which ends in order as soon as `is_to_end` says so: what runs is cancelled, and
-    /// there is a whole report. It is asked before each decision, and after each answer of the world
-    /// and of the planner.
+    /// The same run, which ends in order as soon as `is_to_end` says so: what runs is cancelled,
+    /// and there is a whole report. It is asked before each decision, and after each answer of the
+    /// world and of the planner.
     #[must_use]
     pub fn ending_when(mut self, is_to_end: impl Fn() -> bool + Send + 'a) -> Self {
         self.is_to_end = Box::new(is_to_end);
         self
     }
 
-    /// The same run, which says, where no plan reaches the goal any more, what can never become true
-    /// again and since when ([`Report::dead_end`]). That takes some grounding by reachability, each
-    /// about as long as the embedded planner's.
+    /// The same run, which says, where no plan reaches the goal any more, what can never become
+    /// true again and since when ([`Report::dead_end`]). That takes some grounding by reachability,
+    /// each about as long as the embedded planner's.
     #[must_use]
     pub fn explaining(mut self) -> Self {
         self.is_explaining = true;

@@ -50,9 +50,9 @@ pub trait World: Send {
 /// Time that has passed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Passage {
-    /// What time it is.
+    /// The present time.
     pub now: Rational,
-    /// What has been observed meanwhile, in the order in which it was reported.
+    /// The observations since the last call, in the order in which they were reported.
     pub observations: Vec<Observation>,
 }
 
@@ -60,7 +60,7 @@ pub struct Passage {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct WorldError {
-    /// What went wrong and what to do about it.
+    /// The error, with advice.
     pub message: String,
 }
 

@@ -8,14 +8,15 @@
 //! The way through the module:
 //!
 //! 1. `registry`, `command`: which program to start with which arguments.
-//! 2. `request`, `start`: the files that it gets. At the beginning of a task these are the user's own
-//!    texts, to the letter; in mid-execution the problem is written anew
+//! 2. `request`, `start`: the files that it gets. At the beginning of a task these are the user's
+//!    own texts, to the letter; in mid-execution the problem is written anew
 //!    ([`elbowroom_pddl::write_problem`]).
 //! 3. `supervise`: the process. It has a process group, a folder and limits of its own, its output
 //!    is read as it comes, and at the end nothing of it is left.
-//! 4. `reader`, `log`: plans and telling phrases in what it prints. Memory stays bounded whatever that is.
-//! 5. `run`, `judge`: each plan is judged before anyone sees it, and repaired where only its times are
-//!    rounded.
+//! 4. `reader`, `log`: plans and telling phrases in what it prints. Memory stays bounded whatever
+//!    that is.
+//! 5. `run`, `judge`: each plan is judged before anyone sees it, and repaired where only its times
+//!    are rounded.
 //!
 //! This is the one crate below the command line that looks at a clock, starts threads and processes
 //! and writes files; hence it is a crate of its own. Processes are supervised on Unix systems; on

@@ -31,7 +31,7 @@ pub(super) struct Log {
     untimed: String,
     has_timed: bool,
     tail: VecDeque<u8>,
-    /// What it said.
+    /// The telling lines of the output.
     pub(super) sayings: Sayings,
     /// The number of bytes that came.
     pub(super) bytes: u64,
@@ -47,7 +47,7 @@ pub(super) struct Sayings {
     pub(super) out_of_memory: Option<String>,
 }
 
-/// What programs say when they get no more memory.
+/// Messages of programs that get no more memory.
 const OUT_OF_MEMORY: &[&str] = &[
     "bad_alloc",
     "out of memory",

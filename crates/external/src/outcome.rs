@@ -18,7 +18,7 @@ pub struct Found {
     pub makespan: Rational,
     /// The value of the problem's metric, if it has one that can be evaluated.
     pub metric: Option<Rational>,
-    /// What the judge had to object to in the planner's own times, if they had to be repaired.
+    /// The judge's objection to the planner's own times, if they had to be repaired.
     pub repaired: Option<String>,
 }
 
@@ -95,12 +95,12 @@ pub enum Outcome {
     NotStarted {
         /// The reason.
         reason: String,
-        /// What to do about it.
+        /// Advice.
         help: String,
     },
     /// All plans that it printed were refused; this is about the last of them.
     Refused {
-        /// What the judge objects to, or why it is no plan.
+        /// The judge's objection, or the reason why it is no plan.
         reason: String,
         /// The plan as printed.
         plan: String,
@@ -194,7 +194,7 @@ pub(super) fn signal_name(signal: i32) -> String {
 /// The outcome of a planner's run, with statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// What came of it.
+    /// The outcome.
     pub outcome: Outcome,
     /// How it went.
     pub statistics: Statistics,

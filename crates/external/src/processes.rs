@@ -66,7 +66,7 @@ impl Processes {
         }
     }
 
-    /// What they use now.
+    /// The resources in use.
     pub(super) fn usage(&mut self) -> Usage {
         let (mut pages, mut ticks) = (0_u64, 0_u64);
         for (_, status) in self.find() {

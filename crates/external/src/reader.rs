@@ -55,7 +55,7 @@ impl<'s> Reader<'s> {
         self.shared.mailbox.close();
     }
 
-    /// What it said; of two lines about the same, the one that says more.
+    /// The telling lines of the output; of two about the same, the more informative one.
     pub(super) fn sayings(&self) -> Sayings {
         let (output, error) = (&self.output.sayings, &self.error.sayings);
         let more = |output: &Option<String>, error: &Option<String>| {

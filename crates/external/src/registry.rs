@@ -10,17 +10,17 @@ use super::command::{Command, CommandError, find_program};
 pub struct Registered {
     /// The name to ask for.
     pub name: &'static str,
-    /// What it is, in a sentence.
+    /// A summary, in one sentence.
     pub summary: &'static str,
     /// The variable of the environment that says where the program is.
     pub variable: &'static str,
-    /// What the program is called in `PATH`.
+    /// The names of the program in `PATH`.
     pub programs: &'static [&'static str],
     /// Its arguments, with the placeholders of [`Command`].
     pub arguments: &'static [&'static str],
     /// Where to get it.
     pub how_to_get: &'static str,
-    /// What it says.
+    /// The phrases it prints.
     pub habits: Habits,
 }
 
@@ -113,7 +113,7 @@ pub const REGISTRY: &[Registered] = &[
     },
 ];
 
-/// What POPF and its relatives say.
+/// The phrases of POPF and its relatives.
 const COLIN_FAMILY: Habits = Habits {
     unsolvable: &[
         ";; problem unsolvable!",
@@ -129,7 +129,7 @@ const COLIN_FAMILY: Habits = Habits {
     missing: &[],
 };
 
-/// What our own shim for unified-planning says.
+/// The phrases of our own shim for unified-planning.
 const UNIFIED_PLANNING: Habits = Habits {
     unsolvable: &["elbowroom: unsolvable"],
     gave_up: &["elbowroom: gave up"],
@@ -137,7 +137,7 @@ const UNIFIED_PLANNING: Habits = Habits {
     missing: &["elbowroom: missing"],
 };
 
-/// What programs say that we know nothing of.
+/// Phrases of programs that are not known by name.
 const ANYONE: Habits = Habits {
     unsolvable: &[
         "problem unsolvable",
@@ -161,13 +161,13 @@ const ANYONE: Habits = Habits {
 /// A program to plan with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Planner {
-    /// What to call it in messages.
+    /// The name for messages.
     pub name: String,
-    /// What to start.
+    /// The kind of program to start.
     pub kind: Kind,
-    /// What to do if it is not there.
+    /// Advice on how to install it.
     pub how_to_get: String,
-    /// What it says.
+    /// The phrases it prints.
     pub habits: Habits,
 }
 

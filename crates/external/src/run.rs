@@ -248,7 +248,7 @@ impl<'a, 'r> Run<'a, 'r> {
         }
     }
 
-    /// What it means that there is no valid plan.
+    /// The meaning of a run without a valid plan.
     fn without_plan(&mut self, ended: Ended, sayings: Sayings, excerpt: String) -> Outcome {
         let peak = ended.peak_memory;
         if ended.ending == Ending::MemoryLimit {

@@ -1,7 +1,7 @@
 //! Experiments that compare executors: those of the papers, and your own.
 //!
-//! In: an experiment file. Out: success rates and costs of each executor, as tables and plots.
-//! All executors meet the same worlds (common random numbers). Trials run in parallel, on threads of
+//! In: an experiment file. Out: success rates and costs of each executor, as tables and plots. All
+//! executors meet the same worlds (common random numbers). Trials run in parallel, on threads of
 //! this crate; the results do not depend on how many there are, and the parts of an experiment that
 //! were made on several machines add up.
 //!
@@ -14,8 +14,8 @@
 //! - [`untimed`]: executors for worlds without time, and the rules of a trial.
 //! - [`worlds`]: worlds without time.
 //!
-//! It stands above the library, so that programs which embed the library need neither its threads nor
-//! what only experiments need.
+//! It stands above the library, so that programs which embed the library need neither its threads
+//! nor what only experiments need.
 //!
 //! ```
 //! use elbowroom_laboratory::perturbed::PerturbedExperiment;

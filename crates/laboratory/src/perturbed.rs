@@ -1,9 +1,9 @@
 //! Comparing executors in perturbed worlds: the experiments of paper 2.
 //!
 //! A [`PerturbedExperiment`] is a file: a problem, likelihoods case by case, worlds and executors.
-//! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a trial
-//! depend on the experiment's seed, the case and the trial's number only, so results do not depend on how many
-//! trials run at once.
+//! [`run`] makes every trial with every executor; executors meet the same seeds. The dice of a
+//! trial depend on the experiment's seed, the case and the trial's number only, so results do not
+//! depend on how many trials run at once.
 
 mod experiment;
 mod planner;

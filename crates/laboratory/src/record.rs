@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use elbowroom_report::table::Table;
 
-/// What came of one trial with one executor.
+/// The result of one trial with one executor.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TrialRecord {
     /// The position of the case and of the column in the experiment, for the order of the rows.
@@ -21,8 +21,8 @@ pub struct TrialRecord {
     pub column: String,
     /// The executor.
     pub executor: String,
-    /// How it ended: `goal-reached`, or another word of `docs/formats/run-json.md`; where there is no time,
-    /// `goal-reached` or `failed`.
+    /// How it ended: `goal-reached`, or another word of `docs/formats/run-json.md`; where there is
+    /// no time, `goal-reached` or `failed`.
     pub verdict: String,
     /// The world's time at the end, in seconds; `None` where there is no time.
     pub time: Option<String>,

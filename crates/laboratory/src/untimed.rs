@@ -1,8 +1,8 @@
 //! Executing plans where there is no time: the experiments of paper 2.
 //!
 //! A world without time goes on when something is done in it, and only then. A *step* is the
-//! attempt to start an action, or its end. Facts are seen as they are after every step. The rules of
-//! a trial are those of the published experiments (Ribeiro et al., TIME 2021, section 3):
+//! attempt to start an action, or its end. Facts are seen as they are after every step. The rules
+//! of a trial are those of the published experiments (Ribeiro et al., TIME 2021, section 3):
 //!
 //! - a trial has so many planning *rounds* (ten there: a plan, and nine replans);
 //! - in each round a plan is made from what holds, and executed until the executor has done all of
@@ -98,7 +98,7 @@ pub type ActionName = (SchemaId, Vec<ObjectId>);
 pub struct Game<'g> {
     /// The problem.
     pub task: &'g Task,
-    /// Who plans.
+    /// The plans, with their planner.
     pub plans: &'g mut Plans<'g>,
     /// Who looks out for dead ends, if somebody does; then each step that ends in one uses up a
     /// round, and the trial is lost with the last one.
@@ -124,7 +124,7 @@ impl Tally {
         self.starts + self.ends
     }
 
-    /// What the experiments call executed actions: messages and failed starts.
+    /// Executed actions as the experiments count them: messages and failed starts.
     pub fn steps(self) -> u64 {
         self.messages() + self.failed_starts
     }
@@ -138,7 +138,7 @@ pub struct Trial {
     /// Executions without success: 0 if the first plan led to the goal. Where the trial has failed,
     /// all rounds.
     pub replans: usize,
-    /// What was done.
+    /// The work done.
     pub tally: Tally,
 }
 
@@ -149,7 +149,8 @@ pub struct Stage<'w> {
     tally: Tally,
     most_steps: u64,
     dead_ends: Option<&'w DeadEndWatch<'w>>,
-    /// What has started in this execution and not ended; known only where dead ends are looked for.
+    /// Actions that have started in this execution and not ended; known only where dead ends are
+    /// looked for.
     running: Vec<ActionName>,
     rounds_left: usize,
     is_dead_end: bool,
@@ -157,7 +158,7 @@ pub struct Stage<'w> {
 }
 
 impl Stage<'_> {
-    /// What is true.
+    /// The facts and numbers that hold.
     pub fn state(&self) -> &State {
         self.world.state()
     }
@@ -301,7 +302,7 @@ fn start_of(action: &Action) -> &SnapAction {
     }
 }
 
-/// What a snap action does if nothing goes wrong; additions win over deletions.
+/// Applies the effects of a snap action, if nothing goes wrong; additions win over deletions.
 fn apply(snap: &SnapAction, state: &mut State) {
     for effect in &snap.effects {
         if let Change::Delete(fact) = effect.change {

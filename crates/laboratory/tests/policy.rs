@@ -1,5 +1,5 @@
-//! `policy` beside the timed optimum and beside all other executors, in the worlds of `experiments` and in
-//! random small ones.
+//! `policy` beside the timed optimum and beside all other executors, in the worlds of `experiments`
+//! and in random small ones.
 //!
 //! `ELBOWROOM_TRIALS=2000` makes that many trials of each world, and the table is printed
 //! (`--nocapture`).
@@ -171,8 +171,8 @@ fn made_of(small: &Small<'_>, runs: u64) -> Option<Made> {
     })
 }
 
-/// Run in the world that it knows, it succeeds as often as its table and the plain recursion say, but for
-/// the dice: in worlds in which one can be sure, and in those that are left to chance.
+/// Run in the world that it knows, it succeeds as often as its table and the plain recursion say,
+/// but for the dice: in worlds in which one can be sure, and in those that are left to chance.
 #[test]
 #[allow(clippy::cast_precision_loss, reason = "there are few runs")]
 fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
@@ -197,7 +197,8 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
         let Some(Made { lower, reports }) = made_of(&small, RUNS) else {
             continue;
         };
-        // What happens one after another is ε apart, so that the last second's end is a little late.
+        // What happens one after another is ε apart, so that the last second's end is a little
+        // late.
         let ends = &small.ends + Rational::new(1, 10);
         let is_won =
             |report: &&Report| report.verdict == Verdict::GoalReached && report.time <= ends;
@@ -214,7 +215,8 @@ fn in_random_small_worlds_it_reaches_what_a_plain_recursion_says() {
     assert_eq!(tried, [OF_EACH_KIND; 2], "too few worlds have a plan");
 }
 
-/// The plan passes through the goal, loses it again, and fails half of the time on the way back to it.
+/// The plan passes through the goal, loses it again, and fails half of the time on the way back to
+/// it.
 #[test]
 fn what_is_under_way_is_let_go_when_the_goal_holds() {
     let small = Small {

@@ -112,8 +112,8 @@ fn who_waits_for_the_door_goes_through_it() {
 #[test]
 fn light_that_goes_out_early_is_no_gain() {
     // A match burns 4 or 8, each half of the time, and mending takes 5 in its light: rounding the
-    // match down or the mending up would both be wrong. There is one match, and it must burn down: who
-    // could drop it would have light for ever.
+    // match down or the mending up would both be wrong. There is one match, and it must burn down:
+    // who could drop it would have light for ever.
     let domain = "(define (domain d) (:requirements :durative-actions)
         (:predicates (unused) (light) (burnt) (mended) (day) (done))
         (:action finish :parameters () :precondition (and (mended) (burnt) (day)) :effect (done))

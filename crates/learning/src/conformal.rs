@@ -28,8 +28,8 @@ impl Band {
         }
     }
 
-    /// By how much the band must be stretched at least to hold the value, whatever it is if it was cut
-    /// off. Infinite if no stretching does.
+    /// By how much the band must be stretched at least to hold the value, whatever it is if it was
+    /// cut off. Infinite if no stretching does.
     pub fn score(&self, sample: Sample) -> f64 {
         if sample.is_censored {
             // It may be anything greater: as far below as it was seen, and any distance above.
@@ -95,9 +95,9 @@ pub fn fewest(miss: f64) -> usize {
     fewest
 }
 
-/// How a probability of failure is divided among bands: each gets a share in proportion to how often the
-/// training samples lie outside its band, counted with one miss more, so that each share is positive. The
-/// shares add up to `miss`.
+/// How a probability of failure is divided among bands: each gets a share in proportion to how
+/// often the training samples lie outside its band, counted with one miss more, so that each share
+/// is positive. The shares add up to `miss`.
 pub fn allotment(bands: &[(Band, Vec<Sample>)], miss: f64) -> Vec<f64> {
     let weights: Vec<f64> = bands
         .iter()

@@ -1,14 +1,14 @@
-//! An alarm when values no longer come from where they came from before: a conformal test martingale
-//! (Vovk 2021, the *simple jumper*).
+//! An alarm when values no longer come from where they came from before: a conformal test
+//! martingale (Vovk 2021, the *simple jumper*).
 //!
-//! While the values are exchangeable, the martingale reaches 1/δ with a probability of at most δ, however
-//! long one goes on (Ville's inequality). That is why it can be looked at after each value.
+//! While the values are exchangeable, the martingale reaches 1/δ with a probability of at most δ,
+//! however long one goes on (Ville's inequality). That is why it can be looked at after each value.
 
 use rand::Rng;
 
 use crate::survival::float;
 
-/// What the values so far say.
+/// Evidence in the values so far that their distribution has changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drift {
     /// The largest value of the martingale: so many to one that the values have drifted.

@@ -1,4 +1,5 @@
-//! Distributions fitted to right-censored samples by maximum likelihood, and the choice among families.
+//! Distributions fitted to right-censored samples by maximum likelihood, and the choice among
+//! families.
 
 use elbowroom_sim::Distribution;
 
@@ -17,24 +18,25 @@ pub struct Fit {
     pub log_likelihood: f64,
     /// Akaike's criterion, corrected for small samples (Hurvich & Tsai 1989): less is better.
     pub aicc: f64,
-    /// Whether the distance to the product-limit estimate is larger than chance explains at the 1 % level
-    /// (Lilliefors's limit for large samples, 1.035 / √n).
+    /// Whether the distance to the product-limit estimate is larger than chance explains at the 1 %
+    /// level (Lilliefors's limit for large samples, 1.035 / √n).
     pub is_doubtful: bool,
 }
 
-/// Lilliefors's limit at the 1 % level for large samples, times √n. It is meant for normal distributions
-/// with fitted parameters, and is taken for the others too.
+/// Lilliefors's limit at the 1 % level for large samples, times √n. It is meant for normal
+/// distributions with fitted parameters, and is taken for the others too.
 const LILLIEFORS: f64 = 1.035;
 
 /// The fewest observed values for which a family can be called doubtful.
 const FEWEST_TO_DOUBT: usize = 20;
 
-/// The family that explains the samples best: constant, normal, lognormal or uniform, by the corrected
-/// criterion of Akaike. If even that one is doubtful, and nothing was cut off beyond the values that were
-/// observed, the observed values themselves.
+/// The family that explains the samples best: constant, normal, lognormal or uniform, by the
+/// corrected criterion of Akaike. If even that one is doubtful, and nothing was cut off beyond the
+/// values that were observed, the observed values themselves.
 ///
-/// Probabilities are those of the interval of the width `resolution` around a value, so that values that
-/// are all equal have probability 1 in a constant distribution. `None` if nothing was observed to its end.
+/// Probabilities are those of the interval of the width `resolution` around a value, so that values
+/// that are all equal have probability 1 in a constant distribution. `None` if nothing was observed
+/// to its end.
 pub fn best(samples: &[Sample], resolution: f64) -> Option<Fit> {
     let fits = [
         constant(samples, resolution),
@@ -224,8 +226,8 @@ fn uniform(samples: &[Sample], resolution: f64) -> Option<Fit> {
     ))
 }
 
-/// The observed values, each as often as the product-limit estimate says: a value that stands for others
-/// that were cut off counts for more. `None` if some were cut off beyond the greatest one.
+/// The observed values, each as often as the product-limit estimate says: a value that stands for
+/// others that were cut off counts for more. `None` if some were cut off beyond the greatest one.
 fn empirical(samples: &[Sample]) -> Option<Fit> {
     /// A value of the least probability stands here so many times at most.
     const MOST_COPIES: f64 = 8.0;
@@ -273,11 +275,12 @@ fn empirical(samples: &[Sample]) -> Option<Fit> {
     })
 }
 
-/// Location, scale, and the standard error of the location of a normal distribution, by maximum likelihood
-/// from right-censored samples; `None` if there are fewer than two different observed values.
+/// Location, scale, and the standard error of the location of a normal distribution, by maximum
+/// likelihood from right-censored samples; `None` if there are fewer than two different observed
+/// values.
 ///
-/// In the parameters 1/σ and μ/σ the log-likelihood is concave (Olsen 1978), so that Newton's method with
-/// halved steps finds its only maximum.
+/// In the parameters 1/σ and μ/σ the log-likelihood is concave (Olsen 1978), so that Newton's
+/// method with halved steps finds its only maximum.
 fn location_and_scale(samples: &[Sample]) -> Option<(f64, f64, f64)> {
     let n = float(observed(samples).count());
     if n < 2.0 {

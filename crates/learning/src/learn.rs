@@ -1,5 +1,5 @@
-//! From attempts to rules of a world: which actions are described together, by which distributions, and
-//! how often they fail.
+//! From attempts to rules of a world: which actions are described together, by which distributions,
+//! and how often they fail.
 
 use std::collections::BTreeMap;
 
@@ -17,8 +17,8 @@ use crate::survival::{Sample, SurvivalFunction, float};
 pub struct Settings {
     /// Times in the logs are multiples of this, in seconds.
     pub resolution: f64,
-    /// The evidence at which values are said to have drifted: the reciprocal of the probability of a false
-    /// alarm.
+    /// The evidence at which values are said to have drifted: the reciprocal of the probability of
+    /// a false alarm.
     pub drift_limit: f64,
     /// For telling equal values apart when looking for drift.
     pub seed: u64,
@@ -34,7 +34,7 @@ impl Default for Settings {
     }
 }
 
-/// What logs say of the actions with one name.
+/// Statistics of the actions with one name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Learnt {
     /// The name: `drive`.
@@ -43,7 +43,8 @@ pub struct Learnt {
     pub attempts: usize,
     /// How long the actions take.
     pub durations: Durations,
-    /// How long after the command they start; `None` where no log says, or where it is always at once.
+    /// How long after the command they start; `None` where no log says, or where it is always at
+    /// once.
     pub delay: Option<Fit>,
     /// How often they fail, of those attempts that ended by themselves.
     pub failures: Proportion,
@@ -94,8 +95,8 @@ impl Group {
 /// The fewest observed durations of each ground action for them to be described apart.
 const FEWEST_APART: usize = 5;
 
-/// What the attempts say, by the actions' names. They stand in the order in which they were made, log by
-/// log.
+/// What the attempts say, by the actions' names. They stand in the order in which they were made,
+/// log by log.
 pub fn learn(records: &[Record], settings: &Settings) -> Vec<Learnt> {
     let mut by_name: BTreeMap<&str, Vec<&Record>> = BTreeMap::new();
     for record in records {
@@ -146,8 +147,8 @@ impl Outcome {
     }
 }
 
-/// How long an attempt took, or at least took; `None` of one that never started, and of instantaneous
-/// actions.
+/// How long an attempt took, or at least took; `None` of one that never started, and of
+/// instantaneous actions.
 fn sample(record: &Record, is_whole: impl Fn(Outcome) -> bool) -> Option<Sample> {
     let duration = record.end - record.start?;
     let sample = if is_whole(record.outcome) {
@@ -261,8 +262,9 @@ fn delay(records: &[&Record], settings: &Settings) -> Option<Fit> {
     best(&delays, settings.resolution)
 }
 
-/// When the failed attempts failed: most of them before they had started, or at once; or else, whichever of
-/// *at the end* and *at a moment of the duration, all alike* makes the observed times likelier.
+/// When the failed attempts failed: most of them before they had started, or at once; or else,
+/// whichever of *at the end* and *at a moment of the duration, all alike* makes the observed times
+/// likelier.
 fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Failure {
     let failed: Vec<(&str, f64, Option<f64>)> = records
         .iter()
@@ -283,8 +285,8 @@ fn when(records: &[&Record], durations: &Durations, settings: &Settings) -> Fail
             Failure::AtStart
         };
     }
-    // How far into its duration an attempt failed, in units of the mean duration: at the end, that is
-    // about 1, and midway about 1/2.
+    // How far into its duration an attempt failed, in units of the mean duration: at the end, that
+    // is about 1, and midway about 1/2.
     let shares: Vec<f64> = failed
         .iter()
         .filter(|(_, duration, _)| *duration > settings.resolution)

@@ -1,11 +1,14 @@
-//! What logs of executed plans say about the world: how long actions take, how late they start, how often
-//! they fail, whether that changes, and within which limits the next run will stay.
+//! What logs of executed plans say about the world: how long actions take, how late they start, how
+//! often they fail, whether that changes, and within which limits the next run will stay.
 //!
 //! - [`records`]: attempts to execute actions, from traces of runs; [`table`]: the same from CSV.
-//! - [`survival`], [`fit`]: distributions from samples of which some were cut off, because the action was
-//!   cancelled or failed (right-censored); leaving these out would make slow actions look quick.
-//! - [`learn`]: which actions are described together, and by what; [`world`]: the result as a world file.
-//! - [`conformal`]: intervals that hold the next value with a stated probability, whatever its distribution.
+//! - [`survival`], [`fit`]: distributions from samples of which some were cut off, because the
+//!   action was cancelled or failed (right-censored); leaving these out would make slow actions
+//!   look quick.
+//! - [`learn`]: which actions are described together, and by what; [`world`]: the result as a world
+//!   file.
+//! - [`conformal`]: intervals that hold the next value with a stated probability, whatever its
+//!   distribution.
 //! - [`drift`]: an alarm when values no longer come from where they came from.
 //!
 //! ```

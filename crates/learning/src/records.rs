@@ -11,8 +11,8 @@ use elbowroom_report::trace::{Line, Stored};
 pub enum Outcome {
     /// As it should.
     Succeeded,
-    /// Without success, whether by chance or because a condition of it did not hold: logs tell that in
-    /// free text only.
+    /// Without success, whether by chance or because a condition of it did not hold: logs tell that
+    /// in free text only.
     Failed,
     /// Because it was told to.
     Cancelled,
@@ -33,7 +33,8 @@ pub struct Record {
     pub end: f64,
     /// How it ended.
     pub outcome: Outcome,
-    /// How long it was planned to take; `None` where the log does not say, and for instantaneous actions.
+    /// How long it was planned to take; `None` where the log does not say, and for instantaneous
+    /// actions.
     pub planned: Option<f64>,
 }
 
@@ -53,8 +54,9 @@ struct Open {
     start: Option<f64>,
 }
 
-/// The starts of a trace, in the order of the commands. What was observed and not taken at its word is left
-/// out. An action whose start was never reported has started when it was commanded, if it ended at all.
+/// The starts of a trace, in the order of the commands. What was observed and not taken at its word
+/// is left out. An action whose start was never reported has started when it was commanded, if it
+/// ended at all.
 pub fn of_trace(trace: &Stored) -> Vec<Record> {
     let mut open: BTreeMap<u64, Open> = BTreeMap::new();
     let mut records: Vec<(u64, Record)> = Vec::new();

@@ -1,5 +1,5 @@
-//! Right-censored samples: values that were observed, and values of which only a lower bound is known,
-//! because the action was cancelled or failed before it could end.
+//! Right-censored samples: values that were observed, and values of which only a lower bound is
+//! known, because the action was cancelled or failed before it could end.
 
 /// One value, or a lower bound of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,8 @@ mod tests {
 
     #[test]
     fn a_worked_example_by_hand() {
-        // At 3 one of 5 ends, at 5 one of 3 (4 was cut off), at 8 the last one that is left but one.
+        // At 3 one of 5 ends, at 5 one of 3 (4 was cut off), at 8 the last one that is left but
+        // one.
         let samples = [
             Sample::observed(3.0),
             Sample::censored(4.0),

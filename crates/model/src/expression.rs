@@ -193,9 +193,11 @@ impl Expression<FluentId> {
 /// A number that the problem leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Unknown {
-    /// An entry of [`Problem::unknowns`](crate::Problem::unknowns): one number for the whole domain.
+    /// An entry of [`Problem::unknowns`](crate::Problem::unknowns): one number for the whole
+    /// domain.
     Domain(u32),
-    /// An entry of [`Schema::unknowns`](crate::problem::Schema::unknowns): one number per action instance.
+    /// An entry of [`Schema::unknowns`](crate::problem::Schema::unknowns): one number per action
+    /// instance.
     Action(u32),
     /// A parameter that a parametrized plan put here, by its position in that plan's list.
     Parameter(u32),

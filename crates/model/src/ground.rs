@@ -125,7 +125,7 @@ pub type Expression = crate::expression::Expression<FluentId>;
 pub struct Effect {
     /// When it happens at all.
     pub guard: Guard,
-    /// What happens.
+    /// The change.
     pub change: Change,
 }
 
@@ -190,7 +190,7 @@ pub struct Action {
     pub arguments: Vec<ObjectId>,
     /// `(name arg …)`.
     pub name: String,
-    /// What it needs and does.
+    /// Its conditions and effects.
     pub body: Body,
 }
 

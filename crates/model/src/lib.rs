@@ -12,8 +12,9 @@
 //!    demand ([`Task::instantiate`]).
 //! 4. [`TimeTriggeredPlan`]: actions with start times and durations, exactly as a planner says.
 //! 5. [`Situation`]: the same problem in mid-execution, with actions under way.
-//! 6. [`validate()`], [`validate_from()`]: the judge. It decides by the semantics of PDDL 2.1 alone and
-//!    shares no code with networks, encodings or solvers, because their results are tested with it.
+//! 6. [`validate()`], [`validate_from()`]: the judge. It decides by the semantics of PDDL 2.1 alone
+//!    and shares no code with networks, encodings or solvers, because their results are tested with
+//!    it.
 //!
 //! Semantics: Fox & Long, "PDDL2.1: An Extension to PDDL for Expressing Temporal Planning
 //! Domains", JAIR 20 (2003), with the timed initial literals of PDDL 2.2.

@@ -17,7 +17,7 @@ pub struct TimeTriggeredPlan {
 pub struct Step {
     /// When it starts, or happens.
     pub start: Rational,
-    /// What is done.
+    /// The action.
     pub action: Action,
     /// The duration; `None` exactly for instantaneous actions.
     pub duration: Option<Rational>,

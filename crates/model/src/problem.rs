@@ -78,15 +78,15 @@ pub struct Problem {
     pub rules: Vec<Rule>,
     /// `:synth-parameters` of the domain: one unknown each, for the whole domain.
     pub unknowns: Vec<String>,
-    /// What is true at time 0.
+    /// The facts that hold at time 0.
     pub initial_facts: Vec<(PredicateId, Vec<ObjectId>)>,
     /// The numbers at time 0; a function value not listed is undefined.
     pub initial_values: Vec<(FunctionId, Vec<ObjectId>, Rational)>,
     /// Timed initial literals and fluents, as written (not sorted).
     pub timed: Vec<TimedInitial>,
-    /// What must hold at the end.
+    /// The goal condition.
     pub goal: Condition,
-    /// What to optimize. Has no bearing on validity.
+    /// The metric to optimize. It has no bearing on validity.
     pub metric: Option<Metric>,
 }
 
@@ -213,7 +213,7 @@ pub struct Schema {
     pub parameters: Vec<Variable>,
     /// `:synth-parameters` of the action: one unknown per instance.
     pub unknowns: Vec<String>,
-    /// What it needs and does.
+    /// Its conditions and effects.
     pub body: Body,
 }
 
@@ -264,7 +264,7 @@ pub struct Effect {
     pub variables: Vec<Variable>,
     /// When it happens at all.
     pub guard: Guard,
-    /// What happens.
+    /// The change.
     pub change: Change,
 }
 
@@ -362,7 +362,7 @@ pub struct Rule {
 pub struct TimedInitial {
     /// When it happens, `> 0`.
     pub time: Rational,
-    /// What happens; ground, never an increase.
+    /// The change; ground, never an increase.
     pub change: TimedChange,
 }
 
@@ -382,7 +382,7 @@ pub enum TimedChange {
 pub struct Metric {
     /// Whether more is better.
     pub maximize: bool,
-    /// What is measured; `None` if it depends on preferences, which we do not measure.
+    /// The expression to optimize; `None` if it depends on preferences, which are not measured.
     pub expression: Option<Expression>,
 }
 

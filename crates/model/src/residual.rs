@@ -60,7 +60,7 @@ impl Situation {
 }
 
 impl RunningAction {
-    /// What is left of the action at `now`, as an action.
+    /// The rest of the action at `now`, as an action.
     #[must_use]
     pub fn rest(&self, now: &Rational) -> Action {
         let elapsed = now - &self.start;
@@ -91,7 +91,7 @@ impl RunningAction {
     }
 }
 
-/// What is left of the durations that are possible, as duration constraints.
+/// The rest of the possible durations, as duration constraints.
 fn bounds(possible: &Interval, elapsed: &Rational) -> Vec<DurationConstraint> {
     let bound = |end: &End, closed, open| {
         let comparison = match end {

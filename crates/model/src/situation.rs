@@ -23,9 +23,9 @@ use crate::task::Task;
 pub struct Situation {
     /// Now.
     pub time: Rational,
-    /// What holds now, after all that has happened.
+    /// The present state, after all that has happened.
     pub state: State,
-    /// What has started and not ended.
+    /// The actions that have started and not ended.
     pub running: Vec<RunningAction>,
 }
 

@@ -9,7 +9,7 @@ use crate::ground::{Change, FactId, FluentId};
 /// The truth of facts and the values of fluents at one moment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
-    /// What is true, derived facts aside.
+    /// The true facts, except derived ones.
     pub facts: BTreeSet<FactId>,
     /// The defined fluents' values.
     pub values: BTreeMap<FluentId, Rational>,
@@ -20,6 +20,6 @@ pub struct State {
 pub struct TimedHappening {
     /// When they happen.
     pub time: Rational,
-    /// What happens: additions, deletions and assignments of constants.
+    /// The changes: additions, deletions and assignments of constants.
     pub changes: Vec<Change>,
 }

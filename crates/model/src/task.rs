@@ -16,9 +16,9 @@ use crate::table::Table;
 ///
 /// Facts and fluents enter a table when something mentions them, so that a plan can be judged
 /// without grounding the whole problem. The table only grows, and clones share it, as do
-/// [`Task::beginning_at`] and [`Situation::rest_of_task`](crate::Situation::rest_of_task): a fact has
-/// one number in all of them, whoever mentions it first. Numbers follow the order of first mention;
-/// where threads mention facts in no fixed order, each needs a table of its own
+/// [`Task::beginning_at`] and [`Situation::rest_of_task`](crate::Situation::rest_of_task): a fact
+/// has one number in all of them, whoever mentions it first. Numbers follow the order of first
+/// mention; where threads mention facts in no fixed order, each needs a table of its own
 /// ([`Task::with_own_table`]) for results to be the same each time.
 #[derive(Clone, Debug)]
 pub struct Task {
@@ -34,7 +34,8 @@ pub struct Task {
 }
 
 impl Task {
-    /// The task of a problem: its initial state, timed happenings and goal, made ground; ε is 0.001.
+    /// The task of a problem: its initial state, timed happenings and goal, made ground; ε is
+    /// 0.001.
     pub fn new(problem: impl Into<Arc<Problem>>) -> Self {
         let problem = problem.into();
         let mut task = Self {

@@ -86,7 +86,7 @@ pub struct Correlation {
 /// `delay` after the activation; part of networks in dispatchable form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GivenWait {
-    /// Who waits.
+    /// The time point that waits.
     pub node: NodeId,
     /// The link whose end it waits for.
     pub link: LinkId,
@@ -114,7 +114,7 @@ pub struct NetworkFile {
     pub correlations: Vec<Correlation>,
     /// The waits of a network in dispatchable form.
     pub waits: Vec<GivenWait>,
-    /// What was taken otherwise than the file says, or left out.
+    /// Remarks on parts of the file that were interpreted leniently, or left out.
     pub remarks: Vec<String>,
 }
 

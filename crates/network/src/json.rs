@@ -61,7 +61,7 @@ impl<'a> Json<'a> {
         }
     }
 
-    /// What the value is, in a message.
+    /// The kind of the value, for a message.
     pub(crate) fn kind(&self) -> &'static str {
         match &self.value {
             Value::Null => "null",
@@ -119,7 +119,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What stands at this place, in a message.
+    /// The text at this place, for a message.
     fn here(&self) -> String {
         match self.text[self.at..].chars().next() {
             Some(letter) => format!("`{letter}`"),

@@ -33,7 +33,7 @@ const REFUSED: [(&str, &str); 6] = [
     ("pstn", "a probabilistic network of the CSTNU Tool (PSTN)"),
 ];
 
-/// What to do about a network of a kind that is refused.
+/// Advice on a network of a kind that is refused.
 const REFUSED_HELP: &str =
     "simple networks (STN) and networks with contingent links (STNU) are read";
 
@@ -92,7 +92,7 @@ fn any(name: &str, text: &str, report: &mut Report) -> Option<NetworkFile> {
     }
 }
 
-/// What stands after the last point of a file's name, in lower case.
+/// The extension of a file's name, in lower case.
 fn ending(name: &str) -> String {
     let base = name.rsplit(['/', '\\']).next().unwrap_or_default();
     match base.rsplit_once('.') {

@@ -36,7 +36,7 @@ pub enum Weak {
 pub struct WeakConflict {
     /// The links that matter, and how long each takes; the others may take any time.
     pub durations: BTreeMap<LinkId, Rational>,
-    /// What contradicts itself then, in the order of a cycle.
+    /// The contradiction in that case, in the order of a cycle.
     pub steps: Vec<WeakStep>,
     /// By how much; negative.
     pub total: Rational,
@@ -49,7 +49,7 @@ pub struct WeakStep {
     pub from: NodeId,
     /// The time point it is subtracted from.
     pub to: NodeId,
-    /// What the difference does not exceed.
+    /// The upper bound of the difference.
     pub bound: Rational,
     /// Where it comes from.
     pub given: Given,

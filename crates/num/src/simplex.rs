@@ -86,7 +86,7 @@ pub type Combination = [(VariableId, Rational)];
 pub struct Simplex {
     tableau: Tableau,
     variables: Vec<Variable>,
-    /// What each assertion since the first [`Simplex::push`] replaced, oldest first.
+    /// The assertions replaced since the first [`Simplex::push`], oldest first.
     replaced: Vec<Replaced>,
     /// How long `replaced` was at each push.
     levels: Vec<usize>,

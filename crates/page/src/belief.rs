@@ -21,7 +21,7 @@ const MOST_POINTS: usize = 20_000;
 pub(crate) struct Belief<'t> {
     task: &'t Arc<Task>,
     progression: Progression,
-    /// What was true when it was last looked at, by fact.
+    /// The facts as they were last observed.
     facts: Vec<bool>,
     /// The values then, by fluent.
     values: Vec<Option<Rational>>,

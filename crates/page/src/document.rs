@@ -14,9 +14,9 @@ pub struct Document {
     pub title: String,
     /// The answer in one line.
     pub verdict: Verdict,
-    /// What the page is about: names and values.
+    /// The subject of the page: names and values.
     pub facts: Vec<(String, String)>,
-    /// What there is to see, from top to bottom.
+    /// The sections, from top to bottom.
     pub sections: Vec<Section>,
     /// Texts that occur often; see [`Text`].
     pub texts: Vec<String>,
@@ -124,13 +124,15 @@ pub struct Chart {
     pub bars: Vec<Bar>,
     /// Deadlines and other moments.
     pub marks: Vec<Mark>,
-    /// What the plans order: positions in [`Chart::bars`], the one that comes first, and the other.
+    /// The orderings of the plans: positions in [`Chart::bars`], the one that comes first, and the
+    /// other.
     pub orderings: Vec<(usize, usize)>,
-    /// What was guaranteed, from when to when.
+    /// The guarantee over time.
     pub guarantee: Vec<Segment>,
-    /// What happened, in order of time, so that the state at any time can be shown; only of a run.
+    /// The changes of facts and numbers in order of time, so that the state at any time can be
+    /// shown; only of a run.
     pub changes: Vec<Change>,
-    /// What was decided, in order of time; only of a run.
+    /// The decisions, in order of time; only of a run.
     pub decisions: Vec<DecisionAt>,
     /// Whether the actions were executed: there is a past to look at.
     pub is_run: bool,
@@ -139,7 +141,7 @@ pub struct Chart {
 /// A way to put actions on lanes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Grouping {
-    /// What a lane stands for: `robot`.
+    /// The kind of lane, such as `robot`.
     pub name: String,
     /// The lanes' names.
     pub lanes: Vec<String>,
@@ -164,7 +166,7 @@ pub struct Bar {
     pub lanes: Vec<usize>,
     /// The plan that it belongs to.
     pub plan: usize,
-    /// What is shown when it is pointed at: names and values.
+    /// The details shown on hover: names and values.
     pub details: Vec<(&'static str, Text)>,
 }
 
@@ -173,7 +175,7 @@ pub struct Bar {
 pub struct Mark {
     /// When.
     pub at: f64,
-    /// What happens.
+    /// The happening.
     pub name: String,
     /// Whether it is a moment of the run, not one of the problem.
     pub is_event: bool,
@@ -201,7 +203,7 @@ pub struct Change {
     pub kind: &'static str,
     /// Which fact, fluent or action.
     pub name: Text,
-    /// What it is now; a fact that is no more has `None`.
+    /// The new value; a fact that no longer holds has `None`.
     pub value: Option<String>,
 }
 
@@ -210,7 +212,7 @@ pub struct Change {
 pub struct DecisionAt {
     /// When.
     pub at: f64,
-    /// What, and why.
+    /// The decision and its reason.
     pub words: String,
 }
 
@@ -219,7 +221,7 @@ pub struct DecisionAt {
 pub struct Table {
     /// The heading.
     pub heading: String,
-    /// What there is to say about it.
+    /// A note on it.
     pub note: String,
     /// The columns: their headings, and whether they hold numbers.
     pub columns: Vec<(String, bool)>,
@@ -236,7 +238,7 @@ pub struct Table {
 pub struct Rates {
     /// The heading.
     pub heading: String,
-    /// What there is to say about them.
+    /// A note on them.
     pub note: String,
     /// The groups.
     pub groups: Vec<RateGroup>,
@@ -245,7 +247,7 @@ pub struct Rates {
 /// Shares that are compared with each other.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RateGroup {
-    /// What they have in common.
+    /// The property that they share.
     pub name: String,
     /// The shares.
     pub rates: Vec<Rate>,
@@ -254,7 +256,7 @@ pub struct RateGroup {
 /// A share with its interval.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Rate {
-    /// What it is the share of.
+    /// The name of the share.
     pub name: String,
     /// The share, its lower and its upper end, between 0 and 1; `None` if there was no trial.
     pub share: Option<(f64, f64, f64)>,
@@ -286,8 +288,8 @@ pub struct SeriesLine {
     pub words: String,
 }
 
-/// Quantities to change. Whether the plan works with the values chosen is worked out on the page, in whole
-/// numbers.
+/// Quantities to change. Whether the plan works with the values chosen is worked out on the page,
+/// in whole numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Sliders {
     /// The heading.

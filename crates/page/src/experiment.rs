@@ -9,7 +9,7 @@ use elbowroom_laboratory::perturbed::PerturbedResults;
 use crate::document::{Document, Rate, RateGroup, Rates, Section, Table, Text, Tone, Verdict};
 use crate::plan::word;
 
-/// What the intervals are.
+/// The meaning of the intervals.
 const INTERVALS: &str = "The share of runs that reached the goal, with Wilson's 95 % interval.";
 
 /// The page about an experiment on a clock.

@@ -24,14 +24,15 @@ pub(crate) struct Lanes {
     pub(crate) of: Vec<Vec<usize>>,
 }
 
-/// What an action without an object of the lanes' type is put under.
+/// The lane of actions without an object of the lanes' type.
 const OTHERS: &str = "others";
 
 /// The ways to put these actions on lanes.
 ///
 /// There is one for each type of object that occurs: a lane for each object, with the actions that
 /// mention it first among those of its type. The one to begin with is the type whose objects come
-/// early in the names of most actions, as acting objects do, without having to do two things at once.
+/// early in the names of most actions, as acting objects do, without having to do two things at
+/// once.
 pub(crate) fn lanes<'a>(
     occupants: &[Occupant<'_>],
     type_of: &dyn Fn(&str) -> Option<&'a str>,
@@ -99,7 +100,7 @@ impl Lanes {
     }
 }
 
-/// What the lanes of a grouping stand for.
+/// The objects that the lanes of a grouping stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind<'a> {
     /// The objects of a type.

@@ -4,11 +4,11 @@
 //! file with its style, its script and its data inside, which needs no network and can be sent by
 //! mail. It knows no files, no clock and no command line, and the same input gives the same bytes.
 //!
-//! What is read on a page was worked out here, from exact numbers; the script in it draws, filters and
-//! moves through time. The one thing that it decides is whether a plan works with the values of its
-//! sliders, and it does so in whole numbers (`script/points.js`). Names and other texts that
-//! come from outside are data: they reach the page in a block of JSON, and the script only ever shows
-//! them as text.
+//! What is read on a page was worked out here, from exact numbers; the script in it draws, filters
+//! and moves through time. The one thing that it decides is whether a plan works with the values of
+//! its sliders, and it does so in whole numbers (`script/points.js`). Names and other texts that
+//! come from outside are data: they reach the page in a block of JSON, and the script only ever
+//! shows them as text.
 //!
 //! - [`document`](mod@document): what a page shows, as data.
 //! - `plan`, `run`, `experiment`: from answers, traces and results to documents.
@@ -69,7 +69,7 @@ pub enum PageError {
          the answers of `envelope`, `plan` and `run`, and of the results of `compare`"
     )]
     OtherFormat {
-        /// What the text is called.
+        /// The name of the text.
         name: String,
         /// The format that it says it has.
         format: String,
@@ -80,15 +80,15 @@ pub enum PageError {
     /// It says that it is one of these, but is damaged, or of another version.
     #[error("{name} cannot be read: {why}")]
     Damaged {
-        /// What the text is called.
+        /// The name of the text.
         name: String,
-        /// What is wrong with it.
+        /// The error.
         why: String,
     },
 }
 
-/// The page about an answer, a trace, or results: an HTML file. `name` is what the text is called, such
-/// as its file.
+/// The page about an answer, a trace, or results: an HTML file. `name` is what the text is called,
+/// such as its file.
 ///
 /// # Errors
 /// When the text is none of these, or damaged.

@@ -1,7 +1,9 @@
-//! A run as an MCAP file (<https://mcap.dev>), which Foxglove and others open beside a robot's own logs.
+//! A run as an MCAP file (<https://mcap.dev>), which Foxglove and others open beside a robot's own
+//! logs.
 //!
-//! Messages are JSON with schemas: what happened as a log, what each lane is doing, each number, and the
-//! guarantee. The file is plain: no chunks, no index, no checksums; readers do without them.
+//! Messages are JSON with schemas: what happened as a log, what each lane is doing, each number,
+//! and the guarantee. The file is plain: no chunks, no index, no checksums; readers do without
+//! them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -129,7 +131,7 @@ impl File {
         }
     }
 
-    /// What each lane is doing.
+    /// The action of each lane over time.
     fn lanes(&mut self, chart: &Chart) {
         let Some(grouping) = chart.groupings.get(chart.chosen) else {
             return;

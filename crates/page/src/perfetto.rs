@@ -1,8 +1,10 @@
-//! A run as a trace that Perfetto (<https://ui.perfetto.dev>) opens: its native format, track events.
+//! A run as a trace that Perfetto (<https://ui.perfetto.dev>) opens: its native format, track
+//! events.
 //!
-//! Each lane of the chart is a track, with what was done and what was planned below it; slices on one
-//! track do not overlap, as the format asks. Numbers are counters, moments and decisions are instants,
-//! and what the plan orders is joined by flows. The field numbers are those of `perfetto_trace.proto`.
+//! Each lane of the chart is a track, with what was done and what was planned below it; slices on
+//! one track do not overlap, as the format asks. Numbers are counters, moments and decisions are
+//! instants, and what the plan orders is joined by flows. The field numbers are those of
+//! `perfetto_trace.proto`.
 
 use crate::clock::nanoseconds;
 use crate::document::{Bar, Chart, Document, Section, Series, Text};
@@ -28,7 +30,7 @@ pub(crate) fn trace(document: &Document) -> Option<Vec<u8>> {
 /// The one sequence of packets that all events are on.
 const SEQUENCE: u64 = 1;
 
-/// What a track event is.
+/// The kind of a track event.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     End = 2,

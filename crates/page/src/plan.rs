@@ -168,7 +168,7 @@ fn fixed<'a>(actions: impl Iterator<Item = (&'a str, &'a str, Exact, Option<Exac
     }
 }
 
-/// What goes wrong, as sentences and as a schedule.
+/// The failure, as sentences and as a schedule.
 fn failure(example: &Counterexample, texts: &mut Texts) -> Vec<Section> {
     let mut paragraphs = vec![example.message.clone()];
     if let Some(shortfall) = &example.shortfall {
@@ -265,8 +265,8 @@ fn chart(timeline: &Timeline, rooms: &[Room], texts: &mut Texts) -> Chart {
     }
 }
 
-/// Where the axis ends: behind all that is planned, and behind what may come later as far as that is
-/// not so far away that nothing else could be seen.
+/// Where the axis ends: behind all that is planned, and behind what may come later as far as that
+/// is not so far away that nothing else could be seen.
 pub(crate) fn end_of_axis(bars: &[Bar], marks: &[Mark]) -> f64 {
     let spans = bars
         .iter()

@@ -27,8 +27,8 @@ use crate::run::log::Log;
 
 /// The page about a stored run.
 ///
-/// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be, the
-/// page does without them.
+/// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be,
+/// the page does without them.
 pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec) -> Document {
     let mut texts = Texts::default();
     let task = task(spec).map(Arc::new);

@@ -57,7 +57,7 @@ pub enum WriteProblemError {
         /// The durations that are possible.
         possible: String,
     },
-    /// What the action does at its end, or until then, cannot be said in advance.
+    /// The effects at the end of the action, or until then, are not known in advance.
     #[error(
         "a problem file cannot say that {action} is under way: {why}; \
          the embedded planner takes it as it is"
@@ -65,7 +65,7 @@ pub enum WriteProblemError {
     Unspeakable {
         /// The action.
         action: String,
-        /// What is beyond timed initials.
+        /// The part that timed initials cannot express.
         why: String,
     },
 }

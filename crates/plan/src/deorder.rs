@@ -15,8 +15,8 @@
 //! - Rates of continuous effects are treated like over-all conditions. So are over-all conditions
 //!   of conditional effects, but what came between start and end stays strictly between, as such
 //!   a condition must not become true either.
-//! - The goal is read in the end, after all timed initials too, so it needs no constraint of its own:
-//!   what writes a fact or fluent last does so in every schedule.
+//! - The goal is read in the end, after all timed initials too, so it needs no constraint of its
+//!   own: what writes a fact or fluent last does so in every schedule.
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
 //!

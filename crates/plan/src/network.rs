@@ -119,7 +119,8 @@ impl StnPlan {
     }
 
     /// What is left of the plan `now`: what has happened stays where it is, and of the rest what
-    /// `waits` for somebody to bring it about comes not before now. Timed initials keep their times.
+    /// `waits` for somebody to bring it about comes not before now. Timed initials keep their
+    /// times.
     ///
     /// The constraints that say so come after the plan's own.
     #[must_use]

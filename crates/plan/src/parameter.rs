@@ -55,7 +55,7 @@ pub struct ParametrizedPlan {
     /// How long those actions are planned to take whose durations are left neither to the world nor
     /// fixed by the domain: the executor tells them at their start.
     pub told: BTreeMap<InstanceId, Rational>,
-    /// What must hold at the end: the task's goal, with the domain's unknowns as parameters.
+    /// The goal: the task's, with the domain's unknowns as parameters.
     pub goal: Condition,
 }
 

@@ -54,9 +54,8 @@ use opening::Opening;
 /// Leaves quantities of a plan open.
 ///
 /// Without specifications, these are all durations but those that the domain leaves to the executor
-/// ([`ParametrizedPlan::told`]). Numbers that the domain itself leaves open become parameters in any
-/// case. `nominal` is a
-/// schedule of the plan; it says how long things take nominally.
+/// ([`ParametrizedPlan::told`]). Numbers that the domain itself leaves open become parameters in
+/// any case. `nominal` is a schedule of the plan; it says how long things take nominally.
 ///
 /// # Errors
 /// When a specification fits nothing, or fits too much, or a nominal value is missing.

@@ -188,7 +188,7 @@ struct Use {
     needs_true: BTreeSet<FactId>,
     needs_false: BTreeSet<FactId>,
     footprint: Footprint,
-    /// What is needed throughout counts with the end.
+    /// Over-all conditions count with the end.
     throughout: Footprint,
 }
 

@@ -63,7 +63,7 @@ pub enum Node {
 pub struct Instance {
     /// `n0`, `refuel_2`, …; unique in its plan.
     pub label: String,
-    /// What is done. Numbers left open are `Expression::Unknown(Unknown::Parameter(_))`.
+    /// The action. Open numbers are `Expression::Unknown(Unknown::Parameter(_))`.
     pub action: Action,
 }
 
@@ -261,7 +261,7 @@ impl StnPlan {
         }
     }
 
-    /// What happens at the node reads and writes.
+    /// The reads and writes of the happening at the node.
     pub fn footprint(&self, task: &Task, node: NodeId) -> Footprint {
         match self.nodes[node.index()] {
             Node::Zero => Footprint::default(),

@@ -148,8 +148,8 @@ impl StnPlan {
 impl ParametrizedPlan {
     /// What a constraint means to an executor who knows that each parameter is in its interval,
     /// tells actions how long to take where that is not left to the world (as long as planned:
-    /// [`told`](Self::told)), and learns the value of a duration when the action ends, of the time of a timed initial
-    /// when that happens, and of any other bound never.
+    /// [`told`](Self::told)), and learns the value of a duration when the action ends, of the time
+    /// of a timed initial when that happens, and of any other bound never.
     ///
     /// A parameter that bounds several differences may be another value in each, which asks for
     /// more than need be.

@@ -1,7 +1,7 @@
 //! The modules of the embedded planner depend on each other in one direction.
 //!
-//! What a file imports is read off its paths (`super::…`, `crate::embedded::…`); a module stands for
-//! itself and all that is below it. Tests do not count.
+//! What a file imports is read off its paths (`super::…`, `crate::embedded::…`); a module stands
+//! for itself and all that is below it. Tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

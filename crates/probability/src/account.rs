@@ -4,12 +4,12 @@
 //!
 //! - *Where is it lost?* [`Loss`]es, each with its place, its reason and its share of all worlds;
 //!   they and P(A ∩ G) add up to 1.
-//! - *What would certainty gain?* P(A ∩ G) of the same order if one action never failed, or one fact
-//!   never changed by itself. These do not add up: where two things must both go well, making
+//! - *What would certainty gain?* P(A ∩ G) of the same order if one action never failed, or one
+//!   fact never changed by itself. These do not add up: where two things must both go well, making
 //!   either certain leaves the other.
 //! - *What would retrying gain?* P(A ∩ G) if failed attempts to start one action did not end the
-//!   order, but were repeated. Each attempt is a step after which facts may change by themselves. The
-//!   sum over the number of failed attempts is exact but for what is left of it in the end.
+//!   order, but were repeated. Each attempt is a step after which facts may change by themselves.
+//!   The sum over the number of failed attempts is exact but for what is left of it in the end.
 
 use elbowroom_model::ground::FactId;
 use elbowroom_plan::{InstanceId, Node, NodeId};
@@ -19,16 +19,17 @@ use crate::likelihoods::Flip;
 use crate::model::{Model, is_fact};
 use crate::network::{Loss, PrunedNetwork, TooCoupled};
 
-/// So many failed attempts are counted at most.
+/// Limit on the number of failed attempts that are counted.
 const MOST_ATTEMPTS: usize = 1000;
 
-/// What is still to come of a sum is not looked at below this.
+/// The rest of a sum is ignored below this.
 const NEGLIGIBLE: f64 = 1e-13;
 
-/// So many happenings are looked at for one order; what retrying gains is not said of longer ones.
+/// Limit on the number of happenings evaluated for one order; for longer ones the gain of retrying
+/// is not given.
 const MOST_HAPPENINGS: usize = 4_000_000;
 
-/// What an order owes its probability to.
+/// The account of an order's probability: where it is lost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Account {
     /// P(A).

@@ -8,7 +8,7 @@ use elbowroom_model::reachability::{self, Answer};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; without time there are only facts, and unconditional effects on them")]
 pub struct Unsupported {
-    /// What there is in it.
+    /// The unsupported feature.
     pub what: String,
 }
 

@@ -22,7 +22,8 @@ use crate::total_order::{Slot, TotalOrderPlan};
 /// The next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
-    /// The goal holds, nothing is under way, and no timed initial changes what the goal reads any more.
+    /// The goal holds, nothing is under way, and no timed initial changes what the goal reads any
+    /// more.
     GoalReached,
     /// This happening.
     Next(NextHappening),

@@ -1,7 +1,7 @@
 //! The success probability of a plan, and the most likely order of its actions (Olisipo).
 //!
-//! In: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the belief
-//! about the present state. Out: the order most likely to succeed, and the next happening.
+//! In: a partially ordered plan, the likelihoods of failures and spontaneous changes, and the
+//! belief about the present state. Out: the order most likely to succeed, and the next happening.
 //!
 //! 1. [`Likelihoods`]: facts that change by themselves, starts and effects that fail; read from
 //!    files by [`likelihoods`].
@@ -9,9 +9,10 @@
 //! 3. [`PrunedNetwork`]: P(A) and P(A ∩ G) of an order, happening by happening.
 //! 4. [`OrderSearch`] (`PGen`): the best order, from [`Circumstances`].
 //! 5. [`LayerDispatch`] (`PExec`): the next happening, in the present state.
-//! 6. [`account`]: where an order's probability is lost, and what certainty and retrying would gain;
-//!    [`search::Lattice`]: all orders of a short plan at once.
-//! 7. [`optimum`]: the best that any executor can reach in a small world, and its [`optimum::Table`].
+//! 6. [`account`]: where an order's probability is lost, and what certainty and retrying would
+//!    gain; [`search::Lattice`]: all orders of a short plan at once.
+//! 7. [`optimum`]: the best that any executor can reach in a small world, and its
+//!    [`optimum::Table`].
 //!
 //! What exactly is calculated, and why it is exact, is in `docs/probability.md`. Nothing here draws
 //! random numbers or looks at a clock: time limits come in as callbacks, and the same input gives

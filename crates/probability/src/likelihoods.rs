@@ -18,8 +18,8 @@ use crate::belief::Belief;
 pub use authors::read as read_authors;
 pub use write::write;
 
-/// Reads a likelihood file, in our own format or in that of Olisipo's authors: theirs has a line `-`
-/// between facts and actions, which ours cannot have.
+/// Reads a likelihood file, in our own format or in that of Olisipo's authors: theirs has a line
+/// `-` between facts and actions, which ours cannot have.
 ///
 /// # Errors
 /// All mistakes found: of syntax, of names, of numbers, and what is missing.
@@ -95,7 +95,7 @@ pub struct PartialFlip {
 /// Invariant: all probabilities are in [0, 1]; whoever fills the fields sees to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Likelihoods {
-    /// What applies where nothing else is said.
+    /// The likelihoods of actions and facts that are not named.
     pub defaults: Defaults,
     /// By predicate.
     pub predicates: BTreeMap<PredicateId, PartialFlip>,

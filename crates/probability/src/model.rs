@@ -57,7 +57,7 @@ pub(crate) struct Event {
     pub(crate) success: f64,
     /// Whether it is a snap action, after which facts change by themselves.
     pub(crate) is_step: bool,
-    /// What is needed from right after this start to the end of its action.
+    /// The conditions from right after this start to the end of its action.
     pub(crate) over_all: Requirement,
     /// Memories that become false when their condition does, from this start to the end.
     pub(crate) watches: Vec<(usize, Condition)>,
@@ -160,8 +160,8 @@ impl Model {
         NodeId::from(index.expect("every instance has its nodes"))
     }
 
-    /// The plan's happenings as they are timed; ends before what begins at the same time. `steps` are
-    /// in the order of the plan's instances.
+    /// The plan's happenings as they are timed; ends before what begins at the same time. `steps`
+    /// are in the order of the plan's instances.
     pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
         let timed = self.task.timed();
         let nodes = self.plan.nodes.iter().enumerate();

@@ -46,7 +46,7 @@ pub struct PrunedNetwork<'m> {
     model: &'m Model,
     facts: Facts,
     numbers: Numbers,
-    /// What is left of the durations of actions that were running at the beginning.
+    /// The remaining durations of actions that were running at the beginning.
     remaining: Vec<(InstanceId, Option<Rational>)>,
     /// The actions under way, in order of their start.
     running: Vec<InstanceId>,
@@ -164,8 +164,8 @@ impl<'m> PrunedNetwork<'m> {
         required.map(|()| probability)
     }
 
-    /// Where an order's probability is lost, in the order of its happenings, and with respect to the
-    /// goal at last. The masses and P(A ∩ G) add up to 1.
+    /// Where an order's probability is lost, in the order of its happenings, and with respect to
+    /// the goal at last. The masses and P(A ∩ G) add up to 1.
     ///
     /// # Errors
     /// When a condition couples too many facts.
@@ -276,7 +276,7 @@ impl<'m> PrunedNetwork<'m> {
         self.require_throughout(node)
     }
 
-    /// So much is left of the probability.
+    /// Multiplies the probability, and notes the loss.
     fn multiply(
         &mut self,
         mass: f64,
@@ -293,7 +293,7 @@ impl<'m> PrunedNetwork<'m> {
         self.ledger.note(position, reading, masses, cause);
     }
 
-    /// What is required throughout the actions under way, in the present layer.
+    /// Requires, in the present layer, the over-all conditions of the actions under way.
     fn require_throughout(&mut self, node: NodeId) -> Result<(), TooCoupled> {
         let model = self.model;
         for place in 0..self.running.len() {

@@ -66,7 +66,7 @@ pub struct Settings {
     pub horizon: Horizon,
     /// The number of actions that can be under way at once.
     pub most_running: usize,
-    /// What becomes of a run where there is no plan.
+    /// The outcome of a run where there is no plan.
     pub dead_ends: DeadEnds,
     /// Whether an action whose over-all condition fails is abandoned at once.
     pub enforces_over_all: bool,
@@ -98,7 +98,7 @@ pub enum NotSmall {
     /// Numbers, or effects that depend on what held throughout an action.
     #[error("{what}, and worlds in which that happens are not tabulated")]
     Unsupported {
-        /// What there is.
+        /// The unsupported feature.
         what: String,
     },
     /// The likelihoods are those of another reading.
@@ -127,7 +127,8 @@ pub struct Optimum {
 }
 
 impl Optimum {
-    /// What is best from here, as an executor is told it; `slot` says when a happening can be.
+    /// The best choice from here, in the form of an executor's decision; `slot` says when a
+    /// happening can take place.
     pub fn choice(
         &self,
         process: &Perturbed,

@@ -159,8 +159,8 @@ impl OrderSearch {
     }
 
     /// A plan's happenings as they are timed, as an order: without the timed initials that do not
-    /// matter, and of those that come after all actions, with those up to the last that changes what
-    /// the goal reads. `steps` are in the order of the plan's instances.
+    /// matter, and of those that come after all actions, with those up to the last that changes
+    /// what the goal reads. `steps` are in the order of the plan's instances.
     pub fn as_timed(&self, steps: &[Step]) -> Vec<NodeId> {
         let is_timed =
             |node: NodeId| matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
@@ -176,7 +176,8 @@ impl OrderSearch {
         order
     }
 
-    /// Whether no timed initial after `now` changes what the goal reads. Until then it is not reached.
+    /// Whether no timed initial after `now` changes what the goal reads. Until then it is not
+    /// reached.
     pub fn is_goal_settled(&self, now: &Rational) -> bool {
         self.separations.is_goal_settled(now)
     }

@@ -264,8 +264,9 @@ fn a_lattice_beyond_its_limits_is_refused() {
     let model = Model::new(task, plan, &Likelihoods::certain(), Semantics::Paper).unwrap();
     let search = OrderSearch::new(model, SearchSettings::default());
     let lattice = search.lattice(&initial, LatticeLimits::default()).unwrap();
-    // Each lamp is off, being lit, or lit. Of the 6! / 2^3 ways there is no time for six: what takes as long
-    // cannot begin after one of two that began together has ended, and end before the other.
+    // Each lamp is off, being lit, or lit. Of the 6! / 2^3 ways there is no time for six: what
+    // takes as long cannot begin after one of two that began together has ended, and end before the
+    // other.
     assert_eq!((lattice.nodes.len(), lattice.orders), (27, 84));
     let limits = LatticeLimits {
         nodes: 20,

@@ -1,4 +1,5 @@
-//! The pruned network against exact inference by someone else: pgmpy, from the Python package index.
+//! The pruned network against exact inference by someone else: pgmpy, from the Python package
+//! index.
 //!
 //! Runs where `python3`, or the program that `ELBOWROOM_PYTHON` names, has pgmpy; says that it is
 //! skipped elsewhere.

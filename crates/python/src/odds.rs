@@ -77,8 +77,8 @@ fn executors(names: &[String]) -> Result<Vec<ExecutorSpec>, Trouble> {
     }
 }
 
-/// How likely a plan is to succeed: a document, all orders as a picture if they were asked for, and whether
-/// the search was ended by Ctrl-C.
+/// How likely a plan is to succeed: a document, all orders as a picture if they were asked for, and
+/// whether the search was ended by Ctrl-C.
 #[pyfunction]
 #[expect(
     clippy::too_many_arguments,

@@ -14,7 +14,7 @@ use elbowroom::text::Source;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-/// What a planner has raised, for whoever made the run.
+/// The exception of a planner, for the caller that made the run.
 pub(crate) type Raised = Arc<Mutex<Option<PyErr>>>;
 
 /// A planner that is asked with the texts of a domain and a problem, and answers with the text of a

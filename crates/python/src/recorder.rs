@@ -29,7 +29,7 @@ impl Tape {
         })
     }
 
-    /// What stands in it.
+    /// The text of the record.
     pub(crate) fn text(&self) -> String {
         self.text
             .lock()

@@ -25,7 +25,7 @@ pub(crate) struct Stepper {
     raised: Raised,
 }
 
-/// What a run needs next: a kind, and what it is about.
+/// The next need of a run: its kind, and its subject.
 #[derive(IntoPyObject)]
 pub(crate) enum Needed {
     Start(&'static str, String, u64, String, Option<String>),
@@ -82,7 +82,7 @@ impl Stepper {
         })
     }
 
-    /// What the run needs next.
+    /// The next need of the run.
     fn next(&self, py: Python<'_>) -> PyResult<Needed> {
         guarded(py, || {
             let mut run = self.run();
@@ -145,7 +145,7 @@ impl Stepper {
         })
     }
 
-    /// What time it is, by the world's clock.
+    /// The present time, by the world's clock.
     fn now(&self) -> String {
         self.run().now().to_string()
     }

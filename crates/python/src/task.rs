@@ -29,7 +29,8 @@ pub(crate) struct Task {
     pub(crate) problem: Source,
 }
 
-/// Reads a domain and a problem, each a name for messages and a text; also the warnings, as records.
+/// Reads a domain and a problem, each a name for messages and a text; also the warnings, as
+/// records.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,
@@ -53,7 +54,7 @@ pub(crate) fn read(
     })
 }
 
-/// What can be said about a check, as JSON.
+/// The options of a check, as JSON.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct CheckOptions {
@@ -70,11 +71,11 @@ enum Rules {
     Pddl,
     /// The same, with the goal after the plan's last action, whatever timed initials do later.
     PddlGoalAfterActions,
-    /// What unified-planning does where a problem has no ε.
+    /// The semantics of unified-planning for problems without an ε.
     UnifiedPlanning,
 }
 
-/// What can be said about an envelope, as JSON.
+/// The options of an envelope, as JSON.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct EnvelopeOptions {
@@ -309,7 +310,7 @@ impl Task {
     }
 }
 
-/// What to leave open.
+/// The specifications of the quantities that may vary.
 fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Trouble> {
     let specs = texts.iter().map(|text| text.parse::<VarySpec>());
     specs.collect::<Result<_, _>>().map_err(Trouble::request)

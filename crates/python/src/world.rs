@@ -19,7 +19,7 @@ pub(crate) struct PyWorld {
     task: Arc<Task>,
     now: Rational,
     interrupted: Arc<AtomicBool>,
-    /// What the world has raised.
+    /// The exception of the world.
     pub(crate) raised: Option<PyErr>,
 }
 
@@ -118,7 +118,7 @@ impl World for PyWorld {
     }
 }
 
-/// What a look is at, in words.
+/// The subjects of a look, in words.
 pub(crate) fn names(
     task: &Task,
     facts: &[FactId],

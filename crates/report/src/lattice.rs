@@ -1,16 +1,16 @@
 //! A picture of all orders of a plan's happenings, as SVG.
 //!
-//! A [`LatticePicture`] shows the sets of happenings that an order can have behind it, from nothing on
-//! the left to everything on the right, with a line for each happening that can be next. How dark a
-//! set is says how likely the best of the orders through it is to succeed; one order is drawn through
-//! it all. No fonts are read, and the same picture gives the same bytes.
+//! A [`LatticePicture`] shows the sets of happenings that an order can have behind it, from nothing
+//! on the left to everything on the right, with a line for each happening that can be next. How
+//! dark a set is says how likely the best of the orders through it is to succeed; one order is
+//! drawn through it all. No fonts are read, and the same picture gives the same bytes.
 
 use std::fmt::Write as _;
 
-/// What is drawn.
+/// The picture of a lattice.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LatticePicture {
-    /// What it shows.
+    /// The title.
     pub title: String,
     /// Below the title.
     pub subtitle: String,
@@ -27,7 +27,7 @@ pub struct LatticePicture {
 pub struct PictureNode {
     /// How many happenings are in it: how far to the right it is.
     pub level: usize,
-    /// What is in it.
+    /// The label.
     pub words: String,
     /// A probability.
     pub value: f64,

@@ -41,13 +41,13 @@ pub enum Line {
 pub struct PlanLine {
     /// The time.
     pub now: Exact,
-    /// What the world's clock reads at the plan's time 0.
+    /// The time on the world's clock when the plan's clock reads 0.
     pub origin: Exact,
     /// The actions.
     pub steps: Vec<StepLine>,
     /// The plan with room.
     pub network: NetworkLine,
-    /// What is left open.
+    /// The parameters.
     pub parameters: Vec<ParameterLine>,
 }
 
@@ -190,7 +190,7 @@ pub struct WindowLine {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReasonLine {
-    /// What kind of reason: [`Cause::name`](elbowroom_execution::Cause::name).
+    /// The kind of reason: [`Cause::name`](elbowroom_execution::Cause::name).
     pub cause: String,
     /// The whole of it as a sentence.
     pub words: String,
@@ -198,9 +198,9 @@ pub struct ReasonLine {
     pub action: Option<String>,
     /// The quantity, condition or moment that it is about, in words.
     pub about: Option<String>,
-    /// What was observed.
+    /// The observed value.
     pub observed: Option<Exact>,
-    /// What is allowed.
+    /// The interval that is allowed.
     pub allowed: Option<IntervalLine>,
     /// The constraints behind that, in words.
     pub behind: Vec<String>,
@@ -252,9 +252,9 @@ pub enum GivenLine {
 pub struct PassedLine {
     /// Until when the world was asked to wait at most.
     pub until: Exact,
-    /// What time it is now.
+    /// The present time.
     pub now: Exact,
-    /// What was observed.
+    /// The observations.
     pub observations: Vec<ObservationLine>,
 }
 
@@ -264,7 +264,7 @@ pub struct PassedLine {
 pub struct LookedLine {
     /// The time.
     pub now: Exact,
-    /// What it reported.
+    /// The observations.
     pub observations: Vec<ObservationLine>,
 }
 
@@ -340,9 +340,9 @@ pub enum ObservationLine {
     },
     /// Something that cannot be understood.
     Unintelligible {
-        /// What was said.
+        /// The message.
         said: String,
-        /// What is wrong with it.
+        /// The mistake in it.
         why: String,
         /// The time.
         time: Exact,
@@ -367,11 +367,11 @@ pub struct PlanningLine {
 pub struct SituationLine {
     /// The time.
     pub time: Exact,
-    /// What is true.
+    /// The true facts.
     pub facts: Vec<String>,
     /// The values of the fluents.
     pub values: IndexMap<String, Exact>,
-    /// What is running.
+    /// The actions under way.
     pub running: Vec<RunningLine>,
 }
 
@@ -417,7 +417,7 @@ pub struct InterruptedLine {
 pub struct ReportLine {
     /// How it ended: [`Verdict::name`](elbowroom_execution::run::Verdict::name).
     pub verdict: String,
-    /// What there is to add.
+    /// A further explanation.
     pub why: Option<String>,
     /// The time, by the world's clock.
     #[serde(with = "exact")]
@@ -426,11 +426,11 @@ pub struct ReportLine {
     pub replans: usize,
     /// The reason.
     pub reasons: Vec<ReasonLine>,
-    /// What can never become true again, where no plan reaches the goal any more.
+    /// Facts and numbers that can never become true again, where no plan reaches the goal any more.
     pub dead_end: Vec<ReasonLine>,
     /// The number of actions started.
     pub starts: usize,
-    /// What was done.
+    /// The executed steps.
     pub executed: Vec<ExecutedLine>,
 }
 

@@ -1,8 +1,8 @@
 //! Plots of results, as SVG.
 //!
 //! One kind is there: an [`IntervalPlot`] shows, for each of several groups, one value of each of
-//! several series, with its interval. With the feature `plots` it is drawn by `plotters`, with its SVG
-//! backend alone: no fonts are read, and the same plot gives the same bytes.
+//! several series, with its interval. With the feature `plots` it is drawn by `plotters`, with its
+//! SVG backend alone: no fonts are read, and the same plot gives the same bytes.
 
 #[cfg(feature = "plots")]
 mod drawn;
@@ -13,13 +13,13 @@ pub use drawn::PlotError;
 /// Values side by side, group by group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct IntervalPlot {
-    /// What it shows.
+    /// The title.
     pub title: String,
-    /// What the vertical axis is, with its unit.
+    /// The label of the vertical axis, with its unit.
     pub axis: String,
     /// The groups, from left to right.
     pub groups: Vec<String>,
-    /// What is compared in each group.
+    /// The series compared in each group.
     pub series: Vec<Series>,
     /// A line across each group, with its name: what could be reached, say.
     pub reference: Option<Series>,
@@ -28,7 +28,7 @@ pub struct IntervalPlot {
 /// Values, one for each group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// What they are.
+    /// The name.
     pub name: String,
     /// In the order of the groups; `None` where there is no value.
     pub points: Vec<Option<Point>>,

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 /// A table: a heading for each column, and rows of as many cells.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Table {
-    /// What it shows.
+    /// The caption.
     pub caption: String,
     /// One for each column.
     pub headings: Vec<String>,
@@ -14,7 +14,7 @@ pub struct Table {
     pub keys: usize,
     /// Rows.
     pub rows: Vec<Vec<String>>,
-    /// What the rows mean; only in Markdown, below the table.
+    /// Notes on the rows; only in Markdown, below the table.
     pub notes: Vec<String>,
 }
 
@@ -72,8 +72,8 @@ impl Table {
         text
     }
 
-    /// For a terminal of `width` columns: headings are broken between words, and columns that do not
-    /// fit follow below, each time after the keys.
+    /// For a terminal of `width` columns: headings are broken between words, and columns that do
+    /// not fit follow below, each time after the keys.
     pub fn within(&self, width: usize) -> String {
         let longest_word = |heading: &String| {
             let words = heading.split(' ').map(|word| word.chars().count());

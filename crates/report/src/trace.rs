@@ -17,11 +17,11 @@ use serde::Serialize;
 pub use crate::line::{self, Line};
 pub use replay::{Difference, Replay, ReplayPlanner, ReplayWorld, Stored, TraceError};
 
-/// What the first line says the trace is.
+/// The value of `format` in the first line of a trace.
 pub const FORMAT: &str = "elbowroom-trace";
 /// The version of the format.
 pub const VERSION: u64 = 1;
-/// What the first line is called.
+/// The kind of the first line.
 const HEADER: &str = "header";
 
 /// Writes each entry of a run as one line.

@@ -15,7 +15,7 @@ use crate::line::{GivenLine, ObservationLine};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct WireError {
-    /// What is wrong with it.
+    /// The error.
     pub message: String,
 }
 

@@ -19,13 +19,13 @@ pub enum Purpose {
     Failure = 3,
     /// When something happens by itself.
     Exogenous = 4,
-    /// What happens to a report.
+    /// The fate of a report.
     Report = 5,
     /// By how much an action changes a fluent; the fluent is part of the instance.
     Amount = 6,
     /// Whether effects of actions take place.
     Effect = 7,
-    /// What changes by itself from one step to the next.
+    /// A change by itself from one step to the next.
     Change = 8,
 }
 
@@ -105,7 +105,7 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// What is wrong with its numbers, if something is.
+    /// The mistake in its numbers, if there is one.
     pub fn problem(&self) -> Option<String> {
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
         let problem = match self {

@@ -1,12 +1,13 @@
 //! Seeded worlds to execute plans in.
 //!
-//! In: a world file (`docs/formats/world.md`) and a seed. Out: a [`World`](elbowroom_execution::World)
-//! that executes commands with durations and failures of its own.
+//! In: a world file (`docs/formats/world.md`) and a seed. Out: a
+//! [`World`](elbowroom_execution::World) that executes commands with durations and failures of its
+//! own.
 //!
-//! - [`WorldModel`]: the contents of a world file: distributions of durations and of numeric changes,
-//!   failures, exogenous events, and the reliability of reports.
-//! - [`SimWorld`]: one trajectory of it, by the semantics of PDDL: conditions are evaluated in the true
-//!   state, and an action whose conditions do not hold fails.
+//! - [`WorldModel`]: the contents of a world file: distributions of durations and of numeric
+//!   changes, failures, exogenous events, and the reliability of reports.
+//! - [`SimWorld`]: one trajectory of it, by the semantics of PDDL: conditions are evaluated in the
+//!   true state, and an action whose conditions do not hold fails.
 //! - [`Unreliable`]: loses, repeats, delays and contradicts the reports of another world.
 //!
 //! Randomness is keyed ([`draw`]): the duration of the second time that `(pick rover box)` starts

@@ -24,7 +24,7 @@ pub struct WorldModel {
     pub amounts: Vec<Amount>,
     /// How often actions fail; without a rule, never.
     pub failures: Vec<Failing>,
-    /// What happens by itself, apart from the problem's timed initials.
+    /// The exogenous events, apart from the problem's timed initials.
     pub exogenous: Vec<Exogenous>,
     /// How well the world reports.
     pub reports: Reports,
@@ -35,9 +35,9 @@ pub struct WorldModel {
 pub struct Rule {
     /// How the quantity is distributed.
     pub distribution: Distribution,
-    /// What is less becomes this.
+    /// Lower amounts become this.
     pub minimum: Option<f64>,
-    /// What is more becomes this.
+    /// Higher amounts become this.
     pub maximum: Option<f64>,
     /// Whether it is a multiple of the planned value, rather than the value itself.
     pub is_relative: bool,
@@ -64,7 +64,8 @@ pub struct Failing {
     /// The time.
     pub when: Failure,
     /// Whether a failure after the start undoes what the start did: the facts that it made false
-    /// become true again, and those that it made true, false. If not, they stay as the start left them.
+    /// become true again, and those that it made true, false. If not, they stay as the start left
+    /// them.
     pub is_undone: bool,
 }
 
@@ -86,7 +87,7 @@ pub struct Exogenous {
     pub time: Rule,
     /// How likely it happens at all.
     pub probability: f64,
-    /// What happens.
+    /// The change.
     pub change: ExogenousChange,
     /// Whether the world reports it. If not, it is noticed only when the world is asked to look, or
     /// when an action fails because of it.
@@ -155,12 +156,12 @@ impl WorldModel {
         duration.max(planned.min(&self.resolution).clone())
     }
 
-    /// What is known of how long an action takes; `None`: as long as planned.
+    /// The rule for how long an action takes; `None`: as long as planned.
     pub fn duration_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.durations, action)
     }
 
-    /// What is known of how long after its command an action starts; `None`: it does at once.
+    /// The rule for how long after its command an action starts; `None`: at once.
     pub fn delay_rule(&self, action: &str) -> Option<&Rule> {
         last(&self.delays, action)
     }

@@ -30,7 +30,7 @@ pub trait Pace: Send {
 pub struct Begun<'a> {
     /// Which start it is.
     pub ticket: Ticket,
-    /// What is done.
+    /// The action.
     pub action: &'a Action,
     /// How many of that name had been told to start before.
     pub occurrence: u64,
@@ -48,7 +48,8 @@ pub struct Paced<'a, P> {
     world: SimWorld<'a>,
     pace: P,
     now: Rational,
-    /// What was told to start and has not, with its number among those of its name.
+    /// The actions that were told to start and have not, with their number among those of the same
+    /// name.
     ordered: BTreeMap<Ticket, Ordered>,
     occurrences: BTreeMap<String, u64>,
 }

@@ -31,15 +31,15 @@ pub struct SimWorld<'a> {
     seed: u64,
     truth: Progression,
     now: Rational,
-    /// What is going to happen, by time, and then in the order in which it was decided.
+    /// The coming happenings, by time, and then in the order in which they were decided.
     agenda: BTreeMap<(Rational, u64), Coming>,
     /// The number of things put on the agenda.
     decided: u64,
-    /// What has happened and has not been told.
+    /// The happenings that have not been reported.
     untold: Vec<Observation>,
     /// How often each action was started.
     occurrences: BTreeMap<String, u64>,
-    /// What was started, until it has ended.
+    /// The actions that were started, until they have ended.
     actions: BTreeMap<Ticket, Commanded>,
 }
 

@@ -1,14 +1,13 @@
 //! Values in a box for which a network has no schedule, found without looking at all corners.
 //!
 //! Bounds of the network depend on quantities, each somewhere in an interval: the durations of
-//! contingent links, or the parameters of a plan. Whether there is a schedule for all their values is
-//! co-NP-complete in general (weak controllability; Vidal & Fargier 1999, Morris & Muscettola 1999), so
-//! nothing avoids branching altogether. But few quantities need it.
-//! Each bound is first taken at its worst, whatever the other bound of its quantity says. If no
-//! cycle is negative even so, all values have a schedule. If one is that takes no quantity at two
-//! different values, some values have none. Only where a negative cycle takes a quantity at both
-//! of its ends, that quantity is set to the one, and then to the other: the values with a schedule
-//! form a convex set.
+//! contingent links, or the parameters of a plan. Whether there is a schedule for all their values
+//! is co-NP-complete in general (weak controllability; Vidal & Fargier 1999, Morris & Muscettola
+//! 1999), so nothing avoids branching altogether. But few quantities need it. Each bound is first
+//! taken at its worst, whatever the other bound of its quantity says. If no cycle is negative even
+//! so, all values have a schedule. If one is that takes no quantity at two different values, some
+//! values have none. Only where a negative cycle takes a quantity at both of its ends, that
+//! quantity is set to the one, and then to the other: the values with a schedule form a convex set.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -20,8 +19,8 @@ use crate::NodeId;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyBranches;
 
-/// `to - from <= constant + q` for the quantity `q` of the [`Side::Upper`], `constant - q` for that of
-/// the [`Side::Lower`]: it bounds from above, or from below.
+/// `to - from <= constant + q` for the quantity `q` of the [`Side::Upper`], `constant - q` for that
+/// of the [`Side::Lower`]: it bounds from above, or from below.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OpenBound<Q> {
     /// The time point that is subtracted.

@@ -15,7 +15,7 @@ pub struct Constraint<W = Rational> {
     pub from: NodeId,
     /// Where the edge ends.
     pub to: NodeId,
-    /// What the difference does not exceed.
+    /// The upper bound of the difference.
     pub bound: W,
 }
 

@@ -53,11 +53,11 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// For programs: the kind of finding, where a reader tells kinds apart.
     pub code: Option<&'static str>,
-    /// What is wrong, in lower case.
+    /// The message, in lower case.
     pub message: String,
     /// Where. At least one: the first is the place itself, others explain it.
     pub labels: Vec<Label>,
-    /// What was expected, or what to do.
+    /// The form that was expected, or advice.
     pub advice: Option<String>,
 }
 

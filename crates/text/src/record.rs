@@ -12,9 +12,9 @@ pub struct Record {
     /// The kind of finding, where a reader tells kinds apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub code: Option<String>,
-    /// What is wrong, in lower case.
+    /// The message, in lower case.
     pub message: String,
-    /// What was expected, or what to do; `null` if there is nothing to say.
+    /// The form that was expected, or advice; `null` if there is none.
     pub advice: Option<String>,
     /// The name of the text, usually a path.
     pub file: String,

@@ -16,7 +16,7 @@ pub struct Source(Arc<Inner>);
 /// Some editors put it before a text.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// What a text without a name is reported as.
+/// The name under which a text without a name is reported.
 const NAMELESS: &str = "text";
 
 #[derive(PartialEq, Eq)]

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
-/// `constant + Σ factor · end`: ends are numbered, the lower one of parameter `p` is `2p`, the upper
-/// one `2p + 1`.
+/// `constant + Σ factor · end`: ends are numbered, the lower one of parameter `p` is `2p`, the
+/// upper one `2p + 1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ends {
     /// What depends on no end.

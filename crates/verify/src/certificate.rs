@@ -26,8 +26,8 @@ pub struct Certificate {
     /// Ends count up to a deviation of so many times the scale of their parameter.
     #[serde(with = "number")]
     pub counted: Rational,
-    /// How far each variable moves its ends out from the nominal value: for each parameter its lower
-    /// end, then its upper end; or both, if these move together.
+    /// How far each variable moves its ends out from the nominal value: for each parameter its
+    /// lower end, then its upper end; or both, if these move together.
     pub slacks: Vec<Exact>,
     /// Proofs of inequalities in the ends of boxes.
     pub proofs: Vec<Proof>,
@@ -184,8 +184,8 @@ pub enum Part {
     Least(usize),
     /// The upper bound of the constraint at this position: from its `from` to its `to`.
     Most(usize),
-    /// The observed difference of the constraint at this position is the shortest: from its `from` to
-    /// its `to`.
+    /// The observed difference of the constraint at this position is the shortest: from its `from`
+    /// to its `to`.
     Early(usize),
     /// It is the longest: from its `to` to its `from`.
     Late(usize),

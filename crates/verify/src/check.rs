@@ -201,10 +201,10 @@ impl<'a> Checker<'a> {
     /// that follows.
     ///
     /// With the variables in the order of their slacks, let a box be at least as good. Its smallest
-    /// slack is then no less than the smallest here, so what stops those that have it here stops them
-    /// there; so its next one is no less than the next one here, and so on. Boxes inside the envelope
-    /// have their sub-boxes there, so it is enough that the box breaks the inequality in which the
-    /// others have no more than the variable that is stopped.
+    /// slack is then no less than the smallest here, so what stops those that have it here stops
+    /// them there; so its next one is no less than the next one here, and so on. Boxes inside the
+    /// envelope have their sub-boxes there, so it is enough that the box breaks the inequality in
+    /// which the others have no more than the variable that is stopped.
     fn least_slack(&self, stopped: &[Stopped]) -> Result<Rational, Flaw> {
         let mut is_stopped = vec![false; self.slacks.len()];
         for (place, one) in stopped.iter().enumerate() {

@@ -26,8 +26,9 @@ pub enum Flaw {
     /// A proof uses a duration that the world does not decide on.
     #[error("constraint {0} is no duration that the world decides on")]
     NotObserved(usize),
-    /// A duration that the world decides on is none: it leads from a point to the same one, or to time
-    /// zero, or to where another such duration ends, or from a point that comes about only after it.
+    /// A duration that the world decides on is none: it leads from a point to the same one, or to
+    /// time zero, or to where another such duration ends, or from a point that comes about only
+    /// after it.
     #[error(
         "constraint {0} is observed, but is no duration from a time point to a later one that nothing \
          else decides on"

@@ -4,18 +4,18 @@
 //! [`Certificate`] alone ([`verify`]). Out: what it proves ([`Verified`]), or the first thing in it
 //! that is not so ([`Flaw`]).
 //!
-//! A certificate holds the plan's temporal network, the box, *proofs* of linear inequalities that all
-//! boxes inside the envelope satisfy (each a cycle of the network's bounds), and how it follows from
-//! these that no box is better. The inequalities themselves are not in it: they are worked out here
-//! from the proofs ([`row`]), so that there is nothing to believe but
+//! A certificate holds the plan's temporal network, the box, *proofs* of linear inequalities that
+//! all boxes inside the envelope satisfy (each a cycle of the network's bounds), and how it follows
+//! from these that no box is better. The inequalities themselves are not in it: they are worked out
+//! here from the proofs ([`row`]), so that there is nothing to believe but
 //!
 //! - that the network is that of the plan,
 //! - the theorems that make the cycles conflicts (Vidal & Fargier 1999; Morris & Muscettola 2005;
 //!   Morris 2006), and that a box inside the envelope has its sub-boxes there, too.
 //!
-//! What the network does not show, such as conditions on numbers, is in it as an assumption with its
-//! reason in words; how many there are is part of the verdict. That the box itself is inside the
-//! envelope is not what a certificate proves: `elbowroom envelope --contains` checks that.
+//! What the network does not show, such as conditions on numbers, is in it as an assumption with
+//! its reason in words; how many there are is part of the verdict. That the box itself is inside
+//! the envelope is not what a certificate proves: `elbowroom envelope --contains` checks that.
 //!
 //! This crate knows exact numbers, and nothing of planning, networks or search.
 

@@ -4,8 +4,8 @@ use crate::certificate::{Certificate, Constraint};
 use crate::flaw::Flaw;
 
 /// Checks that constraints are about points that there are, and that observed ones are durations:
-/// each leads to a point of its own, not to time zero, and they follow each other in no circle. The theorems
-/// about such networks take that for granted.
+/// each leads to a point of its own, not to time zero, and they follow each other in no circle. The
+/// theorems about such networks take that for granted.
 ///
 /// # Errors
 /// The first constraint that is not so.

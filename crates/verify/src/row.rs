@@ -197,8 +197,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The durations between a point and the one, chosen by the executor, from which they count. There
-    /// is such a point: durations follow each other in no circle ([`crate::network`]).
+    /// The durations between a point and the one, chosen by the executor, from which they count.
+    /// There is such a point: durations follow each other in no circle ([`crate::network`]).
     fn chain(&self, point: usize) -> Result<(usize, Vec<usize>), Flaw> {
         let mut links = Vec::new();
         let mut root = point;
@@ -247,7 +247,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Sums of a semi-reducible cycle: its own, and those of what has to be negative for it to be one.
+    /// Sums of a semi-reducible cycle: its own, and those of what has to be negative for it to be
+    /// one.
     fn semireducible(&self, cycle: &[usize]) -> Result<Vec<Ends>, Flaw> {
         let parts: Vec<Part> = cycle.iter().copied().map(Part::Way).collect();
         self.is_circle(&parts)?;

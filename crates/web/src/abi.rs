@@ -1,10 +1,10 @@
 //! The interface of the module: memory and one function, as C would call them.
 //!
 //! A host reserves room with [`elbowroom_reserve`], writes a question in UTF-8 there, and calls
-//! [`elbowroom_ask`]. The reply begins with its length in bytes, four of them, the lowest first; the
-//! reply itself follows, in UTF-8. The host gives back what it was given with [`elbowroom_release`].
-//! On WebAssembly the module imports one function, `now` from `elbowroom`: milliseconds since some
-//! fixed moment, as a double.
+//! [`elbowroom_ask`]. The reply begins with its length in bytes, four of them, the lowest first;
+//! the reply itself follows, in UTF-8. The host gives back what it was given with
+//! [`elbowroom_release`]. On WebAssembly the module imports one function, `now` from `elbowroom`:
+//! milliseconds since some fixed moment, as a double.
 //!
 //! A panic ends the instance, which is of no more use then: the host makes a new one.
 
@@ -27,8 +27,8 @@ pub extern "C" fn elbowroom_reserve(length: usize) -> *mut u8 {
 /// Takes back room.
 ///
 /// # Safety
-/// `start` and `length` are those of room that was reserved, or of a reply with its head, and it has not
-/// been given back before.
+/// `start` and `length` are those of room that was reserved, or of a reply with its head, and it
+/// has not been given back before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn elbowroom_release(start: *mut u8, length: usize) {
     let slice = std::ptr::slice_from_raw_parts_mut(start, length);
@@ -82,7 +82,8 @@ mod tests {
     fn a_reply_comes_with_its_length_and_can_be_given_back() {
         let question = b"no question";
         let room = elbowroom_reserve(question.len());
-        // SAFETY: the room is as long as the question, and both it and the reply are given back once.
+        // SAFETY: the room is as long as the question, and both it and the reply are given back
+        // once.
         let reply = unsafe {
             room.copy_from_nonoverlapping(question.as_ptr(), question.len());
             let reply = elbowroom_ask(room, question.len());

@@ -1,10 +1,10 @@
 //! The library for browsers: a question goes in as JSON, the answer comes out as JSON.
 //!
-//! Built for `wasm32-unknown-unknown`, this is a module with a plain C interface ([`abi`]) that needs
-//! no generated bindings. A [`Question`] holds all that it is about, texts included, because a browser
-//! has no files; a [`Reply`] holds the document that the command prints with `--json`, byte for byte,
-//! and the exit code that the command would end with. This crate only translates: what an answer *is*
-//! stands in `elbowroom`, and what a page shows in `elbowroom-page`.
+//! Built for `wasm32-unknown-unknown`, this is a module with a plain C interface ([`abi`]) that
+//! needs no generated bindings. A [`Question`] holds all that it is about, texts included, because
+//! a browser has no files; a [`Reply`] holds the document that the command prints with `--json`,
+//! byte for byte, and the exit code that the command would end with. This crate only translates:
+//! what an answer *is* stands in `elbowroom`, and what a page shows in `elbowroom-page`.
 //!
 //! ```
 //! use elbowroom_web::reply;
@@ -34,8 +34,8 @@ pub use reply::Reply;
 
 use reply::Failure;
 
-/// The reply to a question, which is a [`Question`] as JSON. `clock` says how much time has passed since
-/// some fixed moment.
+/// The reply to a question, which is a [`Question`] as JSON. `clock` says how much time has passed
+/// since some fixed moment.
 ///
 /// A question that cannot be understood is replied to, too.
 pub fn reply(question: &str, clock: &mut (dyn FnMut() -> Duration + Send)) -> Reply {

@@ -47,7 +47,8 @@ pub struct CheckQuestion {
     /// The plan, with fixed times.
     #[serde(default)]
     pub plan: Option<Text>,
-    /// The least separation of interfering happenings, as an exact number: `0.001` if there is none.
+    /// The least separation of interfering happenings, as an exact number: `0.001` if there is
+    /// none.
     #[serde(default)]
     pub epsilon: Option<String>,
     /// By how much times may be off, as VAL's `-t`.
@@ -66,7 +67,8 @@ pub struct PlanQuestion {
     /// As for a [check](CheckQuestion::epsilon).
     #[serde(default)]
     pub epsilon: Option<String>,
-    /// Better plans are looked for until so many seconds have passed; without it, the first is taken.
+    /// Better plans are looked for until so many seconds have passed; without it, the first is
+    /// taken.
     #[serde(default)]
     pub time_limit: Option<String>,
     /// Whether the first plan is enough, whatever time is left.

@@ -12,25 +12,28 @@ pub(crate) struct CompareArgs {
     #[arg(value_name = "EXPERIMENT.toml")]
     pub(crate) experiment: PathBuf,
     /// Number of trials of each problem; by default that of the experiment
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) trials: Option<u64>,
     /// Where the dice begin; by default the seed of the experiment
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Number of threads; 0 for one per processor
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = count)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) jobs: usize,
     /// Run only part `I` of `N`, counted from 0
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub(crate) shard: Option<(u64, u64)>,
     /// Run nothing; merge the results of parts
-    #[arg(long, value_name = "RESULTS.json", num_args = 1.., conflicts_with_all = ["shard", "trials"])]
+    #[arg(long, value_name = "RESULTS.json", num_args = 1..)]
+    #[arg(conflicts_with_all = ["shard", "trials"])]
     pub(crate) merge: Vec<PathBuf>,
     /// Write results.json, table.md, table.csv and plots to this folder
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
-    /// Also write trials.csv there: seed, case, column, trial, executor, verdict, time and replans of
-    /// each trial
+    /// Also write trials.csv there: seed, case, column, trial, executor, verdict, time and replans
+    /// of each trial
     #[arg(long, requires = "output", conflicts_with = "merge")]
     pub(crate) each_trial: bool,
     /// Print the results as one JSON document

@@ -36,12 +36,13 @@ pub(crate) struct EnvelopeArgs {
     /// The largest box whose intervals have both bounds equally far from the nominal value
     #[arg(long)]
     symmetric: bool,
-    /// The largest box where bounds count up to a deviation of N times the nominal value (by default
-    /// 9), unless `in [LB, UB]` of --vary says less; what nothing stops is infinite all the same
+    /// The largest box where bounds count up to a deviation of N times the nominal value (by
+    /// default 9), unless `in [LB, UB]` of --vary says less; what nothing stops is infinite all the
+    /// same
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     cap: Option<Rational>,
-    /// Step size at which the search ends, in the unit of the plan: each bound is closer to its limit
-    /// than twice this. By default a hundredth of each nominal value
+    /// Step size at which the search ends, in the unit of the plan: each bound is closer to its
+    /// limit than twice this. By default a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
     /// Whether the step size doubles after a success or stays constant
@@ -62,7 +63,8 @@ pub(crate) struct EnvelopeArgs {
     #[arg(long, value_name = "ACTION")]
     pub(crate) controllable: Vec<String>,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
     /// Time limit in seconds; the best envelope so far is printed
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
@@ -141,7 +143,7 @@ pub(crate) enum Method {
     Best,
 }
 
-/// What a box is to be the greatest of.
+/// The objective of the largest box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Objective {
     /// The least deviation for which any bound has room, in relation to the nominal value; then the
@@ -199,7 +201,7 @@ impl From<Guarantee> for library::Guarantee {
     }
 }
 
-/// What says that the executor chooses the durations of these actions.
+/// The `--vary` specifications that make the durations of these actions the executor's choice.
 pub(crate) fn controllable(actions: &[String]) -> Vec<String> {
     actions
         .iter()

@@ -17,17 +17,20 @@ pub(crate) struct LearnArgs {
     #[arg(short, long, value_name = "WORLD.toml")]
     pub(crate) output: Option<PathBuf>,
     /// Times in the logs are multiples of this, in seconds
-    #[arg(long, value_name = "S", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) resolution: Rational,
-    /// Report a drift where the evidence for it is N to one; in logs without drift that happens with
-    /// a probability of at most 1/N for each action
-    #[arg(long, value_name = "N", default_value = "100", value_parser = positive, allow_negative_numbers = true)]
+    /// Report a drift where the evidence for it is N to one; in logs without drift that happens
+    /// with a probability of at most 1/N for each action
+    #[arg(long, value_name = "N", default_value = "100", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) drift: Rational,
     /// Seed for telling equal values apart in the search for drift
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Compute intervals that hold all durations of the next execution of a plan with this probability,
-    /// whatever their distributions, and check that the plan survives all that lies in them
+    /// Compute intervals that hold all durations of the next execution of a plan with this
+    /// probability, whatever their distributions, and check that the plan survives all that lies in
+    /// them
     #[arg(long, value_name = "P", requires_all = ["domain", "problem", "plan"])]
     pub(crate) inside: Option<Rational>,
     /// The domain of that plan, in PDDL
@@ -43,7 +46,8 @@ pub(crate) struct LearnArgs {
     #[arg(long, value_enum, default_value_t = Guarantee::Dynamic, requires = "inside")]
     pub(crate) guarantee: Guarantee,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     #[arg(requires = "inside")]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document

@@ -12,24 +12,27 @@ pub(crate) struct NetworkArgs {
     /// The network, in any of the formats below
     #[arg(value_name = "FILE")]
     pub(crate) file: PathBuf,
-    /// Write the minimal network, with the tightest implied bound between each two time points; only
-    /// for consistent networks without contingent links
+    /// Write the minimal network, with the tightest implied bound between each two time points;
+    /// only for consistent networks without contingent links
     #[arg(long, value_name = "OUT")]
     pub(crate) minimal: Option<PathBuf>,
     /// Write the dispatchable network, including its waits, if there is one
     #[arg(long, value_name = "OUT")]
     pub(crate) dispatchable: Option<PathBuf>,
     /// Simulate N executions with random durations
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) simulate: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole, allow_negative_numbers = true, requires = "simulate")]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(allow_negative_numbers = true, requires = "simulate")]
     pub(crate) seed: u64,
     /// How durations are drawn
     #[arg(long, value_enum, default_value_t = DurationsChoice::Given, requires = "simulate")]
     pub(crate) durations: DurationsChoice,
     /// Number of branches after which weak controllability, which can be hard, is left undecided
-    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES, value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = elbowroom::network::MOST_BRANCHES, value_parser = count)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) branches: usize,
     /// Print the answer as one JSON document
     #[arg(long)]

@@ -35,28 +35,32 @@ pub(crate) struct OddsArgs {
     #[arg(long, value_name = "NAME", requires = "world")]
     pub(crate) executor: Vec<String>,
     /// How many samples
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole)]
+    #[arg(allow_negative_numbers = true)]
     #[arg(requires = "world")]
     pub(crate) samples: u64,
     /// The seed of the first sample; the others follow
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(allow_negative_numbers = true)]
     #[arg(requires = "world")]
     pub(crate) seed: u64,
     /// Write a picture of all orders of the plan's actions; of short plans only
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) lattice: Option<PathBuf>,
     /// Number of beginnings of orders that the search for the best order may look at
-    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = count)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) most_sequences: usize,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// What an effect that fails leaves behind.
+/// The state after an effect that fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SemanticsChoice {
     /// The opposite of what it should, as in paper 2

@@ -13,8 +13,8 @@ use super::number::positive;
 pub(crate) struct PlanArgs {
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
-    /// The planner: `embedded`, a planner known by name, `up:ENGINE`, or a command line that contains
-    /// `{domain}` and `{problem}`
+    /// The planner: `embedded`, a planner known by name, `up:ENGINE`, or a command line that
+    /// contains `{domain}` and `{problem}`
     #[arg(long, value_name = "NAME|\"CMD\"", default_value = EMBEDDED)]
     pub(crate) planner: String,
     /// Time limit in seconds for the search for better plans, by the problem's metric or else by
@@ -25,13 +25,15 @@ pub(crate) struct PlanArgs {
     #[arg(long)]
     pub(crate) first: bool,
     /// Memory limit in MB; by default 2048 for the embedded planner
-    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40), allow_negative_numbers = true)]
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) memory: Option<u64>,
     /// Write the plan to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]

@@ -25,33 +25,36 @@ pub(crate) struct RunArgs {
     /// The same as PLAN
     #[arg(long, value_name = "FILE")]
     pub(crate) plan: Option<PathBuf>,
-    /// The planner: `embedded`, another one as in `elbowroom plan`, or `none`: the run ends when the
-    /// plan no longer works
+    /// The planner: `embedded`, another one as in `elbowroom plan`, or `none`: the run ends when
+    /// the plan no longer works
     #[arg(long, value_name = "NAME|CMD", default_value = EMBEDDED)]
     pub(crate) planner: String,
-    /// Planning time in seconds for another planner than the embedded one; without it, its first plan
-    /// is taken, within a minute
+    /// Planning time in seconds for another planner than the embedded one; without it, its first
+    /// plan is taken, within a minute
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) planner_time: Option<Rational>,
     /// Number of states that the embedded planner may evaluate for a plan
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) planner_states: u64,
     /// Number of states after the first plan, in search of a better one
-    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 2_000, value_parser = whole)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) improve_states: u64,
-    /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each action
-    /// when that is worst; without it, everything goes as planned
+    /// The simulated world (docs/formats/world.md), or `spoiler`, an adversary that ends each
+    /// action when that is worst; without it, everything goes as planned
     #[arg(long, value_name = "WORLD.toml|spoiler")]
     pub(crate) world: Option<PathBuf>,
-    /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default the
-    /// plan's envelope
+    /// The box from which the spoiler chooses durations, as in `envelope --contains`; by default
+    /// the plan's envelope
     #[arg(long, value_name = "BOX", requires = "world")]
     pub(crate) spoil: Option<String>,
     /// A program that is the world and speaks JSON Lines (docs/formats/world-protocol.md)
     #[arg(long, value_name = "COMMAND", conflicts_with = "world")]
     pub(crate) world_process: Option<String>,
     /// Time limit in seconds for each answer of that program
-    #[arg(long, value_name = "S", default_value = "3600", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value = "3600", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     #[arg(requires = "programs")]
     pub(crate) answer_within: Rational,
     /// End the run at the first message of that program that is malformed or names something that
@@ -92,25 +95,28 @@ pub(crate) struct RunArgs {
     /// What happens to running actions when a new plan is made
     #[arg(long, value_enum, default_value_t = RunningChoice::Keep)]
     pub(crate) running: RunningChoice,
-    /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0, with
-    /// --realtime `measured`
+    /// Time that planning takes in the world: `measured`, or a number of seconds; by default 0,
+    /// with --realtime `measured`
     #[arg(long, value_name = "measured|S", allow_negative_numbers = true)]
     pub(crate) planning_time: Option<String>,
     /// Number of new plans that may be made
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) max_replans: usize,
     /// Time limit of the run, in seconds of the world
-    #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value = "1000000", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) time_limit: Rational,
     /// Run on a wall clock, FACTOR times as fast (0.000001 to 1000000000); measured planning times
     /// are multiplied by FACTOR. A world process has a clock of its own
-    #[arg(long, value_name = "FACTOR", value_parser = factor, allow_negative_numbers = true, conflicts_with = "world_process")]
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    #[arg(allow_negative_numbers = true, conflicts_with = "world_process")]
     pub(crate) realtime: Option<Rational>,
     /// Write a trace of the run to this file (docs/formats/trace.md)
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) trace: Option<PathBuf>,
-    /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a crash.
-    /// Nothing is started that is not on the disk
+    /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a
+    /// crash. Nothing is started that is not on the disk
     #[arg(
         long,
         value_name = "FILE",
@@ -118,17 +124,18 @@ pub(crate) struct RunArgs {
         conflicts_with = "trace"
     )]
     pub(crate) journal: Option<PathBuf>,
-    /// Go on with the run of a journal, whose program has died: the world is asked what became of what was
-    /// under way; all other options are taken from the journal
+    /// Go on with the run of a journal, whose program has died: the world is asked what became of
+    /// what was under way; all other options are taken from the journal
     #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]
     pub(crate) resume: Option<PathBuf>,
-    /// Replay a stored trace and say whether the decisions are the same; all other options are taken
-    /// from the trace
+    /// Replay a stored trace and say whether the decisions are the same; all other options are
+    /// taken from the trace
     #[arg(long, value_name = "TRACE", conflicts_with_all = IN_THE_TRACE)]
     #[arg(conflicts_with_all = ["answer_within", "strict_world"])]
     pub(crate) replay: Option<PathBuf>,
     /// Minimum time between interfering happenings (epsilon)
-    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]
@@ -146,14 +153,14 @@ impl RunArgs {
         self.world.as_deref() == Some(std::path::Path::new("spoiler"))
     }
 
-    /// What to leave open, and what not.
+    /// The `--vary` specifications of the arguments.
     pub(crate) fn specifications(&self) -> Vec<String> {
         let controllable = controllable(&self.controllable);
         self.vary.iter().cloned().chain(controllable).collect()
     }
 }
 
-/// What a stored trace says, and the command line cannot change.
+/// Options that a stored trace fixes, so that the command line cannot change them.
 const IN_THE_TRACE: &[&str] = &[
     "domain",
     "problem",

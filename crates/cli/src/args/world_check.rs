@@ -26,9 +26,10 @@ pub(crate) struct WorldCheckArgs {
     /// The plan whose actions the world is told to start
     #[arg(value_name = "PLAN")]
     pub(crate) plan: Option<PathBuf>,
-    /// Time limit in seconds for each answer of the program; it is asked to wait for at most a second
-    /// of its own time, or a tenth of an action's
-    #[arg(long, value_name = "S", default_value = "10", value_parser = positive, allow_negative_numbers = true)]
+    /// Time limit in seconds for each answer of the program; it is asked to wait for at most a
+    /// second of its own time, or a tenth of an action's
+    #[arg(long, value_name = "S", default_value = "10", value_parser = positive)]
+    #[arg(allow_negative_numbers = true)]
     pub(crate) answer_within: Rational,
     /// Print the answer as one JSON document
     #[arg(long)]

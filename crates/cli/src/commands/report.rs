@@ -7,7 +7,7 @@ use crate::args::ReportArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::{input, output};
 
-/// What `compare -o DIR` leaves in a folder.
+/// The file that `compare -o DIR` writes its results to.
 const RESULTS: &str = "results.json";
 
 /// Writes what is asked for.

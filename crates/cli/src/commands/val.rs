@@ -77,7 +77,7 @@ fn read(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPl
     }
 }
 
-/// What came of the plans so far.
+/// The results of the plans so far.
 #[derive(Default)]
 struct Tally {
     /// Value and name.

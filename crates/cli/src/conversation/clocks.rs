@@ -28,8 +28,8 @@ struct Clock {
 }
 
 impl Clocks {
-    /// A clock was read: it showed `reads` at `time`. `rate`, if given, is how many of its seconds pass in
-    /// one of the world's.
+    /// A clock was read: it showed `reads` at `time`. `rate`, if given, is how many of its seconds
+    /// pass in one of the world's.
     ///
     /// # Errors
     /// In words, when no clock can run like that.
@@ -136,7 +136,8 @@ mod tests {
         assert_eq!(time, Ok(number("10.25")));
     }
 
-    /// 100 s on this clock are 101 s of the world's, so 1 s before the last reading is 1.01 s before.
+    /// 100 s on this clock are 101 s of the world's, so 1 s before the last reading is 1.01 s
+    /// before.
     #[test]
     fn drift_is_taken_from_readings_far_apart() {
         let mut clocks = Clocks::default();

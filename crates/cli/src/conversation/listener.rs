@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 
 use super::clocks::Clocks;
 
-/// The versions of the protocol that are spoken here. A program that does not greet speaks the first.
+/// The versions of the protocol that are spoken here. A program that does not greet speaks the
+/// first.
 const VERSIONS: [u64; 2] = [1, 2];
 
 /// The first message to a program.
@@ -106,7 +107,8 @@ impl Listener {
         self.greeting.as_ref()
     }
 
-    /// Whether the program can do that, as far as it says: one of the first version can do everything.
+    /// Whether the program can do that, as far as it says: one of the first version can do
+    /// everything.
     pub(crate) fn can(&self, ability: Ability) -> bool {
         self.greeting
             .as_ref()

@@ -8,11 +8,11 @@
 //!
 //! `run` has each planner (`embedded`, those of the registry, `up:ENGINE`, or a command line) plan
 //! for each temporal instance of `FOLDER/manifest.csv`, and appends one line for each to the file.
-//! The manifest's first line names its columns: `domain`, `instance`, `domain_file` and `problem_file`
-//! must be among them; `collection`, `durative_actions`, `domain_features` and `problem_features` may.
-//! Lines that are there already are not run again, so an interrupted run goes on where it was.
-//! `--only` keeps instances whose line in the manifest has the text in it; `--every` each Kth of
-//! a domain. `table` makes Markdown of the file.
+//! The manifest's first line names its columns: `domain`, `instance`, `domain_file` and
+//! `problem_file` must be among them; `collection`, `durative_actions`, `domain_features` and
+//! `problem_features` may. Lines that are there already are not run again, so an interrupted run
+//! goes on where it was. `--only` keeps instances whose line in the manifest has the text in it;
+//! `--every` each Kth of a domain. `table` makes Markdown of the file.
 //!
 //! `--time` is processor time, so that a busy machine does not change the results.
 //!

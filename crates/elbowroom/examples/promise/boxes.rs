@@ -1,5 +1,5 @@
-//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take; and
-//! what is gained where the dispatcher sees to obligations.
+//! What the dynamic guarantee costs: boxes beside those of the weak one, and the time they take;
+//! and what is gained where the dispatcher sees to obligations.
 
 use std::fmt::Write as _;
 use std::sync::Arc;

@@ -11,9 +11,9 @@
 //! `plan` has the embedded planner make a plan for each temporal problem and keeps them as text in
 //! the folder `--plans`; the others use them, and make those that are missing (`--seconds 0`: they
 //! do not). `nominal` executes every valid plan where nothing deviates. `runs` executes them in
-//! worlds in which every duration is somewhere in its interval, each plan at most N times and for at
-//! most S seconds. `grow` widens boxes that cannot be widened. `boxes` compares boxes of the weak and
-//! the dynamic guarantee.
+//! worlds in which every duration is somewhere in its interval, each plan at most N times and for
+//! at most S seconds. `grow` widens boxes that cannot be widened. `boxes` compares boxes of the
+//! weak and the dynamic guarantee.
 //!
 //! `--only TEXT` (also several) keeps the plans in whose family or name the text is, `--jobs` is
 //! the number of threads, `--widening` the number of seconds after which a box is wide enough.

@@ -17,7 +17,7 @@ pub struct CheckRequest<'a> {
     pub task: &'a Task,
     /// The plan.
     pub plan: Option<&'a TimeTriggeredPlan>,
-    /// What the plan is called in the answer, such as its file.
+    /// The name of the plan in the answer, such as its file.
     pub name: String,
     /// By which rules.
     pub settings: Settings,
@@ -49,7 +49,7 @@ pub struct PlanChecked {
     pub format: CheckFormat,
     /// Always the same.
     pub version: Version,
-    /// What the request calls the plan.
+    /// The name of the plan, as the request gives it.
     pub plan: String,
     /// The domain's name.
     pub domain: String,
@@ -83,7 +83,7 @@ pub enum CheckFinding {
     },
     /// It is not.
     Invalid {
-        /// What is wrong.
+        /// The violation.
         violation: ViolationAnswer,
     },
 }

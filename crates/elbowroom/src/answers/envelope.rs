@@ -45,12 +45,12 @@ pub struct EnvelopeRequest {
     pub task: Arc<Task>,
     /// The plan.
     pub plan: AnyPlan,
-    /// What the plan is called in the answer, such as its file.
+    /// The name of the plan in the answer, such as its file.
     pub name: String,
     /// What to leave open; all durations that the domain fixes if empty. An STN plan may leave
     /// something open itself.
     pub vary: Vec<VarySpec>,
-    /// What to guarantee inside the envelope.
+    /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// Whether the dispatcher is to keep to obligations that are bounds on differences of times
     /// ([`elbowroom_envelope::enforced`]).
@@ -205,8 +205,9 @@ pub fn envelope(
     }
 }
 
-/// What had been found when somebody could wait no longer, for those who have no time to hear what limits
-/// it: the box so far, of a plan and after so many checks and seconds, as a watcher was told it last.
+/// What had been found when somebody could wait no longer, for those who have no time to hear what
+/// limits it: the box so far, of a plan and after so many checks and seconds, as a watcher was told
+/// it last.
 pub fn so_far(
     request: &EnvelopeRequest,
     found: Option<(&Arc<ParametrizedPlan>, &DecoupledEnvelope, usize)>,

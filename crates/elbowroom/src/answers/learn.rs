@@ -27,10 +27,10 @@ pub struct LearnRequest {
     pub inside: Option<InsideRequest>,
 }
 
-/// What one log tells.
+/// The content of one log.
 #[derive(Clone, Debug)]
 pub struct Log {
-    /// What it is called, such as its file.
+    /// The name of the log, such as its file.
     pub name: String,
     /// The attempts to execute actions, in order.
     pub records: Vec<Record>,
@@ -43,9 +43,9 @@ pub enum LogError {
     /// It is a trace, and damaged.
     #[error("{name}: {error}")]
     Trace {
-        /// What it is called.
+        /// The name of the log.
         name: String,
-        /// What is wrong with it.
+        /// The error in it.
         error: TraceError,
     },
     /// It is a table with mistakes.
@@ -54,8 +54,8 @@ pub enum LogError {
 }
 
 impl Log {
-    /// Reads a trace of a run (`docs/formats/trace.md`), or a table (`docs/formats/log-csv.md`). What begins
-    /// with `{` is a trace.
+    /// Reads a trace of a run (`docs/formats/trace.md`), or a table (`docs/formats/log-csv.md`).
+    /// What begins with `{` is a trace.
     ///
     /// # Errors
     /// When it is neither, with the place of the mistake.
@@ -73,7 +73,7 @@ impl Log {
     }
 }
 
-/// What logs say: `docs/formats/learn-json.md`.
+/// The result of learning from logs: `docs/formats/learn-json.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnAnswer {
     /// Always the same.
@@ -84,7 +84,7 @@ pub struct LearnAnswer {
     pub logs: Vec<String>,
     /// How many attempts there were.
     pub attempts: usize,
-    /// What the attempts say, by the actions' names.
+    /// Statistics of the attempts, by the actions' names.
     pub actions: Vec<ActionLearnt>,
     /// All of it as a world file.
     pub world: String,
@@ -102,7 +102,7 @@ pub enum LearnFormat {
     Learn,
 }
 
-/// What the attempts to execute actions of one name say.
+/// Statistics of the attempts to execute actions of one name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionLearnt {
     /// The name: `drive`.
@@ -115,7 +115,8 @@ pub struct ActionLearnt {
     pub delay: Option<FitAnswer>,
     /// How often they fail.
     pub failures: FailuresLearnt,
-    /// Whether durations change from log to log; `None` where each ground action is described apart.
+    /// Whether durations change from log to log; `None` where each ground action is described
+    /// apart.
     pub drift: Option<DriftAnswer>,
     /// Whether the frequency of failures does.
     pub failure_drift: DriftAnswer,
@@ -208,8 +209,8 @@ pub struct DriftAnswer {
 /// Says what logs tell about the world.
 ///
 /// # Errors
-/// When the plan that is asked about has no envelope that can be computed. That the logs are too few for an
-/// answer is an answer.
+/// When the plan that is asked about has no envelope that can be computed. That the logs are too
+/// few for an answer is an answer.
 pub fn learn(
     request: &LearnRequest,
     watcher: &mut dyn Watcher,
@@ -235,8 +236,8 @@ pub fn learn(
     })
 }
 
-/// What a log expected beside what happened, action by action: the mean planned and the mean actual duration
-/// of all attempts that succeeded and had a planned duration.
+/// What a log expected beside what happened, action by action: the mean planned and the mean actual
+/// duration of all attempts that succeeded and had a planned duration.
 pub fn expectation_and_reality(records: &[Record], name: &str) -> Option<(f64, f64)> {
     let pairs: Vec<(f64, f64)> = records
         .iter()

@@ -51,11 +51,11 @@ pub struct OddsRequest<'a> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OddsSettings {
-    /// What a failed effect leaves behind.
+    /// The state after an effect that fails.
     pub semantics: OddsSemantics,
     /// Whether the answer is about the best order, not about that of the plan's times.
     pub takes_best_order: bool,
-    /// So many beginnings of orders are looked at for the best order.
+    /// Limit on the number of partial orders that the search for the best order visits.
     pub most_sequences: usize,
     /// Whether to list all orders.
     pub with_lattice: bool,
@@ -84,7 +84,7 @@ impl Default for OddsSettings {
     }
 }
 
-/// What a failed effect leaves behind: [`Semantics`].
+/// The state after an effect that fails: [`Semantics`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OddsSemantics {
@@ -115,7 +115,7 @@ pub struct OddsAnswer {
     pub domain: String,
     /// The problem's name.
     pub problem: String,
-    /// What a failed effect leaves behind.
+    /// The state after an effect that fails.
     pub semantics: OddsSemantics,
     /// The answer itself.
     #[serde(flatten)]
@@ -163,9 +163,9 @@ pub enum OddsFinding {
 pub struct Odds {
     /// The order that they are about.
     pub order: OrderAnswer,
-    /// What another order, retrying, or another plan would gain.
+    /// The gain of another order, of retrying, and of another plan.
     pub gains: GainsAnswer,
-    /// What came of executing the plan in samples of the world, if there is one.
+    /// The results of executing the plan in samples of the world, if there is one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub executed: Vec<ExecutedAnswer>,
     /// All orders, if they were asked for.

@@ -60,7 +60,7 @@ pub struct PlanAnswer {
     pub seconds: f64,
     /// The time at which the first plan was found.
     pub first_plan_seconds: Option<f64>,
-    /// What else the planner counts.
+    /// Further statistics of the planner.
     pub statistics: PlanStatistics,
 }
 
@@ -86,7 +86,7 @@ pub enum PlanFinding {
         /// The value of the problem's metric, if it has one.
         #[serde(with = "exact::option")]
         metric: Option<Rational>,
-        /// What the judge had to object to in the planner's own times, if they were repaired.
+        /// The judge's objection to the planner's own times, if they were repaired.
         repaired: Option<String>,
         /// By start time.
         steps: Vec<PlanStep>,

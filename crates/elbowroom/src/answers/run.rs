@@ -15,16 +15,16 @@ use crate::execute::{RunSpec, SpecError};
 
 /// Asks for a run.
 pub struct RunRequest<'a> {
-    /// What to run.
+    /// The specification of the run.
     pub spec: &'a RunSpec,
     /// The problem, with the ε of the specification.
     pub task: &'a Arc<Task>,
     /// The plan to begin with; without one, one is made.
     pub plan: Option<TimeTriggeredPlan>,
-    /// Who makes plans, if it is not whom the specification names: a replay, or a planner on another
-    /// clock than the watcher's.
+    /// Who makes plans, if it is not whom the specification names: a replay, or a planner on
+    /// another clock than the watcher's.
     pub planner: Option<Box<dyn Planner + 'a>>,
-    /// Who keeps a record.
+    /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
 }
 
@@ -33,7 +33,7 @@ pub struct RunRequest<'a> {
 pub struct RunOutcome {
     /// The answer as a document.
     pub answer: RunAnswer,
-    /// What came of the run.
+    /// The report of the run.
     pub report: Report,
 }
 
@@ -61,7 +61,7 @@ pub enum RunFormat {
 /// Progress of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunProgress<'a> {
-    /// What has just been recorded: a decision, a command, an observation, a plan, …
+    /// The latest entry of the record: a decision, a command, an observation, a plan, …
     pub entry: &'a Entry<'a>,
     /// The number of plans that have been taken up.
     pub plans: usize,

@@ -28,7 +28,7 @@ pub struct StnOutcome {
     pub answer: StnAnswer,
     /// The network; `None` if the judge rejects the plan.
     pub plan: Option<ParametrizedPlan>,
-    /// What the judge objects to in the plan's own times, if times close to these were taken.
+    /// The judge's objection to the plan's own times, if times close to these were taken.
     pub repaired: Option<Box<Violation>>,
 }
 
@@ -80,7 +80,7 @@ pub enum StnFinding {
 pub struct NodeAnswer {
     /// As in STN plan files.
     pub name: String,
-    /// What happens there, in words.
+    /// The happening, in words.
     pub what: String,
     /// When, for timed initials.
     #[serde(with = "exact::option")]

@@ -98,7 +98,7 @@ impl Analyst {
         Ok(flow::open(task, freed, &specs)?)
     }
 
-    /// What facts alone order: see [`Need::Orderings`].
+    /// The orderings by facts alone: see [`Need::Orderings`].
     fn orderings(
         task: &Task,
         plan: &TimeTriggeredPlan,

@@ -12,8 +12,8 @@ use super::{Analyst, Embedded, WholeRegion};
 use crate::flow;
 
 /// Executes a plan in a world, with one of the
-/// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for when the
-/// plan no longer works. [`Execution`] has everything else that can be chosen.
+/// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for when
+/// the plan no longer works. [`Execution`] has everything else that can be chosen.
 ///
 /// # Errors
 /// When there is no executor of that name. Whatever happens in the world, there is a report.

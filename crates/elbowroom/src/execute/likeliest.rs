@@ -34,16 +34,17 @@ const SEED: u64 = 0x6f64_6473_0000_0000;
 /// Chooses among several plans the one that is likeliest to succeed.
 ///
 /// The plans: the one that the planner makes for the problem as it is, and those that it makes for
-/// problems in which every action takes long, and never less than planned. How likely: the share of sampled worlds in which
-/// durations drawn from the world's distributions leave the plan's network consistent and no action
-/// fails. That is the probability that the plan can be scheduled by one who knows the durations;
-/// when one learns them on the way, it is less at times. Amounts are taken as the domain has them.
+/// problems in which every action takes long, and never less than planned. How likely: the share of
+/// sampled worlds in which durations drawn from the world's distributions leave the plan's network
+/// consistent and no action fails. That is the probability that the plan can be scheduled by one
+/// who knows the durations; when one learns them on the way, it is less at times. Amounts are taken
+/// as the domain has them.
 ///
 /// The samples are the same for all plans, and depend on nothing but the actions' names.
 pub struct Likeliest<'a> {
-    /// What is known of the world.
+    /// The model of the world.
     pub model: WorldModel,
-    /// Who makes the plans.
+    /// The planner.
     pub planner: Embedded<'a>,
     /// The planning time, as it passes in the world.
     pub planning_time: Rational,
@@ -99,7 +100,7 @@ impl SharedLikeliest {
         Self(Arc::new(Mutex::new(likeliest)))
     }
 
-    /// What it remembers is right whatever became of who asked last.
+    /// Results are right whoever asked before, even after a panic of another thread.
     fn get(&self) -> MutexGuard<'_, Likeliest<'static>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -28,7 +28,7 @@ pub struct Embedded<'a> {
     pub most_states: u64,
     /// How many states to look at for a better plan than the first.
     pub improve_states: u64,
-    /// What time it is, in seconds since whenever: where planning time is measured.
+    /// The clock by which planning time is measured, in seconds since some fixed time.
     pub clock: Option<&'a (dyn Fn() -> Rational + Sync)>,
     /// Asked now and then whether to go on; without it, always.
     pub goes_on: Option<&'a (dyn Fn() -> bool + Sync)>,

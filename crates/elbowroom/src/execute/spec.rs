@@ -52,7 +52,7 @@ pub struct RunSpec {
     /// A world that lets each action end when that is worst; left out where it is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spoiler: Option<Spoiler>,
-    /// Who makes plans: [`EMBEDDED`], [`NOBODY`], or the name or command line of another planner.
+    /// The planner: [`EMBEDDED`], [`NOBODY`], or the name or command line of another one.
     pub planner: String,
     /// How many seconds another planner has for better plans than its first; left out where the
     /// first is taken.
@@ -64,7 +64,7 @@ pub struct RunSpec {
     pub likelihoods: Option<NamedText>,
     /// Whether there is a plan to begin with; in a trace, it is the first entry.
     pub has_plan: bool,
-    /// Who decides.
+    /// The executor.
     #[serde(with = "as_text")]
     pub executor: ExecutorSpec,
     /// Which of the possible trajectories of the world to take.
@@ -76,14 +76,14 @@ pub struct RunSpec {
     /// What to leave open; all durations that the domain fixes if empty.
     #[serde(with = "listed")]
     pub vary: Vec<VarySpec>,
-    /// What is guaranteed inside envelopes.
+    /// The guarantee inside envelopes.
     pub guarantee: Guarantee,
-    /// How close to its limit each end of an envelope should come; left out where that is a hundredth
-    /// of each nominal value.
+    /// How close to its limit each end of an envelope should come; left out where that is a
+    /// hundredth of each nominal value.
     #[serde(default, with = "positive::option")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<Rational>,
-    /// What becomes of running actions when a new plan is made.
+    /// The treatment of running actions when a new plan is made.
     #[serde(with = "as_text")]
     pub running: RunningRule,
     /// The planning time, as it passes in the world.

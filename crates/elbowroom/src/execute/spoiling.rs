@@ -26,7 +26,7 @@ pub struct Spoiling {
     happened: Vec<Option<Rational>>,
     /// Timed initials, with their times.
     timed: Vec<(NodeId, Rational)>,
-    /// What is under way.
+    /// Actions under way.
     running: BTreeMap<Ticket, InstanceId>,
     /// When that ends on which the spoiler does not decide.
     ends: BTreeMap<Ticket, Rational>,

@@ -7,7 +7,7 @@ use super::Explainer;
 
 /// Constraints that contradict each other, in words.
 pub(super) struct Conflict {
-    /// What takes how long, against what.
+    /// The conflict: which durations have to fit into which bound.
     pub(super) reason: String,
     /// By how much it is too long.
     pub(super) excess: Rational,
@@ -76,8 +76,8 @@ pub(super) fn find(explainer: &Explainer<'_>, valuation: &Valuation) -> Option<C
 }
 
 impl Explainer<'_> {
-    /// What takes at least so long, or what it has to fit into, at the nominal values; `None` for mere
-    /// orderings.
+    /// What takes at least so long, or what it has to fit into, at the nominal values; `None` for
+    /// mere orderings.
     pub(crate) fn bound_words(&self, constraint: &Constraint, side: Side) -> Option<String> {
         let nominal = self.plan.nominal();
         match side {
@@ -130,7 +130,7 @@ fn is_own_separation(explainer: &Explainer<'_>, origin: Edge<'_>) -> bool {
     }
 }
 
-/// What takes time because of a lower bound; `None` for mere separations.
+/// The time that a lower bound takes; `None` for mere separations.
 fn need(
     explainer: &Explainer<'_>,
     constraint: &Constraint,
@@ -160,7 +160,7 @@ fn need(
     })
 }
 
-/// What there is to fit into because of an upper bound. `next` follows on the cycle.
+/// The room that an upper bound leaves. `next` follows on the cycle.
 fn room(
     explainer: &Explainer<'_>,
     constraint: &Constraint,

@@ -6,7 +6,8 @@ use elbowroom_plan::{DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind
 use super::Explainer;
 
 impl Explainer<'_> {
-    /// What an executor would have to know in advance, and what stands between that and a schedule.
+    /// The value that an executor would have to know in advance, and the constraints that demand
+    /// it.
     pub(super) fn uncontrollable(&self, conflict: &ControlConflict) -> String {
         let mut unknown: Vec<ParameterId> = Vec::new();
         let mut between: Vec<String> = Vec::new();

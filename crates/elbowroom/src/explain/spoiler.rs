@@ -22,9 +22,9 @@ enum Policy {
 
 /// The result of a play of the executor against the world.
 struct Play {
-    /// What happened, in order.
+    /// The happenings so far, in order.
     happened: Vec<(Rational, NodeId)>,
-    /// What could not be kept.
+    /// The window that could not be kept.
     broken: OutOfWindow,
     windows: MovingWindows,
 }

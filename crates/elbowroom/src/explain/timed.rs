@@ -22,8 +22,8 @@ impl Explainer<'_> {
     }
 
     /// A bound that a plan puts on a node's absolute time, by the deadline behind it if there is
-    /// one: the first timed initial at or after it that takes away what the node needs. If the bound
-    /// keeps more distance from that than interfering happenings have to, both are named.
+    /// one: the first timed initial at or after it that takes away what the node needs. If the
+    /// bound keeps more distance from that than interfering happenings have to, both are named.
     pub(super) fn deadline_behind(&self, node: NodeId, bound: &Rational) -> Option<String> {
         let (index, timed) = self
             .task
@@ -41,7 +41,7 @@ impl Explainer<'_> {
         Some(format!("{deadline} ({node} at {bound} or before)"))
     }
 
-    /// What the timed initials do, as far as it concerns the node: `(open w) becomes false`.
+    /// The change by the timed initials that concerns the node: `(open w) becomes false`.
     pub(super) fn timed_change(&self, node: NodeId, timed: usize) -> String {
         let changes = &self.task.timed()[timed].changes;
         let footprint = self.plan.plan.footprint(self.task, node);

@@ -25,7 +25,7 @@ pub struct Answer {
     pub requirements: usize,
     /// How many contingent links.
     pub links: usize,
-    /// What was taken otherwise than the file says, or left out.
+    /// Remarks on parts of the file that were interpreted leniently, or left out.
     pub remarks: Vec<String>,
     /// Whether there is a schedule, if the world is kind.
     pub consistent: Promise,

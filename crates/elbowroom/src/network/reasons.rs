@@ -36,7 +36,7 @@ pub(super) fn consistent(file: &NetworkFile) -> Promise {
     })
 }
 
-/// What a constraint of [`NetworkFile::kind_network`] comes from: `Late` is a link's upper bound.
+/// The origin of a constraint of [`NetworkFile::kind_network`]: `Late` is a link's upper bound.
 fn kind_ground(file: &NetworkFile, id: ConstraintId) -> Ground {
     let mut rest = id.index();
     let requirements = file.network.requirements().constraints().len();

@@ -35,7 +35,8 @@ pub(super) enum Move {
     Wait,
 }
 
-/// All that is worth looking at in a state in which the goal does not hold, and in which there is hope.
+/// All that is worth looking at in a state in which the goal does not hold, and in which there is
+/// hope.
 pub(super) fn moves(world: &TimedWorld, state: &State) -> Vec<Move> {
     let startable = state.startable(world);
     if state.must_start(world, &startable) {
@@ -108,7 +109,8 @@ impl<'a> Below<'a> {
                 outcomes.into_iter().collect()
             });
         }
-        // Where more facts are never worse, nothing is worse than harm both before and after all else.
+        // Where more facts are never worse, nothing is worse than harm both before and after all
+        // else.
         let is_harm = |happening: &Happening| matches!(happening, Happening::Event(event) if world.events[*event].is_harmful());
         let (harm, rest): (Vec<_>, Vec<_>) = happenings.iter().copied().partition(is_harm);
         if rest.len() > MOST_ORDERED {

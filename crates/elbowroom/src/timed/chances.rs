@@ -1,4 +1,5 @@
-//! In which cell what began in one ends, and in which cell what happens by itself does: [`Chances`].
+//! In which cell what began in one ends, and in which cell what happens by itself does:
+//! [`Chances`].
 
 use elbowroom_sim::Side as Part;
 

@@ -15,8 +15,8 @@ use elbowroom_sim::{Distribution, ExogenousChange, Failure, WorldModel};
 use super::world::{Act, Event, Facts, Needs, Snap};
 use super::{NotTabulated, Settings};
 
-/// All actions that can start, whatever happens by itself, or those that are asked for. One that can
-/// never end is in no plan, but what its start does may still be of use.
+/// All actions that can start, whatever happens by itself, or those that are asked for. One that
+/// can never end is in no plan, but what its start does may still be of use.
 pub(super) fn actions(
     task: &Task,
     model: &WorldModel,

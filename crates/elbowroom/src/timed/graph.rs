@@ -126,8 +126,9 @@ impl State {
         after
     }
 
-    /// The action at that place in the list ends, well or badly. It fails, too, if what its end needs
-    /// does not hold; then nobody undoes what its start did, nor does anybody where it breaks off.
+    /// The action at that place in the list ends, well or badly. It fails, too, if what its end
+    /// needs does not hold; then nobody undoes what its start did, nor does anybody where it breaks
+    /// off.
     pub(super) fn ended(&self, world: &TimedWorld, place: usize, well: bool) -> Self {
         let mut after = self.clone();
         let running = after.running.remove(place);
@@ -237,8 +238,8 @@ pub(super) fn explored(
     Ok(layers)
 }
 
-/// By which factors a value shrinks on the way, so that of two ways that are equally likely to reach the
-/// goal the shorter one is worth more.
+/// By which factors a value shrinks on the way, so that of two ways that are equally likely to
+/// reach the goal the shorter one is worth more.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolls {
     /// From one cell to the next.
@@ -255,9 +256,9 @@ impl Tolls {
     };
 }
 
-/// The values of a cell's nodes. Nodes lead to later ones, or back through instantaneous actions and
-/// such as take less than a cell; so they are gone through from the last to the first, until nothing
-/// changes any more.
+/// The values of a cell's nodes. Nodes lead to later ones, or back through instantaneous actions
+/// and such as take less than a cell; so they are gone through from the last to the first, until
+/// nothing changes any more.
 pub(super) fn settled(nodes: &Nodes, next: &[f64], tolls: Tolls) -> Vec<f64> {
     let mut values = vec![0.0_f64; nodes.len()];
     loop {

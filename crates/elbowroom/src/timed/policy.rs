@@ -14,8 +14,9 @@ use super::{NotTabulated, Settings, Side, TimedOptimum, optimum};
 
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
-/// Whoever always makes the move of most worth at the boundaries of cells succeeds at least with the
-/// probability [`TimedOptimum::lower`], but for [`HASTE`] and for the ε that happenings are kept apart.
+/// Whoever always makes the move of most worth at the boundaries of cells succeeds at least with
+/// the probability [`TimedOptimum::lower`], but for [`HASTE`] and for the ε that happenings are
+/// kept apart.
 #[derive(Debug)]
 pub struct Policy {
     world: TimedWorld,
@@ -31,8 +32,8 @@ pub struct Policy {
 const HASTE: f64 = 1e-4;
 
 impl Policy {
-    /// The policy on the finest grid that [`optimum`] finishes; `None` if that is none, or `goes_on` says
-    /// so.
+    /// The policy on the finest grid that [`optimum`] finishes; `None` if that is none, or
+    /// `goes_on` says so.
     ///
     /// # Errors
     /// When there is something in the task or in the world that the process does not know.
@@ -73,7 +74,8 @@ impl Policy {
         Ok(Some(policy))
     }
 
-    /// The bounds between which the best of all executors lies, and the grids that were tried for them.
+    /// The bounds between which the best of all executors lies, and the grids that were tried for
+    /// them.
     pub fn optimum(&self) -> &TimedOptimum {
         &self.optimum
     }
@@ -185,8 +187,8 @@ impl Policy {
         happened
     }
 
-    /// Makes actions that should be over by now count as started later, as late as it takes for them
-    /// to be under way still. Whether there were any.
+    /// Makes actions that should be over by now count as started later, as late as it takes for
+    /// them to be under way still. Whether there were any.
     fn rejuvenate(&self, cell: usize, state: &mut State) -> bool {
         let mut is_overdue = false;
         for running in &mut state.running {

@@ -305,8 +305,8 @@ impl Act {
             .is_some_and(|(_, end)| end.deletes & !end.adds == 0)
     }
 
-    /// Whether its end needs nothing but what it needs all the time anyway, so that no moment is better
-    /// for it to end than another.
+    /// Whether its end needs nothing but what it needs all the time anyway, so that no moment is
+    /// better for it to end than another.
     fn ends_safely(&self) -> bool {
         self.rest.as_ref().is_some_and(|(over_all, end)| {
             let always = over_all.conjunction().unwrap_or(0);
@@ -316,8 +316,8 @@ impl Act {
         })
     }
 
-    /// Whether there can be something in cancelling it where more facts are never worse: its end may
-    /// do harm, or who begins anew may be done earlier than who goes on.
+    /// Whether there can be something in cancelling it where more facts are never worse: its end
+    /// may do harm, or who begins anew may be done earlier than who goes on.
     fn may_gain_by_cancelling(&self, model: &WorldModel) -> bool {
         !self.ends_kindly()
             || !self.ends_safely()

@@ -82,8 +82,8 @@ fn an_order_that_misses_its_deadline_is_not_chosen() {
     assert!(is_valid(&scene, &report));
 }
 
-/// The next start is decided when it is known what has become of the one before: after no time, where
-/// that is told at once.
+/// The next start is decided when it is known what has become of the one before: after no time,
+/// where that is told at once.
 #[test]
 fn starts_that_are_due_at_once_begin_at_once() {
     let scene = field(7);

@@ -70,8 +70,8 @@ fn live_holds_amounts_that_were_not_left_open_against_the_rest() {
     }
 }
 
-/// While a tank is filled its level rises: after 20 it runs over. A survey of 25 leaves too little in
-/// the battery for the next one.
+/// While a tank is filled its level rises: after 20 it runs over. A survey of 25 leaves too little
+/// in the battery for the next one.
 #[test]
 fn live_gives_up_what_runs_too_long_for_the_numbers_while_it_runs() {
     for (case, world, limit) in [

@@ -54,8 +54,9 @@ fn a_run_ends_after_the_last_timed_initial_that_the_goal_depends_on() {
 
 /// At 20 what was packed before is thrown away.
 ///
-/// The published baselines start at once, pack in 1 instead of 4, and have made all the plans that they
-/// may make before it is 20. They fail, but they do not take what will be thrown away for a success.
+/// The published baselines start at once, pack in 1 instead of 4, and have made all the plans that
+/// they may make before it is 20. They fail, but they do not take what will be thrown away for a
+/// success.
 #[test]
 fn what_a_timed_initial_will_undo_is_done_again() {
     let problem = "(define (problem p) (:domain shipping)

@@ -1,5 +1,5 @@
-//! Durations that the executor chooses: it tells them at the start of the action, and can do nothing
-//! about them later.
+//! Durations that the executor chooses: it tells them at the start of the action, and can do
+//! nothing about them later.
 
 use elbowroom::execution::run::Verdict;
 use elbowroom::num::{End, Rational};

@@ -1,5 +1,5 @@
-//! The fairest box: all variables grow together, in relation to their nominal values, until some are
-//! stopped; then the others go on.
+//! The fairest box: all variables grow together, in relation to their nominal values, until some
+//! are stopped; then the others go on.
 //!
 //! Boxes inside an envelope have all their sub-boxes there, too. So where all that still grow have
 //! the same slack, and those that were stopped keep theirs, a variable that cannot grow alone can
@@ -104,7 +104,8 @@ pub(super) fn fill(
 }
 
 impl Fill<'_> {
-    /// How much slack all that still grow can have, or one alone while the others stay where they are.
+    /// How much slack all that still grow can have, or one alone while the others stay where they
+    /// are.
     fn grow(&mut self, alone: Option<usize>, level: &Rational) -> Result<Reached, Refusal> {
         let mut ray = Ray::new(self.plan);
         let mut most = level.clone();

@@ -20,12 +20,13 @@ pub(super) enum Solved {
     Impossible(Vec<(Source, Rational)>),
 }
 
-/// `max Σ worth · variable` over the cuts of one row, and, in a case, over a row each of some others.
+/// `max Σ worth · variable` over the cuts of one row, and, in a case, over a row each of some
+/// others.
 pub(super) struct Master {
     simplex: Simplex,
     variables: Vec<VariableId>,
     objective: Vec<(VariableId, Rational)>,
-    /// What the tags of the linear program mean.
+    /// The sources of the bounds, by the tags of the linear program.
     sources: Vec<Source>,
     /// The rows of the cuts, as variables with their bounds, where they have any factor.
     rows: BTreeMap<(usize, usize), (Option<VariableId>, Rational)>,

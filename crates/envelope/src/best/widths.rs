@@ -26,7 +26,7 @@ struct Leaf {
     case: usize,
     /// The rows that hold in it.
     chosen: Vec<(usize, usize)>,
-    /// What nothing in it exceeds.
+    /// An upper bound on the objective.
     bound: Rational,
     /// Whether the bound was worked out from all cuts that are known.
     is_fresh: bool,

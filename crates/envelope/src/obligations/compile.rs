@@ -111,7 +111,7 @@ impl Compiler<'_> {
         Ok(Progress::Finished)
     }
 
-    /// What the happening at a node requires and changes.
+    /// The requirements and changes of the happening at a node.
     fn happen(
         &self,
         run: &mut Run,
@@ -251,7 +251,7 @@ impl Compiler<'_> {
         Ok(())
     }
 
-    /// What can be said only when the whole timeline is known: over-all conditions and goal.
+    /// The obligations that need the whole timeline: over-all conditions and goal.
     fn finish(&self, run: Run, obligations: &mut Obligations) -> Result<(), Refusal> {
         let timeline = Arc::new(run.timeline);
         let plan = &self.plan.plan;

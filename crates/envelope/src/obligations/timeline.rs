@@ -113,7 +113,7 @@ impl Timeline {
             .push((node, change));
     }
 
-    /// What happens to a fact.
+    /// The history of a fact.
     pub(crate) fn fact_history(&self, fact: FactId) -> FactHistory {
         self.facts.get(&fact).cloned().unwrap_or_default()
     }

@@ -8,8 +8,8 @@ use crate::learn::Learnt;
 use crate::obligations::Refusal;
 
 impl Oracle {
-    /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what that
-    /// says about others that do.
+    /// Whether the box, which holds the nominal values, is inside the envelope, and if not, what
+    /// that says about others that do.
     ///
     /// Takes about as long as [`objection`](Self::objection); the accepted box stays what it is.
     ///

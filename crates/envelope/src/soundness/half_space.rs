@@ -30,8 +30,8 @@ struct Place {
 }
 
 impl Soundness {
-    /// What every box inside the envelope satisfies because of what is broken in this one; `None` if
-    /// that is nothing linear.
+    /// What every box inside the envelope satisfies because of what is broken in this one; `None`
+    /// if that is nothing linear.
     pub(crate) fn row(
         &self,
         plan: &ParametrizedPlan,

@@ -3,8 +3,8 @@
 //!
 //! Z3 has a time limit for each question (`ELBOWROOM_Z3_MILLISECONDS`). The generators, whose
 //! numbers change continuously, take it up to half a minute, so that only those of up to
-//! `ELBOWROOM_NODES` time points are asked about, and only the smallest also whether their boxes can
-//! grow. `ELBOWROOM_INSTANCES` is how the names of the instances begin.
+//! `ELBOWROOM_NODES` time points are asked about, and only the smallest also whether their boxes
+//! can grow. `ELBOWROOM_INSTANCES` is how the names of the instances begin.
 
 use std::ops::ControlFlow;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! A plan of 20 robots, one action after the other on each; every tenth waits for one of another
-//! robot; every hundredth has a deadline. Every action ends half a second later than planned, so that
-//! all windows behind it move.
+//! robot; every hundredth has a deadline. Every action ends half a second later than planned, so
+//! that all windows behind it move.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -44,8 +44,8 @@ impl Events {
         }
     }
 
-    /// Tells the executor what has happened, does what it says, and lets the next action end; whether
-    /// there was one.
+    /// Tells the executor what has happened, does what it says, and lets the next action end;
+    /// whether there was one.
     pub(crate) fn next(&mut self, executor: &mut dyn Executor) -> bool {
         loop {
             let moment = Moment {

@@ -16,7 +16,7 @@ use crate::progression::Progression;
 pub(crate) struct Failure {
     /// The action that needs it; `None` for the goal.
     pub(crate) action: Option<String>,
-    /// What would not hold.
+    /// The condition that would not hold.
     pub(crate) condition: String,
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn failure(dispatch: &Dispatch, moment: &Moment<'_>) -> Option<Failur
     })
 }
 
-/// What has not happened, with the times at which it would, in order.
+/// The happenings to come, with the times at which they are expected, in order.
 fn expected(dispatch: &Dispatch, now: &Rational) -> Vec<(Rational, NodeId)> {
     let plan = dispatch.plan();
     let is_open = |node: &NodeId| {

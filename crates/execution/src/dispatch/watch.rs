@@ -250,7 +250,7 @@ fn broken(moment: &Moment<'_>) -> Option<Reason> {
     Some(reason.about(about).since(moment.now.clone()))
 }
 
-/// What an action needs at its start and does not have.
+/// The condition of an action's start that does not hold.
 pub(crate) fn unmet(action: &Action, duration: &Rational, belief: &Progression) -> Option<Reason> {
     let condition = match &action.body {
         Body::Instantaneous(snap) => &snap.condition,

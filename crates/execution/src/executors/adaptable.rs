@@ -99,8 +99,8 @@ impl Adaptable {
         }
     }
 
-    /// All that can be done in a small world, where nothing is under way and everything is known; with
-    /// the actions.
+    /// All that can be done in a small world, where nothing is under way and everything is known;
+    /// with the actions.
     fn tabulated(&self, mission: &Mission) -> Option<(Chooser, Vec<Step>)> {
         let foresight = self.foresight.as_ref()?;
         // A table is for who sees the state as it is.

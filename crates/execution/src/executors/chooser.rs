@@ -15,7 +15,7 @@ use crate::reason::About;
 pub(super) enum Chooser {
     /// Orders of the plan's happenings, and their layers.
     Orders(Box<LayerDispatch>),
-    /// What is best in a small world.
+    /// The best action by the table of a small world.
     Table {
         table: Arc<Table>,
         search: Box<OrderSearch>,
@@ -33,7 +33,7 @@ impl Chooser {
         }
     }
 
-    /// What is next. `watch` can cut a search short.
+    /// The next choice. `watch` can interrupt a search.
     pub(super) fn choose(
         &mut self,
         circumstances: &Circumstances,

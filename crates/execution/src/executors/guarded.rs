@@ -33,9 +33,10 @@ struct Guard {
     dispatch: Dispatch,
     mission: Mission,
     envelope: DecoupledEnvelope,
-    /// What dispatching keeps: less than the envelope, if that takes knowing values in advance.
+    /// The box that dispatching keeps: smaller than the envelope, if that requires knowing values
+    /// in advance.
     promise: Promise,
-    /// What was observed, and for the rest what is planned.
+    /// The values observed, and the nominal ones of the rest.
     values: Valuation,
 }
 

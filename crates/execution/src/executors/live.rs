@@ -42,7 +42,7 @@ pub(super) const REGISTERED: Registered = Registered {
 /// See [`REGISTERED`].
 struct Live {
     region: Box<dyn Region>,
-    /// Who knows of likelier plans, and by how much one must be likelier.
+    /// The source of likelier plans, and by how much one must be likelier.
     odds: Option<(Box<dyn Odds>, Rational)>,
     state: Option<Rest>,
 }
@@ -50,10 +50,10 @@ struct Live {
 /// A plan, and what is known of its open quantities.
 struct Rest {
     dispatch: Dispatch,
-    /// What holds of what is left.
+    /// The guarantee of the rest of the plan.
     promise: Promise,
     mission: Mission,
-    /// What was observed, and for the rest what is planned.
+    /// The values observed, and the nominal ones of the rest.
     values: Valuation,
     /// The parameters that are durations, by instance.
     durations: BTreeMap<InstanceId, ParameterId>,

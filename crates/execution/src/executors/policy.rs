@@ -1,4 +1,5 @@
-//! `policy`: the plan while its guarantee costs no probability, then the likeliest move, on a clock.
+//! `policy`: the plan while its guarantee costs no probability, then the likeliest move, on a
+//! clock.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -46,7 +47,8 @@ pub(super) const REGISTERED: Registered = Registered {
     },
 };
 
-/// How much probability is given away at most, all in all, for keeping to a plan with its guarantee.
+/// How much probability is given away at most, all in all, for keeping to a plan with its
+/// guarantee.
 const MOST_FORGONE: f64 = 0.005;
 
 /// So often at one time something is started or let go; then the next period is waited for.
@@ -61,7 +63,8 @@ struct Policy {
     follows: bool,
     /// How much probability has been given away for that.
     forgone: f64,
-    /// What was ordered and has not ended: its name, whether the plan ordered it, whether it has started.
+    /// What was ordered and has not ended: its name, whether the plan ordered it, whether it has
+    /// started.
     steps: BTreeMap<StepId, Ordered>,
     /// The facts that the world has changed by itself.
     changed: Vec<(FactId, bool)>,
@@ -155,8 +158,8 @@ impl Executor for Policy {
 }
 
 impl Policy {
-    /// Takes note of what is new; what of it is about the plan, and why nobody knows how things stand, if
-    /// that is so.
+    /// Takes note of what is new; what of it is about the plan, and why nobody knows how things
+    /// stand, if that is so.
     fn learn(&mut self, moment: &Moment<'_>) -> (Vec<News>, Option<Reason>) {
         let (mut own, mut doubt) = (Vec::new(), None);
         for news in moment.news {

@@ -143,7 +143,7 @@ fn most<T, E>(
 /// The room that the rest of a plan is tried with.
 struct Room<'a> {
     mission: &'a Mission,
-    /// What was observed, and for the rest what is planned.
+    /// The values observed, and the nominal ones of the rest.
     values: &'a Valuation,
     /// How much of the room around what is planned; 1 is all of it.
     share: &'a Rational,

@@ -145,8 +145,8 @@ impl Polynomial {
     }
 }
 
-/// Parts the open interval from 0 to `length`: in each cell, each polynomial has one sign. Zeros are
-/// known up to `precision`, if that is asked for.
+/// Parts the open interval from 0 to `length`: in each cell, each polynomial has one sign. Zeros
+/// are known up to `precision`, if that is asked for.
 pub(super) fn cells(
     polynomials: &[Polynomial],
     length: &Rational,

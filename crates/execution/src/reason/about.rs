@@ -38,9 +38,9 @@ pub enum About {
     Throughout(Vec<String>),
     /// This fact or fluent, which was seen.
     Seen(String),
-    /// What was seen when the world was asked to look at the goal.
+    /// An observation made when the world was asked to look at the goal.
     SeenAtTheEnd,
-    /// Whatever is observed next.
+    /// The next observation, of any kind.
     AnyObservation,
     /// The last timed initial that changes what the goal reads.
     GoalSettled,
@@ -54,13 +54,13 @@ pub enum About {
     NextStart,
     /// The next happening of that order, which the world brings about.
     NextHappening,
-    /// What is chosen is best of all that can be done; with the probability to succeed from here.
+    /// The choice is the best of all possible ones; with the probability to succeed from here.
     BestOfAll(f64),
     /// The next moment at which moves are weighed; with the probability to succeed from here.
     NextDecision(f64),
-    /// What is chosen is first of the order most likely to succeed; with that probability.
+    /// The choice is first in the order most likely to succeed; with that probability.
     FirstOfBestOrder(f64),
-    /// What is chosen is next after the lattermost layer that fits.
+    /// The choice is next after the lattermost layer that fits.
     NextInOrder,
     /// Another plan succeeds with the probability `other`, the rest of this one with `present`.
     Odds {
@@ -75,7 +75,7 @@ pub enum About {
     Cancelled,
     /// It has failed so often in a row that its likelihoods do not explain it.
     FailedInARow {
-        /// What the world says of the last failure; `None`: that it was cancelled.
+        /// The world's explanation of the last failure; `None`: it was cancelled.
         why: Option<String>,
         /// The number of failures.
         failures: i32,
@@ -96,7 +96,7 @@ pub enum About {
     Nothing,
     /// Too little time is left even if nothing deviates any more.
     TooLittleTime,
-    /// What the rest of the plan does to numbers fails when the action takes longer.
+    /// The numbers of the rest of the plan fail when the action takes longer.
     LaterNumbers,
     /// A message from outside: of the world, about a failure; of an oracle, about its objection.
     Said(String),

@@ -26,7 +26,7 @@ pub enum Behind {
     },
     /// Timed initials that are to come.
     Timed {
-        /// What they change.
+        /// The changes.
         changes: Vec<Changed>,
         /// When, where that is told.
         at: Option<Rational>,
@@ -45,7 +45,7 @@ pub enum Behind {
     Failed {
         /// The action.
         action: String,
-        /// What the world says of it; empty if it says nothing.
+        /// The world's explanation; empty if there is none.
         why: String,
     },
     /// This action was cancelled.
@@ -82,7 +82,7 @@ pub enum Behind {
     },
 }
 
-/// What a timed initial does to a fact or a fluent.
+/// The change of a fact or a fluent by a timed initial.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Changed {
     /// This fact becomes true.
@@ -94,7 +94,7 @@ pub enum Changed {
 }
 
 impl Changed {
-    /// What these do, by name.
+    /// The changes, by name.
     pub(crate) fn all(task: &Task, changes: &[Change]) -> Vec<Self> {
         let named = changes.iter().map(|change| match change {
             Change::Add(fact) => Self::True(task.fact_name(*fact)),

@@ -61,7 +61,7 @@ impl Account {
         self.entries.len()
     }
 
-    /// What has not ended.
+    /// The tickets of actions that have not ended.
     pub fn open_tickets(&self) -> impl Iterator<Item = Ticket> + '_ {
         self.open.iter().copied()
     }
@@ -213,7 +213,7 @@ fn put_in(snap: &mut SnapAction, measured: &[Measured]) {
     }
 }
 
-/// What has been stopped has no end, and what it needed for going on does not matter.
+/// A cancelled action has no end, and its over-all conditions no longer matter.
 fn cut_off(body: &mut DurativeBody) {
     body.over_all = Condition::TRUE;
     body.end = SnapAction {

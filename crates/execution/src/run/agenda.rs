@@ -34,7 +34,7 @@ pub(super) enum Todo {
     Plan(Reason),
     /// Begin with a plan as soon as the time is over that it took to make it.
     Adopt(Box<Made>),
-    /// What happened while the plan was made, it does not know.
+    /// Events that happened while the plan was made, of which it does not know.
     Tell(Vec<News>),
     /// Wait until then for what was told to stop, and end the run.
     Close(Rational),
@@ -45,7 +45,7 @@ pub(super) struct Made {
     pub(super) plan: TimeTriggeredPlan,
     /// From where.
     pub(super) situation: Situation,
-    /// What is running there.
+    /// The actions running there.
     pub(super) running: Vec<Ticket>,
     /// When it is there, by the world's clock.
     pub(super) ready: Rational,

@@ -35,10 +35,10 @@ pub(super) enum What {
     Value(FluentId, Rational),
 }
 
-/// So much of reachability's work is worth an explanation: about a second.
+/// Limit on the work of reachability for an explanation: about a second.
 const MOST_STEPS: u64 = 10_000_000;
 
-/// So many parts of the goal are explained.
+/// Limit on the number of parts of the goal that are explained.
 const MOST_NAMED: usize = 3;
 
 impl Run<'_> {
@@ -52,7 +52,7 @@ impl Run<'_> {
         }
     }
 
-    /// What can never become true again, and since when.
+    /// Facts and numbers that can never become true again, and since when.
     pub(super) fn dead_end(&self) -> Vec<Reason> {
         let mut past = Past {
             task: &self.task,
@@ -177,7 +177,7 @@ impl Past<'_> {
         None
     }
 
-    /// What has happened, by name.
+    /// A happening, by name.
     fn named(&self, what: &What) -> Behind {
         let task = self.task;
         let entry = |ticket: &Ticket| {

@@ -20,7 +20,7 @@ pub enum Next {
         /// By the world's clock.
         until: Rational,
     },
-    /// What is true of these, if the world can look; then [`Run::see`].
+    /// The world is to look at these, if it can; then [`Run::see`].
     Look {
         /// Facts.
         facts: Vec<FactId>,
@@ -31,8 +31,8 @@ pub enum Next {
     Over(Report),
 }
 
-/// The run has not asked for that: [`Run::observe`] answers [`Next::Wait`], and [`Run::see`] answers
-/// [`Next::Look`].
+/// The run has not asked for that: [`Run::observe`] answers [`Next::Wait`], and [`Run::see`]
+/// answers [`Next::Look`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run has not asked for {what}; ask `Run::next` what it needs first")]
 pub struct NotAsked {
@@ -141,7 +141,7 @@ impl Run<'_> {
         }
     }
 
-    /// What follows from time having passed, whatever was observed.
+    /// The consequences of time having passed, whatever was observed.
     fn after_passage(&mut self) -> Result<(), Stop> {
         if self.closing.is_some() {
             self.go_on_closing();

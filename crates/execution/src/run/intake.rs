@@ -212,7 +212,7 @@ impl Run<'_> {
         }
     }
 
-    /// What was measured, with what the domain reads for it; to be asked before it takes effect.
+    /// The measured amounts, with the nominal ones; to be asked before the happening takes effect.
     fn amounts(
         &self,
         action: &Action,

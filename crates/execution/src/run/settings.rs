@@ -11,7 +11,7 @@ use crate::reason::Reason;
 /// Settings of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSettings {
-    /// What becomes of running actions when a new plan is made.
+    /// The treatment of running actions when a new plan is made.
     pub running: RunningRule,
     /// The planning time, as it passes in the world.
     pub planning_time: PlanningTime,
@@ -124,9 +124,9 @@ impl FromStr for PlanningTime {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{text}` is not {expected}")]
 pub struct UnknownSetting {
-    /// What was written.
+    /// The text as written.
     pub text: String,
-    /// What can be written.
+    /// The form that is expected.
     pub expected: &'static str,
 }
 
@@ -215,6 +215,6 @@ pub struct Report {
     pub dead_end: Vec<Reason>,
     /// The number of actions started.
     pub starts: usize,
-    /// What was done, with the times and amounts observed: a plan for the judge.
+    /// The executed steps, with the times and amounts observed: a plan for the judge.
     pub executed: Vec<ExecutedStep>,
 }

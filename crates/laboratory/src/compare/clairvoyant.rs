@@ -14,7 +14,7 @@ use elbowroom_sim::{Purpose, WorldModel};
 
 use elbowroom::execute::rewrite::{add_function_of, set_durations};
 
-/// What this is, in one sentence.
+/// A summary of the row, in one sentence.
 pub(super) const SUMMARY: &str = "The share of trials in which the planner, with the executors' \
     limits, finds a plan when everything is known in advance, or one of the executors gets there.";
 

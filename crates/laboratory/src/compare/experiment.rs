@@ -17,7 +17,7 @@ use file::{File, exact, text_of};
 /// An experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// What it shows.
+    /// The title.
     pub title: String,
     /// The domain, in PDDL.
     pub domain: String,
@@ -43,7 +43,7 @@ pub struct Experiment {
     pub settings: RunSettings,
     /// How close to its limit each end of an envelope should come.
     pub precision: Rational,
-    /// Who makes plans.
+    /// The planner.
     pub planner: Planning,
     /// How many states the planner looks at for one plan.
     pub planner_states: u64,
@@ -79,7 +79,7 @@ pub struct Column {
     /// How likely everything is, for executors that go by that: a likelihood file. Without one,
     /// everything is certain.
     pub likelihoods: Option<String>,
-    /// What is left open.
+    /// The quantities that may vary.
     pub vary: Vec<VarySpec>,
 }
 

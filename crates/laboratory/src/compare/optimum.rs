@@ -7,14 +7,14 @@ use super::trials::Setting;
 use super::{Column, Experiment, ExperimentError};
 use crate::timed::{Settings, optimum};
 
-/// What the row is called.
+/// The name of the row.
 pub(super) const ROW: &str = "optimum without foresight";
 
-/// What it is, in one sentence.
+/// A summary of the row, in one sentence.
 pub(super) const SUMMARY: &str = "Bounds, in percent, for what the best of all executors reaches that knows \
     the world's distributions but not what will happen; it replans at any time and in no time.";
 
-/// What the best of all executors reaches in a column: the mean over its problems.
+/// The optimum of a column: the mean over its problems.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnOptimum {

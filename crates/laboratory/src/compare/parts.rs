@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// Results of a part of an experiment, or of several.
 pub(crate) trait Partial: Clone {
-    /// What distinguishes the experiment, and into how many parts it was split.
+    /// The fingerprint of the experiment, and the number of parts it was split into.
     fn origin(&self) -> (&str, u64);
     /// Whether both have the same rows and columns.
     fn has_shape_of(&self, other: &Self) -> bool;

@@ -7,8 +7,8 @@ use super::results::Cell;
 use super::{Results, optimum};
 
 impl Results {
-    /// The plots, with a name for a file each: the coverage of each executor in each column, with its
-    /// 95 % interval, and the mean number of new plans of successful runs.
+    /// The plots, with a name for a file each: the coverage of each executor in each column, with
+    /// its 95 % interval, and the mean number of new plans of successful runs.
     pub fn plots(&self) -> Vec<(String, IntervalPlot)> {
         let mut coverage = self.plot(
             "coverage, with 95 % intervals",

@@ -20,7 +20,7 @@ use super::{Experiment, Part};
 pub struct Results {
     format: String,
     version: u64,
-    /// What the experiment shows.
+    /// The title of the experiment.
     pub title: String,
     /// Distinguishes experiments, so that no apples are added to pears.
     pub fingerprint: String,
@@ -263,7 +263,7 @@ impl Results {
     }
 }
 
-/// What each row's executor does, as it is registered; each executor once.
+/// The summary of each row's executor, as it is registered; each executor once.
 fn notes(rows: &[String]) -> Vec<String> {
     let mut notes: Vec<String> = Vec::new();
     for row in rows {

@@ -236,7 +236,7 @@ impl Setting<'_> {
         }
     }
 
-    /// What was filled in.
+    /// The values that were filled in.
     fn words(&self) -> String {
         let filling = self.filling.iter();
         let filling: Vec<_> = filling

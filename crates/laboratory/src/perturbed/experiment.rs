@@ -17,7 +17,7 @@ const FORMAT: &str = "elbowroom-perturbed-experiment";
 /// An experiment, with the texts of all files that it names.
 #[derive(Clone, Debug)]
 pub struct PerturbedExperiment {
-    /// What it shows.
+    /// The title.
     pub title: String,
     /// Trials of each case, world and executor.
     pub trials: u64,
@@ -29,9 +29,9 @@ pub struct PerturbedExperiment {
     pub worlds: Vec<WorldKind>,
     /// With which executors.
     pub executors: Vec<ExecutorName>,
-    /// What changes by itself in the world as published.
+    /// The facts that change by themselves in the world as published.
     pub perturbation: Option<PerturbationNames>,
-    /// Who plans.
+    /// The planner.
     pub planner: PlannerKind,
     /// The cases.
     pub cases: Vec<Case>,
@@ -40,7 +40,7 @@ pub struct PerturbedExperiment {
 /// Likelihoods to try.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What it is called.
+    /// The name.
     pub name: String,
     /// The domain, in PDDL.
     pub domain: String,
@@ -52,7 +52,7 @@ pub struct Case {
     pub also: Vec<OptimumRules>,
     /// A likelihood file (`docs/formats/likelihoods.md`).
     pub likelihoods: String,
-    /// What others have measured in the world as published.
+    /// Measurements by others in the world as published.
     pub published: Option<Published>,
 }
 
@@ -108,8 +108,8 @@ impl WorldKind {
     }
 }
 
-/// Rules by which the optimum is calculated beside those of the trials. Those are: a step that ends in a dead
-/// end uses up a planning round; conditions over all are not looked at.
+/// Rules by which the optimum is calculated beside those of the trials. Those are: a step that ends
+/// in a dead end uses up a planning round; conditions over all are not looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OptimumRules {

@@ -17,7 +17,7 @@ use crate::untimed::ExecutorName;
 pub struct PerturbedResults {
     format: String,
     version: u64,
-    /// What the experiment shows.
+    /// The title of the experiment.
     pub title: String,
     /// Distinguishes experiments, so that no apples are added to pears.
     pub fingerprint: String,
@@ -126,11 +126,11 @@ pub struct Row {
     pub success: Proportion,
     /// Replans in trials that succeeded.
     pub replans: Mean,
-    /// What was done in trials that succeeded.
+    /// The work in trials that succeeded.
     pub succeeded: Work,
-    /// What was done in trials that failed.
+    /// The work in trials that failed.
     pub failed: Work,
-    /// What was published, in that world.
+    /// The published rate in that world.
     pub published: Option<Proportion>,
     /// The best success probability there can be, where it is known.
     pub optimum: Option<f64>,
@@ -139,7 +139,7 @@ pub struct Row {
     pub other_optima: BTreeMap<OptimumRules, f64>,
 }
 
-/// So many digits are read back as they were written.
+/// Rounded to as many digits as are read back as they were written.
 pub(super) fn rounded(probability: f64) -> f64 {
     (probability * 1e12).round() / 1e12
 }

@@ -260,7 +260,7 @@ fn share(of: Proportion) -> Option<Point> {
     })
 }
 
-/// What was published, executor by executor.
+/// The published results, executor by executor.
 fn published(results: &PerturbedResults, world: WorldKind) -> Vec<Series> {
     let published = |row: &Row| row.published.and_then(share);
     let mut series = picture(results, world, ("", ""), &published).series;

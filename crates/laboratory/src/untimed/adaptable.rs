@@ -104,7 +104,7 @@ pub(super) fn model(
     Model::new(task, plan, likelihoods, semantics).ok()
 }
 
-/// What is known, and what is under way.
+/// The believed state, with the actions under way.
 pub(super) fn circumstances(state: &State, running: &[InstanceId]) -> Circumstances {
     let mut circumstances = Circumstances::observed(Rational::ZERO, state);
     let under_way = running.iter().map(|&instance| Running {

@@ -27,7 +27,7 @@ struct Happening {
     action: Arc<Action>,
     /// The position of its start, if it is an end.
     start: Option<usize>,
-    /// What must be done before.
+    /// The steps that must be over first.
     after: Vec<usize>,
 }
 

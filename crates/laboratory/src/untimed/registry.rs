@@ -19,7 +19,7 @@ pub struct Registered {
     /// Its name. What exists on a clock, too, has the same name there
     /// ([`executors::EXECUTORS`]).
     pub name: &'static str,
-    /// What it does, in one sentence or two.
+    /// A summary, in one sentence or two.
     pub summary: &'static str,
     /// Where it comes from.
     pub paper: &'static str,
@@ -98,7 +98,7 @@ impl fmt::Debug for Registered {
 pub struct ExecutorName(usize);
 
 impl ExecutorName {
-    /// What is registered under the name.
+    /// The entry registered under the name.
     pub fn registered(self) -> &'static Registered {
         &EXECUTORS[self.0]
     }
@@ -125,7 +125,7 @@ impl ExecutorName {
     known = EXECUTORS.iter().map(|known| known.name).collect::<Vec<_>>().join(", ")
 )]
 pub struct UnknownExecutor {
-    /// What was asked for.
+    /// The name that was asked for.
     pub name: String,
     /// Whether there is one on a clock.
     pub needs_clock: bool,

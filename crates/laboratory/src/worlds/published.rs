@@ -42,7 +42,7 @@ pub struct PublishedWorld<'a> {
     chances: &'a Chances,
     perturbed: &'a PerturbedFacts,
     state: State,
-    /// What is true, in the order in which it became true.
+    /// The true facts, in the order in which they became true.
     facts: Vec<FactId>,
     starts: RandC,
     effects: BTreeMap<SchemaId, RandC>,

@@ -1,7 +1,7 @@
 //! Small worlds in which all durations and times are whole and even, written out as PDDL and as a
 //! world file, and their best value by plain recursion: at each whole second the agent starts and
-//! cancels what it likes, and a second later happens what happens, in the worst order or in the best
-//! one.
+//! cancels what it likes, and a second later happens what happens, in the worst order or in the
+//! best one.
 //!
 //! It knows neither cells nor bounds, and reads neither PDDL nor world files.
 
@@ -152,8 +152,8 @@ impl SmallWorld {
         text
     }
 
-    /// The best that can be reached from time 0 if what happens at the same second happens in the worst
-    /// order, and in the best one.
+    /// The best that can be reached from time 0 if what happens at the same second happens in the
+    /// worst order, and in the best one.
     pub(crate) fn best(&self) -> (f64, f64) {
         let start = Now {
             time: 0,

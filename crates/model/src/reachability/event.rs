@@ -20,7 +20,7 @@ pub(super) enum Symbol {
 /// A kind of event with its arguments.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Event {
-    /// What happens.
+    /// The symbol of the event.
     pub(super) symbol: Symbol,
     /// To which fact or fluent.
     pub(super) arguments: Box<[ObjectId]>,

@@ -20,9 +20,9 @@ pub(super) struct Rule<'a> {
     /// The head's parameters, then variables of quantifiers.
     pub(super) variables: Vec<Rc<Domain>>,
     pub(super) atoms: Vec<JoinAtom>,
-    /// What is decided as soon as its variables are bound, for ever.
+    /// Tests whose outcome is final as soon as their variables are bound.
     pub(super) static_tests: Vec<Test<'a>>,
-    /// What may be impossible now and possible later.
+    /// Tests that may fail now and succeed later.
     pub(super) tests: Vec<Test<'a>>,
 }
 

@@ -72,7 +72,7 @@ impl WaitingRoom {
         self.watchers.swap_remove(event).unwrap_or_default()
     }
 
-    /// What waits with this ticket, unless it has left.
+    /// The entry that waits with this ticket, unless it has left.
     pub(super) fn get(&self, ticket: Ticket) -> Option<&Pending> {
         Some(&self.entries[ticket.0].as_ref()?.what)
     }

@@ -18,7 +18,7 @@ pub(super) struct Witness<'a> {
     pub(super) reading: &'a Reading<'a>,
     /// Facts, derived ones included, at that moment.
     pub(super) moment: &'a dyn Moment<Fault>,
-    /// What last changed a fact.
+    /// The last change of a fact.
     pub(super) since: &'a dyn Fn(FactId) -> Option<Occurrence>,
 }
 

@@ -31,7 +31,7 @@ pub(super) struct Judge<'a> {
     pub(super) derived: OnceCell<Derived<Fault>>,
     /// Steps that have started and not ended.
     pub(super) running: BTreeMap<usize, Running>,
-    /// What last changed each fact: time and happening.
+    /// The last change of each fact: time and happening.
     pub(super) since: BTreeMap<FactId, (Rational, What<'a>)>,
     pub(super) margins: Margins,
 }
@@ -47,7 +47,7 @@ pub(super) struct Running {
     pub(super) continuous: Vec<bool>,
 }
 
-/// What is under way in mid-execution, by the position of the step that continues it.
+/// The actions under way in mid-execution, by the position of the step that continues each.
 pub(super) fn running(situation: &Situation) -> BTreeMap<usize, Running> {
     let under_way = situation.running.iter().enumerate();
     under_way

@@ -132,7 +132,7 @@ impl<'a> Judge<'a> {
         self.violation(&time, place.step, mistake)
     }
 
-    /// What follows from something that cannot be read.
+    /// The consequence of something that cannot be read.
     pub(super) fn stop(&self, fault: Fault, place: &Place<'_>) -> Stop {
         let within = match place.subject {
             Subject::Condition(_, condition) => self.task.describe_condition(condition),

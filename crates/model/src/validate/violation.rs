@@ -12,7 +12,7 @@ pub struct Violation {
     pub time: Rational,
     /// The action to blame; `None` for the goal.
     pub action: Option<ActionInstance>,
-    /// What is wrong.
+    /// The mistake.
     pub mistake: Mistake,
 }
 
@@ -80,7 +80,7 @@ pub enum Mistake {
         /// Whether the time given is exact; else it is within a millionth below the true one,
         /// which is irrational.
         is_exact: bool,
-        /// What makes it false.
+        /// The reasons why it is false.
         reasons: Vec<Reason>,
     },
     /// Two happenings that interfere are too close to each other.
@@ -139,7 +139,8 @@ pub enum Reason {
         fact: String,
         /// Its truth.
         is_true: bool,
-        /// What last made it so; `None` if it has been so from the beginning, or is derived.
+        /// The last change that made it so; `None` if it has been so from the beginning, or is
+        /// derived.
         since: Option<Occurrence>,
     },
     /// A comparison does not have the truth it should have.
@@ -164,7 +165,7 @@ pub enum Reason {
 pub struct Occurrence {
     /// The time.
     pub time: Rational,
-    /// What of the action it is.
+    /// The point of the action at which it happens.
     pub point: Point,
     /// The action; `None` for timed initials.
     pub action: Option<ActionInstance>,

@@ -88,7 +88,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// What the problem line says.
+/// The number of nodes by the problem line.
 fn node_count(text: &str, report: &mut Report) -> Option<usize> {
     for (at, line) in lines(text) {
         if let ["p", _, count, ..] = words(line)[..] {

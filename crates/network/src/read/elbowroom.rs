@@ -10,7 +10,7 @@ use crate::json::{Json, Value};
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// What the member `format` says.
+/// The value of the member `format`.
 pub(crate) const FORMAT: &str = "elbowroom-network";
 
 pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {

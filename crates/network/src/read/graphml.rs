@@ -309,7 +309,7 @@ fn link(builder: &mut Builder, there: &Edge, back: &Edge, report: &mut Report) {
     builder.link(given, report);
 }
 
-/// What an edge of another type says: a requirement, a wait, or both.
+/// The meaning of an edge of another type: a requirement, a wait, or both.
 fn requirement(builder: &mut Builder, edge: &Edge, report: &mut Report) {
     if let Some(value) = &edge.value {
         let bounds = (Bound::NegativeInfinity, value.clone());

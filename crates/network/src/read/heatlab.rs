@@ -56,7 +56,7 @@ fn domain(builder: &mut Builder, ends: (NodeId, NodeId), node: &Json<'_>, report
     }
 }
 
-/// What a constraint says; the places of all that is wrong with it are noted.
+/// Reads a constraint; the places of all mistakes in it are noted.
 fn read_constraint(builder: &mut Builder, constraint: &Json<'_>, report: &mut Report) {
     let mut end = |name| {
         let json = required(constraint, name, report)?;

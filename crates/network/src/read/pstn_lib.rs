@@ -17,7 +17,7 @@ use crate::json::Json;
 use crate::mistake::Report;
 use crate::number::Bound;
 
-/// What the library writes for infinity.
+/// The number that the library writes for infinity.
 const INFINITY: i64 = 1_000_000_000;
 
 pub(super) fn read(document: &Json<'_>, report: &mut Report) -> Option<NetworkFile> {

@@ -40,8 +40,8 @@ impl Rational {
         })
     }
 
-    /// The decimal with the fewest digits that reads as this float, which is what somebody wrote who
-    /// wrote few: 0.1 is 1/10. `None` for infinities and what is no number.
+    /// The decimal with the fewest digits that reads as this float, which is what somebody wrote
+    /// who wrote few: 0.1 is 1/10. `None` for infinities and what is no number.
     ///
     /// ```
     /// use elbowroom_num::Rational;

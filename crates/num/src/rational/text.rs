@@ -59,8 +59,9 @@ impl std::error::Error for ParseRationalError {}
 const LONGEST_NUMERAL: usize = 400;
 /// Largest decimal exponent accepted, for the same reason.
 const LARGEST_EXPONENT: i32 = 400;
-/// The most bits that numerator and denominator may have, so that a number that was read, written as a
-/// fraction with its sign, is no longer than [`LONGEST_NUMERAL`] on either side and can be read again.
+/// The most bits that numerator and denominator may have, so that a number that was read, written
+/// as a fraction with its sign, is no longer than [`LONGEST_NUMERAL`] on either side and can be
+/// read again.
 const MOST_BITS: usize = 1_325;
 
 /// Reads `12`, `-3.5`, `+.5`, `1e-3` and `p/q` exactly.

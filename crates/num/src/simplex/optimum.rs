@@ -33,8 +33,8 @@ impl Simplex {
     }
 
     /// Like [`maximize`](Self::maximize), with the proof that no value is larger: the bounds with
-    /// these tags, written as `term <= bound`, each times its multiplier, which is positive, add up to
-    /// `objective <= value`. Empty if there are values larger than any number.
+    /// these tags, written as `term <= bound`, each times its multiplier, which is positive, add up
+    /// to `objective <= value`. Empty if there are values larger than any number.
     ///
     /// # Errors
     /// Bounds that contradict each other.

@@ -48,7 +48,8 @@ pub(super) fn sliders(
     })
 }
 
-/// From half to five times the nominal value or, if the envelope reaches further, a bit further than that.
+/// From half to five times the nominal value or, if the envelope reaches further, a bit further
+/// than that.
 fn slider(room: &Room) -> Slider {
     let nominal = &room.range.quantity.nominal;
     let half = Rational::new(1, 2);

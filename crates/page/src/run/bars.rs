@@ -13,16 +13,16 @@ use elbowroom::report::trace::Line;
 
 use super::windows::Windows;
 
-/// What has been read of plans and starts so far.
+/// The plans and starts read so far.
 #[derive(Default)]
 pub(super) struct Bars {
     /// When each plan was taken up.
     plans: Vec<Rational>,
     /// The steps of all plans.
     steps: Vec<Step>,
-    /// What the plans order: steps, the one that comes first, and the other.
+    /// The orderings of the plans: steps, the one that comes first, and the other.
     orderings: Vec<(usize, usize)>,
-    /// What is running while a plan is made: the first steps of the plan.
+    /// The actions that run while a plan is made: the first steps of the plan.
     running: Vec<String>,
     /// Where the steps of the present plan begin.
     first: usize,
@@ -131,7 +131,8 @@ impl Bars {
         }
     }
 
-    /// What was done, as the report on the run has it: it counts where reports contradict each other.
+    /// The executed steps of the run's report, which decides where observations contradict each
+    /// other.
     pub(super) fn executed(&mut self, executed: &[ExecutedLine]) {
         for done in executed {
             let begun = done.start.0.clone();

@@ -11,7 +11,7 @@ use crate::document::Segment;
 #[derive(Default)]
 pub(super) struct Guarantees {
     segments: Vec<Segment>,
-    /// What was last observed outside the window in which it was planned.
+    /// The last observation outside the window in which it was planned.
     deviation: Option<String>,
 }
 

@@ -14,7 +14,7 @@ use crate::source::Span;
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// What can stand in an action.
+/// The keywords of an action.
 const INSTANTANEOUS: &[&str] = &[
     ":parameters",
     ":synth-parameters",
@@ -22,7 +22,7 @@ const INSTANTANEOUS: &[&str] = &[
     ":precondition",
     ":effect",
 ];
-/// What can stand in a durative action.
+/// The keywords of a durative action.
 const DURATIVE: &[&str] = &[
     ":parameters",
     ":synth-parameters",

@@ -6,7 +6,7 @@ use crate::lower::sections::{Section, Sections};
 use crate::syntax::Node;
 use elbowroom_text::nearest;
 
-/// What can stand in a domain.
+/// The keywords of a domain.
 const SECTIONS: &[&str] = &[
     ":requirements",
     ":types",

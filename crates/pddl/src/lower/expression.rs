@@ -8,7 +8,7 @@ use crate::lower::Reader;
 use crate::lower::scope::{Scope, position};
 use crate::syntax::Node;
 
-/// What stands for an expression that cannot be understood.
+/// The placeholder for an expression that cannot be understood.
 pub(super) const WRONG: Expression = Expression::Constant(Rational::ZERO);
 
 /// The number that a word is, if it looks like one at all.

@@ -10,7 +10,7 @@ use crate::lower::scope::Scope;
 use crate::lower::sections::{Section, Sections};
 use crate::syntax::Node;
 
-/// What can stand in a problem.
+/// The keywords of a problem.
 const SECTIONS: &[&str] = &[
     ":domain",
     ":requirements",

@@ -22,7 +22,7 @@ pub(super) struct Sections<'t, 's> {
 pub(super) struct Section<'t, 's> {
     /// Its keyword in lower case.
     pub(super) keyword: Cow<'s, str>,
-    /// What follows the keyword.
+    /// The nodes after the keyword.
     pub(super) content: &'t [Node<'s>],
     /// Where the keyword stands.
     pub(super) span: Span,

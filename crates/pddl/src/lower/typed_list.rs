@@ -21,7 +21,7 @@ pub(super) const MOST_VARIABLES: usize = 1000;
 /// An entry of a typed list.
 #[derive(Debug)]
 pub(super) struct Typed<'t, 's> {
-    /// What is typed: a name, or a function's head.
+    /// The typed node: a name, or a function's head.
     pub(super) node: &'t Node<'s>,
     pub(super) types: TypeNames,
 }

@@ -55,7 +55,7 @@ fn shortest(interval: &Interval, epsilon: &Rational) -> Option<Rational> {
     }
 }
 
-/// What the running actions will do at their `ends`, each as timed initials of its own.
+/// The changes by the running actions at their `ends`, each as timed initials of its own.
 pub(super) fn ends_of_running(
     task: &Task,
     situation: &Situation,
@@ -113,7 +113,7 @@ fn check_end(
     Ok(())
 }
 
-/// What of the rest of an action is no change at a known time.
+/// The part of the rest of an action that is no change at a known time.
 fn beyond_timed_initials(task: &Task, body: &DurativeBody) -> Option<String> {
     if let Some(effect) = body.continuous.first() {
         let fluent = task.fluent_name(effect.fluent);

@@ -168,7 +168,7 @@ fn runs(uses: &[(NodeId, Use)]) -> Vec<Vec<NodeId>> {
         .collect()
 }
 
-/// What the footprint does to each quantity in it.
+/// The uses of each quantity in a footprint.
 fn uses_of(footprint: &Footprint) -> BTreeMap<Quantity, u8> {
     let mut uses = BTreeMap::new();
     let mut note = |quantity: Quantity, bit: u8| *uses.entry(quantity).or_default() |= bit;
@@ -193,7 +193,7 @@ fn uses_of(footprint: &Footprint) -> BTreeMap<Quantity, u8> {
     uses
 }
 
-/// What the footprint reads.
+/// The quantities that the footprint reads.
 pub(super) fn read_by(footprint: &Footprint) -> impl Iterator<Item = Quantity> + '_ {
     let facts = footprint.reads.iter().map(|&fact| Quantity::Fact(fact));
     let fluents = footprint.reads_fluents.iter();

@@ -141,9 +141,9 @@ fn overlap_in_part(
 struct Required {
     /// Basic facts, and whether they must be true.
     literals: Vec<(FactId, bool)>,
-    /// What comparisons read that stand by themselves.
+    /// The reads of comparisons that stand by themselves.
     compared: Footprint,
-    /// What else is read: by other conditions, and by rates.
+    /// All other reads: by other conditions, and by rates.
     other: Footprint,
 }
 
@@ -195,7 +195,7 @@ fn guards(body: &DurativeBody) -> impl Iterator<Item = &Guard> {
     guards.chain(body.continuous.iter().map(|effect| &effect.guard))
 }
 
-/// What over-all conditions of conditional effects read.
+/// The reads of over-all conditions of conditional effects.
 fn guards_throughout(task: &Task, body: &DurativeBody) -> Footprint {
     let conditions = guards(body).map(|guard| guard.over_all.clone()).collect();
     Footprint::of_condition(task, &Condition::And(conditions))

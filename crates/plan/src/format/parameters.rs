@@ -14,7 +14,7 @@ use crate::stn_plan::{Bound, Constraint, InstanceId, StnPlan};
 use crate::unknowns::{self, OpenNumber};
 use crate::valuation::ParameterId;
 
-/// What each declared parameter stands for, judging by the constraints in which it occurs.
+/// The kind of each declared parameter, judging by the constraints in which it occurs.
 pub(super) fn kinds(plan: &StnPlan, used: &[Vec<usize>]) -> Vec<ParameterKind> {
     let kind = |index: usize| {
         let id = ParameterId::from(index);

@@ -12,7 +12,8 @@ use crate::valuation::ParameterId;
 /// In which expressions of an action to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// What effects, continuous ones too, change the function by or to.
+    /// Amounts by which effects, continuous ones too, change the function, or values that they
+    /// assign to it.
     Effects(FunctionId),
     /// Comparisons that read the function.
     Conditions(FunctionId),

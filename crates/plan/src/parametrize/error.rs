@@ -8,7 +8,7 @@ pub enum ParametrizeError {
     Syntax {
         /// The text.
         spec: String,
-        /// What would have been right.
+        /// The form that is expected.
         expected: String,
     },
     /// There is no such kind of quantity.
@@ -26,7 +26,7 @@ pub enum ParametrizeError {
     UnknownName {
         /// The text.
         spec: String,
-        /// What was looked for: `action or label`, `function`, …
+        /// The kind of thing that was looked for: `action or label`, `function`, …
         kind: &'static str,
         /// The name.
         name: String,
@@ -38,7 +38,7 @@ pub enum ParametrizeError {
     NothingMatches {
         /// The text.
         spec: String,
-        /// What is missing.
+        /// The missing part.
         why: String,
     },
     /// Several numbers could be meant.
@@ -46,7 +46,7 @@ pub enum ParametrizeError {
     Ambiguous {
         /// The text.
         spec: String,
-        /// What could be meant.
+        /// The possible meanings.
         choices: Vec<String>,
         /// How to say which.
         advice: &'static str,

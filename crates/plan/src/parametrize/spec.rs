@@ -294,7 +294,7 @@ impl<'a> Words<'a> {
         self.tokens = self.tokens.get(1..).unwrap_or_default();
     }
 
-    /// What is wrong with a word after everything that is read.
+    /// The error for a word after the end of a specification.
     fn surplus(&self, target: &Target, word: &str) -> ParametrizeError {
         match target {
             // No action is followed by a list, or by a name.

@@ -1,14 +1,15 @@
-//! What each technique of the embedded planner is worth: states evaluated to the first plan, with all
-//! techniques, and with one of them switched off, or with one search of the portfolio alone.
+//! What each technique of the embedded planner is worth: states evaluated to the first plan, with
+//! all techniques, and with one of them switched off, or with one search of the portfolio alone.
 //!
 //! ```text
 //! ablation [--states N] [--seconds S] [--without TECHNIQUE]… [--search NAME]… [--set NAME=VALUE]…
 //!          [--only TEXT]… FOLDER|DOMAIN PROBLEM…
 //! ```
 //!
-//! Without `--without` and `--search`, each technique is switched off in turn. The table is Markdown.
-//! A search that has found nothing after N states (50,000) or S seconds (60) is shown as a dash with
-//! the states it has evaluated; only the number of states makes that the same on each machine.
+//! Without `--without` and `--search`, each technique is switched off in turn. The table is
+//! Markdown. A search that has found nothing after N states (50,000) or S seconds (60) is shown as
+//! a dash with the states it has evaluated; only the number of states makes that the same on each
+//! machine.
 #![allow(
     clippy::print_stdout,
     clippy::print_stderr,

@@ -14,8 +14,8 @@ pub(crate) struct Instance {
     pub(crate) problem_file: PathBuf,
 }
 
-/// The problems that the arguments name: a folder with a `manifest.csv`, or a domain and problems. Of
-/// a folder, the lines that contain one of the texts; all of them if there are no texts.
+/// The problems that the arguments name: a folder with a `manifest.csv`, or a domain and problems.
+/// Of a folder, the lines that contain one of the texts; all of them if there are no texts.
 ///
 /// The first line of a manifest names its columns: `domain`, `instance`, `domain_file` and
 /// `problem_file`, in any order; there may be a `collection` and others.

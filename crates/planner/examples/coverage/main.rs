@@ -7,8 +7,8 @@
 //!
 //! FOLDER holds a `manifest.csv`, whose first line names its columns: `domain`, `instance`,
 //! `domain_file` and `problem_file` must be among them, `collection` may. `--only` keeps the lines
-//! that contain one of the texts. With a domain and problems instead, these are run. With `--plans`,
-//! plans are printed to standard error. `--set` changes a constant of the search
+//! that contain one of the texts. With a domain and problems instead, these are run. With
+//! `--plans`, plans are printed to standard error. `--set` changes a constant of the search
 //! (`embedded/tuning.rs`), `--without` switches a technique off, and `--search` runs one search of
 //! the portfolio alone.
 #![allow(

@@ -15,7 +15,7 @@ pub struct Settings {
     /// Whether to stop at the first plan, or to go on for better ones until interrupted or until
     /// there is none.
     pub first_plan_only: bool,
-    /// What makes a plan better than another.
+    /// The order of preference among plans.
     pub objective: Objective,
     /// The constants of the search.
     pub tuning: Tuning,
@@ -47,7 +47,7 @@ impl Default for Settings {
 /// Progress of the search.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
-    /// What is being done.
+    /// The phase of the search.
     pub phase: Phase,
     /// States made and looked at.
     pub counts: Counts,
@@ -167,7 +167,7 @@ pub enum Proof {
     TooLate {
         /// The parts of the goal.
         goal: String,
-        /// What ends when.
+        /// The action and its deadline.
         deadline: String,
     },
     /// All orders of happenings were tried.

@@ -38,7 +38,7 @@ pub(crate) struct Stepper<'a> {
     pub(crate) compiled: &'a Compiled,
     /// Nothing may happen later.
     pub(crate) horizon: Ticks,
-    /// What a plan must be better than, where that depends on times.
+    /// The bound that a better plan must stay below, where that depends on times.
     pub(crate) limit: Option<MetricBound>,
     /// If present, all happenings stay in the network, to be read off at the end, and what is
     /// needed to compute their times exactly is noted here.

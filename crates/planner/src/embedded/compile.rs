@@ -1,11 +1,12 @@
 //! The ground problem in the form in which the search reads it.
 //!
 //! Every action becomes one or two *snaps* (Fox & Long's name for starts, ends and instants);
-//! facts, fluents and tests become small numbers; and what keeps happenings apart becomes a list
-//! of *annotations* (POPF; Coles, Coles, Fox & Long, ICAPS 2010). An annotation is the latest time at which something of a kind happened, such as "fact 7
-//! was read". Each snap says which annotations it must keep what distance from, and which ones it sets;
-//! so the order that PDDL's no-moving-targets rule and over-all conditions ask for is settled
-//! here once, and the search only takes maxima.
+//! facts, fluents and tests become small numbers; and what keeps happenings apart becomes a list of
+//! *annotations* (POPF; Coles, Coles, Fox & Long, ICAPS 2010). An annotation is the latest time at
+//! which something of a kind happened, such as "fact 7 was read". Each snap says which annotations
+//! it must keep what distance from, and which ones it sets; so the order that PDDL's
+//! no-moving-targets rule and over-all conditions ask for is settled here once, and the search only
+//! takes maxima.
 
 mod beginning;
 mod builder;
@@ -56,15 +57,15 @@ pub(crate) struct Compiled {
     pub(crate) tests: Vec<Test>,
     pub(crate) snaps: Vec<Snap>,
     pub(crate) actions: Vec<Action>,
-    /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits for
-    /// them.
+    /// For each fact the annotations of its latest addition and deletion; [`NONE`] if nothing waits
+    /// for them.
     pub(crate) fact_annotations: Vec<[u32; 2]>,
     /// The number of annotations.
     pub(crate) annotation_count: usize,
     /// The timed initials to come, by time.
     pub(crate) timed: Vec<Timed>,
     pub(crate) goal: Formula,
-    /// What a plan shall have little of, if that is more than the makespan and was asked for.
+    /// The metric to minimize, if one other than the makespan was asked for.
     pub(crate) metric: Option<Metric>,
     /// How many timed initials come before the goal is settled, as far as they go: those up to the
     /// last that writes something the goal reads.
@@ -93,7 +94,7 @@ pub(crate) struct Snap {
     pub(crate) deletes: Vec<u32>,
     pub(crate) updates: Vec<Update>,
     pub(crate) conditional: Vec<Conditional>,
-    /// What it adds to `State::cost`.
+    /// Its addition to `State::cost`.
     pub(crate) cost: Option<Numeric>,
     /// Annotations, and how long after them this must happen.
     pub(crate) after: Vec<(u32, Ticks)>,
@@ -140,7 +141,7 @@ pub(crate) struct Action {
     /// [`NONE`] for an instantaneous action.
     pub(crate) end: u32,
     pub(crate) over_all: Formula,
-    /// What end effects read at the start.
+    /// The conditions that end effects read at the start.
     pub(crate) guards: Vec<Formula>,
     pub(crate) duration: Duration,
     pub(crate) flows: Vec<Flow>,
@@ -156,16 +157,16 @@ pub(crate) struct Action {
     pub(crate) uses_duration: bool,
 }
 
-/// How much is lost by *compressing* an action: ending it before anything else happens, in the order
-/// of happenings (compression-safe actions; Coles, Coles, Fox & Long, ICAPS 2009). The safer ones come
-/// later.
+/// How much is lost by *compressing* an action: ending it before anything else happens, in the
+/// order of happenings (compression-safe actions; Coles, Coles, Fox & Long, ICAPS 2009). The safer
+/// ones come later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Compressibility {
     /// Others may need what it offers while it runs: it is an envelope (Coles, Fox, Halsey, Long &
     /// Smith, "Managing concurrency in temporal planning", AIJ 173, 2009).
     Envelope,
-    /// Others can use only what it leaves of a quantity: it takes some at its start and gives it back
-    /// at its end (a renewable resource; Laborie, AIJ 143, 2003).
+    /// Others can use only what it leaves of a quantity: it takes some at its start and gives it
+    /// back at its end (a renewable resource; Laborie, AIJ 143, 2003).
     HoldsResource,
     /// Little.
     Safe,
@@ -222,8 +223,8 @@ impl Compiled {
         self.is_exact && self.relaxation_incomplete_because.is_none()
     }
 
-    /// The earliest time that a tick stands for. That of now is rounded down where the situation's time is
-    /// not on the grid, and nothing happens before that.
+    /// The earliest time that a tick stands for. That of now is rounded down where the situation's
+    /// time is not on the grid, and nothing happens before that.
     pub(crate) fn earliest(&self, tick: Ticks) -> Rational {
         if tick == self.now {
             self.beginning.time.clone()

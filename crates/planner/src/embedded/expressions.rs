@@ -1,5 +1,5 @@
-//! Numbers as linear expressions over the times of happenings (COLIN; Coles, Coles, Fox & Long, IJCAI
-//! 2009).
+//! Numbers as linear expressions over the times of happenings (COLIN; Coles, Coles, Fox & Long,
+//! IJCAI 2009).
 
 use elbowroom_model::problem::Comparison;
 use elbowroom_num::Rational;

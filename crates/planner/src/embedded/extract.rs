@@ -165,7 +165,8 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
 ///
 /// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
 /// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
-/// rounding. What can happen at once happens at the situation's time, which may be later than its tick.
+/// rounding. What can happen at once happens at the situation's time, which may be later than its
+/// tick.
 fn exact_times(
     compiled: &Compiled,
     network: &Network,

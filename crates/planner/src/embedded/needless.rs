@@ -7,8 +7,8 @@ use elbowroom_model::validate::{self, Report, Verdict};
 use elbowroom_model::{Footprint, Situation, Step, Task, TimeTriggeredPlan, validate_from};
 use elbowroom_num::Rational;
 
-/// The plan without the steps that it works without. A search can come to a goal by way of an action
-/// that makes true what another one, perhaps under way before, makes true anyway.
+/// The plan without the steps that it works without. A search can come to a goal by way of an
+/// action that makes true what another one, perhaps under way before, makes true anyway.
 ///
 /// Only steps are tried that change no number and supply no fact that is read before anything else
 /// supplies it: there are few of them, and whether the plan works without one is for the judge to
@@ -41,7 +41,7 @@ pub(super) fn without_needless(
     left
 }
 
-/// What the happenings of a plan read and write, in the order of their times.
+/// The reads and writes of a plan's happenings, in the order of their times.
 struct Timeline<'a> {
     situation: &'a Situation,
     moments: Vec<Moment>,

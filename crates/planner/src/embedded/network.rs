@@ -34,7 +34,7 @@ pub(crate) struct Network {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Whatever else happens, not before.
+    /// A lower bound that holds whatever else happens.
     floor: Ticks,
     earliest: Ticks,
     latest: Ticks,
@@ -160,8 +160,8 @@ impl Network {
         Ok(())
     }
 
-    /// Notes that a node has set an annotation. Older nodes that are known to come before it need not be
-    /// remembered for that annotation.
+    /// Notes that a node has set an annotation. Older nodes that are known to come before it need
+    /// not be remembered for that annotation.
     pub(crate) fn mark(&mut self, annotation: u32, node: NodeId) {
         // The edges to a new node are the last ones.
         let newest = self.edges.iter().rev().take_while(|edge| edge.to == node);

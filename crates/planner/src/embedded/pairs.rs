@@ -47,7 +47,7 @@ pub(crate) struct Pairs<'a> {
     started: Vec<Ticks>,
     /// The same for what was brought about after the start.
     meanwhile: Vec<Ticks>,
-    /// What each operator needs in this state.
+    /// The needs of each operator in this state.
     needs: Vec<Vec<usize>>,
     /// The earliest time of each operator.
     begin: Vec<Ticks>,
@@ -272,7 +272,8 @@ impl<'a> Pairs<'a> {
         time
     }
 
-    /// What the operator brings about, together with all that may last. Whether anything changed.
+    /// Adds the effects of the operator, together with everything that may persist. Whether
+    /// anything changed.
     fn fire(&mut self, state: &State, ended: &[(u32, usize)], number: usize) -> bool {
         let Some(begin) = self.earliest(state, number) else {
             return false;

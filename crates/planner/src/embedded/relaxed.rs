@@ -225,8 +225,8 @@ impl<'a> Relaxed<'a> {
         Some(estimate)
     }
 
-    /// The steps that are applicable, without an estimate; `None` if what is under way cannot end in
-    /// time, as far as that was looked at.
+    /// The steps that are applicable, without an estimate; `None` if what is under way cannot end
+    /// in time, as far as that was looked at.
     pub(crate) fn list(&mut self, state: &State) -> Option<Estimate> {
         let is_in_time = self.prepare(state);
         if is_in_time {

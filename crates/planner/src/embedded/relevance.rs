@@ -172,7 +172,7 @@ impl Relevance {
         }
     }
 
-    /// What matters to what matters, matters.
+    /// Spreads relevance: whatever a relevant part depends on is relevant.
     fn spread(&mut self, grounding: &Grounding) {
         let mut rules: Vec<Vec<usize>> = Vec::new();
         for (number, rule) in grounding.rules.iter().enumerate() {

@@ -56,15 +56,15 @@ pub(crate) struct Search<'a> {
     best_steps: u32,
     /// The estimate of the first state.
     first_estimate: u32,
-    /// What was seen before, if new states come first.
+    /// The propositions seen before, if novelty decides.
     novelty: Option<Novelty>,
-    /// What is used up and not filled up, if it is to be spared.
+    /// The consumable fluents, if they are to be spared.
     consumables: Vec<Consumable>,
     /// Whether times are irrelevant but for their distances.
     is_timeless: bool,
-    /// What steps cost, in a search for a better metric.
+    /// The costs of steps, in a search for a better metric.
     step_costs: Option<StepCosts>,
-    /// What plans must be better than.
+    /// The bound that plans must stay below.
     limit: Option<MetricBound>,
     /// Nothing may happen later, whatever it costs.
     horizon: Ticks,
@@ -85,7 +85,7 @@ struct Node {
     parent: u32,
     step: Step,
     state: State,
-    /// What of the unsettled past matters, in a search that compares it exactly.
+    /// The part of the unsettled past that matters, in a search that compares it exactly.
     projection: Option<Box<Projection>>,
     dead_end: DeadEnd,
     /// How far the way to it has come, in a search for new states.
@@ -202,7 +202,7 @@ impl<'a> Search<'a> {
         !self.strategy.is_complete()
     }
 
-    /// What it looks for.
+    /// The aim of the search.
     pub(crate) fn aim(&self) -> Aim {
         self.strategy.aim
     }
@@ -303,7 +303,8 @@ impl<'a> Search<'a> {
             self.relaxed.list(&state)
         };
         let Some(mut estimate) = estimate else {
-            // Where actions are compressed, what the relaxed plan does without may be what a plan needs.
+            // Where actions are compressed, what the relaxed plan does without may be what a plan
+            // needs.
             self.has_lost |= self.strategy.compresses.is_some();
             return Turn::Nothing;
         };

@@ -23,16 +23,16 @@ pub(crate) struct State {
     /// A bit for each fact.
     pub(crate) facts: Vec<u64>,
     pub(crate) values: Vec<Option<Rational>>,
-    /// What the metric sums up: see [`Metric`](super::compile::Metric).
+    /// The metric's sum: see [`Metric`](super::compile::Metric).
     pub(crate) cost: Rational,
     /// The latest settled time at which each kind of thing happened.
     pub(crate) annotations: Vec<Ticks>,
-    /// What has started and not ended, by action.
+    /// The actions that have started and not ended.
     pub(crate) open: Vec<Open>,
     /// How many of the timed initials have happened.
     pub(crate) timed: u32,
     pub(crate) network: Network,
-    /// What was chosen last, where choices come in the order of time.
+    /// The last choice, where choices come in the order of time.
     pub(crate) last: Last,
     /// The time of the last settled happening.
     pub(crate) settled_end: Ticks,
@@ -86,7 +86,7 @@ pub(crate) struct Open {
     /// The node of its end, where numbers depend on times and it started in the plan; else
     /// [`SETTLED`].
     pub(crate) end: NodeId,
-    /// What it changes continuously, at what rates.
+    /// The fluents that it changes continuously, with their rates.
     pub(crate) flows: Vec<(u32, Rational)>,
 }
 
@@ -219,7 +219,8 @@ impl State {
             && self.symbolic == other.symbolic
     }
 
-    /// What matters of the unsettled past: all that what follows can push, and how far.
+    /// The part of the unsettled past that matters: everything that later choices can push, and how
+    /// far.
     pub(crate) fn projection(&self) -> Projection {
         let open = self.open.iter().map(|open| open.node);
         let open: Vec<NodeId> = open
@@ -290,9 +291,9 @@ impl State {
 
 /// The network of a state, seen from what can still be pushed: the starts under way.
 ///
-/// Later happenings only push these, and are only pushed by the annotations. So of two states that are
-/// discretely the same and whose settled pasts compare, the one with the smaller distances and the
-/// later latest times allows every schedule that the other allows.
+/// Later happenings only push these, and are only pushed by the annotations. So of two states that
+/// are discretely the same and whose settled pasts compare, the one with the smaller distances and
+/// the later latest times allows every schedule that the other allows.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     rows: Vec<Row>,

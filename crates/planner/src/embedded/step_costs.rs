@@ -13,7 +13,7 @@ pub(crate) struct StepCosts {
     counts: Vec<(u32, u32)>,
     /// How much of the metric one step more counts as much as.
     unit: f64,
-    /// What had been spent in the beginning, time not counted.
+    /// The cost at the beginning, without time.
     initial: f64,
 }
 
@@ -60,17 +60,17 @@ impl StepCosts {
         }
     }
 
-    /// What the start of an action counts for, or the instantaneous action.
+    /// The cost of the start of an action, or of the instantaneous action.
     pub(crate) fn start(&self, action: u32) -> u32 {
         self.counts[action as usize].0
     }
 
-    /// What the end of an action counts for.
+    /// The cost of the end of an action.
     pub(crate) fn end(&self, action: u32) -> u32 {
         self.counts[action as usize].1
     }
 
-    /// What a state has spent since the beginning, in the same units.
+    /// The cost of a state since the beginning, in the same units.
     pub(crate) fn spent(&self, compiled: &Compiled, state: &State) -> i64 {
         let Some(metric) = &compiled.metric else {
             return 0;
@@ -84,13 +84,13 @@ impl StepCosts {
     }
 }
 
-/// What a state has spent, as far as that is known without choosing times.
+/// The cost of a state, as far as it is known without choosing times.
 fn spent(metric: &Metric, state: &State) -> f64 {
     let spent = state.spent(metric);
     spent.map_or_else(|| state.cost.to_f64(), |spent| spent.to_f64())
 }
 
-/// What has been spent before anything is chosen.
+/// The cost before anything is chosen.
 fn initial(compiled: &Compiled, metric: &Metric) -> f64 {
     let beginning = &compiled.beginning;
     let read = metric.values.value(&beginning.values, None);
@@ -105,7 +105,7 @@ fn least_duration(compiled: &Compiled, action: &Action) -> Rational {
     known.fold(action.duration.least.clone(), Rational::max)
 }
 
-/// What a happening costs, the numbers that it reads being as they are in the beginning.
+/// The cost of a happening, with the numbers that it reads as they are at the beginning.
 fn cost(compiled: &Compiled, metric: &Metric, snap: &Snap, duration: &Rational) -> f64 {
     let values = &compiled.beginning.values;
     let own = snap.cost.as_ref();

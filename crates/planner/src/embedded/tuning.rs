@@ -27,7 +27,7 @@ pub enum Technique {
     /// In the relaxed problem a fact that holds only while an envelope runs does not serve who
     /// needs it for longer.
     Envelopes,
-    /// What an action under way rules out for good.
+    /// Mutual exclusions with an action under way that last for ever.
     Exclusions,
     /// An end that would break the over-all condition of an action under way waits for it in the
     /// network, from the moment at which both are under way.
@@ -69,7 +69,7 @@ pub enum Member {
     Chronological,
     /// In the order of time, saving what is never filled up.
     Saving,
-    /// What is new comes first, among states of the same estimate (BFWS(f₂)).
+    /// Novelty decides among states of the same estimate (BFWS(f₂)).
     Novelty,
     /// Successors are new or not, and hardly any state is estimated (BFWS(f₅)).
     Width,
@@ -97,9 +97,9 @@ pub enum TuningError {
     /// There is no constant, technique or search of that name.
     #[error("there is no `{name}`; choose one of {}", .known.join(", "))]
     Unknown {
-        /// What was asked for.
+        /// The name that was asked for.
         name: String,
-        /// What there is.
+        /// The names that exist.
         known: Vec<&'static str>,
     },
     /// The value is no number that the constant can take.
@@ -107,7 +107,7 @@ pub enum TuningError {
     Value {
         /// The constant.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: String,
     },
 }
@@ -152,10 +152,10 @@ macro_rules! constants {
         #[derive(Clone, Debug, PartialEq)]
         #[non_exhaustive]
         pub struct Tuning {
-            /// What is switched off.
+            /// The techniques that are switched off.
             pub without: Vec<Technique>,
-            /// The only search, if there is to be but one. A search that the problem gives no reason
-            /// for is run as well.
+            /// The only search, if there is to be but one. A search that the problem gives no
+            /// reason for is run as well.
             pub only: Option<Member>,
             $($(#[$doc])* pub $name: $type,)*
         }
@@ -193,19 +193,19 @@ macro_rules! constants {
 
 constants! {
     /// How many states each incomplete search looks at in the first round of the portfolio; each
-    /// round has twice as many. Not measured: most benchmark instances are solved within it, so that
-    /// easy problems pay for one search only.
+    /// round has twice as many. Not measured: most benchmark instances are solved within it, so
+    /// that easy problems pay for one search only.
     first_round: u64 = 20_000;
     /// The same where searches that fill up reservoirs take turns with others. Not measured; less,
     /// as only one of the two kinds usually has a chance.
     first_round_with_reservoirs: u64 = 2_048;
-    /// The same where chronological searches take turns with others. Not measured; less, for the same
-    /// reason.
+    /// The same where chronological searches take turns with others. Not measured; less, for the
+    /// same reason.
     first_round_with_concurrency: u64 = 4_096;
-    /// The most operators of estimates that a first round comes to, so that a large problem, each state
-    /// of which takes long, does not wait for one search. Measured on parking, 18th of IPC 2014, with
-    /// 25,215 actions: BFWS(f₅) finds a plan after 17 states, but had no turn within 20 s while the
-    /// first round went by states alone.
+    /// The most operators of estimates that a first round comes to, so that a large problem, each
+    /// state of which takes long, does not wait for one search. Measured on parking, 18th of IPC
+    /// 2014, with 25,215 actions: BFWS(f₅) finds a plan after 17 states, but had no turn within 20
+    /// s while the first round went by states alone.
     first_round_work: u64 = 20_000_000;
     /// How many states an incomplete search looks at for each one of the complete search. Not
     /// measured; the complete search seldom finds a first plan, but is needed for proofs.
@@ -213,11 +213,12 @@ constants! {
     /// How many states each search for better plans looks at in its first round. Not measured.
     improving_round: u64 = 4_096;
 
-    /// How many turns the preferred successors get for a better estimate. The value of LAMA (Richter
-    /// & Westphal, JAIR 2010); not measured here.
+    /// How many turns the preferred successors get for a better estimate. The value of LAMA
+    /// (Richter & Westphal, JAIR 2010); not measured here.
     boost: i64 = 1_000;
     /// In the complete search, one turn in this many goes to the successor that has waited longest.
-    /// Not measured; any number keeps the search from losing itself where states are endlessly many.
+    /// Not measured; any number keeps the search from losing itself where states are endlessly
+    /// many.
     exploration_interval: u64 = 32;
     /// How many states that differ in times only are kept by compressing searches. Not measured.
     compressed_variants: usize = 4;
@@ -237,8 +238,8 @@ constants! {
     /// three times as large, and so on. Not measured; the longer a search takes, the likelier it is
     /// lost in dead ends.
     dead_end_patience: u64 = 4_096;
-    /// Beyond so many atoms temporal `h²` is not computed: its table takes the square in memory, and
-    /// each check more than that in time. Not measured.
+    /// Beyond so many atoms temporal `h²` is not computed: its table takes the square in memory,
+    /// and each check more than that in time. Not measured.
     most_pair_atoms: usize = 400;
     /// The same for the pairs that one round of it looks up. Not measured; about 10 ms.
     most_pair_lookups: usize = 2_000_000;

@@ -7,8 +7,8 @@ use elbowroom_planner::{Answer, Member, Settings, Technique, Tuning, plan};
 
 use crate::world::{describe, task};
 
-/// A shelf is one cell wide and `depth` deep; a crane stands before it. Boxes have to fill it, so the
-/// deepest cell comes first: what stands in a cell keeps the crane from those behind.
+/// A shelf is one cell wide and `depth` deep; a crane stands before it. Boxes have to fill it, so
+/// the deepest cell comes first: what stands in a cell keeps the crane from those behind.
 fn shelf(depth: usize) -> (String, String) {
     let domain = "
         (:requirements :typing :durative-actions)

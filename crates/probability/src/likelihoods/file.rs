@@ -10,9 +10,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::{Likelihoods, PartialFlip, Success, is_changed, names};
 
-/// What `format` says in our files.
+/// The value of `format` in our files.
 pub(super) const FORMAT: &str = "elbowroom-likelihoods";
-/// What `version` says.
+/// The value of `version`.
 pub(super) const VERSION: &str = "1";
 
 /// Reads a likelihood file of our own format.

@@ -11,7 +11,7 @@ use elbowroom_num::Rational;
 pub(crate) struct Requirement {
     /// Facts with the truth they must have, sorted.
     pub(crate) literals: Vec<(usize, bool)>,
-    /// What reads numbers only.
+    /// The conditions that read numbers only.
     pub(crate) numeric: Vec<Condition>,
     /// Everything else.
     pub(crate) coupled: Vec<Coupled>,

@@ -9,21 +9,21 @@ pub struct Loss {
     /// The position in the order of the happening after whose beginning it is lost; `None` before
     /// the first, where something is under way.
     pub position: Option<usize>,
-    /// What was asked there.
+    /// The reading at which it is lost.
     pub reading: Reading,
-    /// What was not so.
+    /// The condition that failed.
     pub cause: LossCause,
     /// How many of all worlds are lost: a probability. Those of all losses of an order and its
     /// P(A ∩ G) add up to 1.
     pub mass: f64,
 }
 
-/// What is asked of the state.
+/// The reading of the state that a loss is due to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// What the happening needs.
+    /// The conditions of the happening.
     OnArrival,
-    /// What an action under way needs throughout, after the happening.
+    /// An over-all condition of an action under way, after the happening.
     Throughout(InstanceId),
     /// The goal, after the last happening.
     Goal,
@@ -77,7 +77,7 @@ impl Ledger {
         }
     }
 
-    /// What has been lost; no more is kept.
+    /// The losses so far; no more are noted.
     pub(super) fn close(&mut self) -> Vec<Loss> {
         self.0.take().unwrap_or_default()
     }

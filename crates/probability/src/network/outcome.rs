@@ -40,7 +40,7 @@ pub(super) fn by_itself(flip: Flip) -> Kernel {
     }
 }
 
-/// What the effects that take place do to their fact; deletions come before additions.
+/// The transition of a fact by the effects that take place; deletions come before additions.
 pub(super) fn kernel<'a>(
     model: &Model,
     fact: usize,

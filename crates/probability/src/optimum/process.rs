@@ -195,7 +195,7 @@ impl Perturbed {
         self.place[(self.sets[set] & !(1 << id.0)) as usize]
     }
 
-    /// What can be done, in the order of the plan.
+    /// The available choices, in the order of the plan.
     pub(super) fn options(&self, set: usize, state: usize) -> Vec<Move> {
         let mut options = Vec::new();
         let bits = self.sets[set];

@@ -38,8 +38,8 @@ pub struct Table {
 
 impl Table {
     /// The table of a world; `None` where it is not small, or is not of the kind in which every
-    /// happening can be chosen when it is due: there are numbers, timed initials or negations, or an
-    /// action's end takes away what another needs.
+    /// happening can be chosen when it is due: there are numbers, timed initials or negations, or
+    /// an action's end takes away what another needs.
     pub fn new(task: &Task, likelihoods: &Likelihoods) -> Option<Self> {
         let task = task.clone();
         let actions = all_actions(&task).ok()?;
@@ -83,7 +83,8 @@ impl Table {
         self.optimum.value(&self.process, circumstances)
     }
 
-    /// What is best. A start is due as soon as nothing that interferes with it has just happened.
+    /// The best choice. A start is due as soon as nothing that interferes with it has just
+    /// happened.
     pub fn choose(&self, search: &OrderSearch, circumstances: &Circumstances) -> Choice {
         self.optimum.choice(&self.process, circumstances, |node| {
             let slots = search.windows(circumstances, &[node]);
@@ -98,9 +99,9 @@ impl Table {
 }
 
 /// How likely the best of all agents is to reach the goal that has these actions, may try them as
-/// often as it likes, and sees the state as it is; where no way leads to the goal even if nothing goes
-/// wrong, it has lost. At most three actions are under way at once, and what runs without what it needs
-/// throughout breaks off.
+/// often as it likes, and sees the state as it is; where no way leads to the goal even if nothing
+/// goes wrong, it has lost. At most three actions are under way at once, and what runs without what
+/// it needs throughout breaks off.
 ///
 /// # Errors
 /// When the world is not small, or has more in it than facts.

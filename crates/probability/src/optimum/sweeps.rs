@@ -142,7 +142,7 @@ impl Perturbed {
         }
     }
 
-    /// What a state is worth when a step ends in it: in a dead end that uses up patience.
+    /// The value of a state when a step ends in it: in a dead end that uses up patience.
     fn landing(&self, values: &Values, layer: usize) -> Vec<Vec<f64>> {
         let mut landing = values[layer].clone();
         if !matches!(self.settings.dead_ends, DeadEnds::Patience(_)) {

@@ -28,11 +28,11 @@ use crate::network::PrunedNetwork;
 pub(crate) struct Bounds {
     /// For each fact, the instances that change it: `None` for timed initials.
     setters: Vec<Vec<Setter>>,
-    /// What the end of an instance needs, and its middle.
+    /// The conditions of an instance's end, and over all.
     needs_at_end: Vec<Vec<(usize, bool)>>,
-    /// What its middle needs.
+    /// Its over-all conditions.
     needs_throughout: Vec<Vec<(usize, bool)>>,
-    /// What its start needs.
+    /// The conditions of its start.
     needs_at_start: Vec<Vec<(usize, bool)>>,
     goal: Vec<(usize, bool)>,
 }
@@ -129,7 +129,7 @@ impl Bounds {
         }
     }
 
-    /// What no way to go on exceeds, not going on included.
+    /// An upper bound on the probability of every continuation, including the empty one.
     pub(crate) fn bound(
         &self,
         model: &Model,

@@ -56,7 +56,7 @@ pub(super) struct Cache {
 }
 
 impl Cache {
-    /// What is known.
+    /// The entry, if there is one.
     pub(super) fn get(&self, key: &Key) -> Option<&Known> {
         self.known.get(key)
     }

@@ -1,9 +1,9 @@
 //! All orders of a short plan at once: [`Lattice`].
 //!
-//! The sets of happenings that an order can have behind it, ordered by inclusion: a way upwards from
-//! nothing is an order. What is behind an order says what can follow and what would be true if
-//! nothing went wrong, but not how likely its facts are: that also depends on the way. So
-//! each way is looked at, and a set is given the best of those that lead through it.
+//! The sets of happenings that an order can have behind it, ordered by inclusion: a way upwards
+//! from nothing is an order. What is behind an order says what can follow and what would be true if
+//! nothing went wrong, but not how likely its facts are: that also depends on the way. So each way
+//! is looked at, and a set is given the best of those that lead through it.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ pub struct Lattice {
     pub orders: usize,
 }
 
-/// What an order can have behind it.
+/// A set of happenings that an order can have behind it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeNode {
     /// The happenings, sorted.
@@ -61,7 +61,7 @@ pub struct LatticeLimits {
 }
 
 impl Default for LatticeLimits {
-    /// What can still be seen in a picture, and a second or two.
+    /// Limits that keep a picture legible and the work below a second or two.
     fn default() -> Self {
         Self {
             nodes: 300,
@@ -249,7 +249,7 @@ impl Walk<'_> {
         }
     }
 
-    /// What could be next, time and probabilities aside.
+    /// The possible next happenings, regardless of time and probabilities.
     fn next(&self) -> Vec<NodeId> {
         let separations = &self.search.separations;
         let mut next = Vec::new();

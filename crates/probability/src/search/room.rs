@@ -2,10 +2,10 @@
 //!
 //! Of all the happenings of an order, only a few can still matter to the timing of what is to come:
 //! the last one, the ends under way, zero (if there are times on the clock to be kept), and what
-//! was less than ε ago from which something must be ε apart. The network of the order, projected
-//! on these, is a small matrix of greatest differences. It is kept closed: a happening is added by
-//! relaxing the paths through its new bounds, and what no longer matters is dropped with its row and
-//! column.
+//! was less than ε ago from which something must be ε apart. The network of the order, projected on
+//! these, is a small matrix of greatest differences. It is kept closed: a happening is added by
+//! relaxing the paths through its new bounds, and what no longer matters is dropped with its row
+//! and column.
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};

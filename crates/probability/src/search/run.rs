@@ -211,7 +211,7 @@ impl<'s, 'w> Run<'s, 'w> {
         Ok(())
     }
 
-    /// What could be next, time and probabilities aside.
+    /// The possible next happenings, regardless of time and probabilities.
     fn next(&self) -> Vec<NodeId> {
         let separations = &self.search.separations;
         let mut next = Vec::new();

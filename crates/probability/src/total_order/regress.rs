@@ -55,7 +55,7 @@ impl Needed {
         }
     }
 
-    /// What is needed on arrival at a happening.
+    /// The conditions on arrival at a happening.
     fn before(&self, model: &Model, event: &Event) -> Self {
         let mut before = Self::default();
         for &(fact, truth) in &self.literals {

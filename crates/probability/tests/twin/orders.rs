@@ -27,9 +27,9 @@ pub(crate) fn all(
     orders
 }
 
-/// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as likely
-/// has. Only those count for which there is time, which is asked of the network as a whole, and
-/// those that work nominally if the settings ask for it.
+/// The best P(A ∩ G) of all orders, and how many happenings the shortest of those that are as
+/// likely has. Only those count for which there is time, which is asked of the network as a whole,
+/// and those that work nominally if the settings ask for it.
 pub(crate) fn best(
     case: &Case,
     semantics: Semantics,

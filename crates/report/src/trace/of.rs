@@ -93,7 +93,7 @@ impl Line {
 }
 
 impl ReportLine {
-    /// What came of a run, as a line.
+    /// The report of a run, as a line.
     pub fn of(report: &Report) -> Self {
         Self {
             verdict: report.verdict.name().to_owned(),

@@ -23,7 +23,7 @@ use crate::wire::read_observation;
 pub struct TraceError {
     /// The line, from 1 on.
     pub line: usize,
-    /// What is wrong with it.
+    /// The error.
     pub message: String,
 }
 
@@ -38,7 +38,7 @@ pub struct Stored {
     pub is_cut_off: bool,
 }
 
-/// What is wrong with another kind of file.
+/// The error for another kind of file.
 const NO_TRACE: &str = "this is no trace of a run, as `--trace` writes it";
 
 impl Stored {
@@ -280,9 +280,9 @@ fn instantiate(name: &str, task: &Task) -> Result<elbowroom_model::ground::Actio
 pub struct Difference {
     /// The line of the trace, from 1 on.
     pub line: usize,
-    /// What the trace has there.
+    /// The line of the trace.
     pub stored: Line,
-    /// What the replay came to.
+    /// The line of the replay.
     pub replayed: Line,
 }
 

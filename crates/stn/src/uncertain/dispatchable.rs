@@ -36,7 +36,7 @@ pub struct DispatchableEdge<'a, W> {
     pub from: NodeId,
     /// The time point it is subtracted from.
     pub to: NodeId,
-    /// What the difference does not exceed.
+    /// The upper bound of the difference.
     pub bound: &'a W,
 }
 
@@ -213,7 +213,7 @@ impl<W: Weight> Dispatchable<W> {
         })
     }
 
-    /// What stands behind an edge, from its beginning to its end.
+    /// The path that an edge stands for, from its beginning to its end.
     pub(super) fn behind(&self, edge: EdgeId) -> Vec<Step<W>> {
         let mut edges = Vec::new();
         self.graph.spelt_out(edge, MOST_STEPS, &mut edges);

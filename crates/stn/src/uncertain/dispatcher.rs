@@ -48,7 +48,7 @@ struct ActiveWait<W> {
 /// Something happened outside its window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Missed<W = Rational> {
-    /// What happened.
+    /// The event's node.
     pub node: NodeId,
     /// The end of the window that was missed.
     pub end: WindowEnd,
@@ -56,7 +56,7 @@ pub struct Missed<W = Rational> {
     pub limit: W,
     /// By how much it was missed; positive.
     pub by: W,
-    /// What stands behind that end, from the event that it counts from.
+    /// The path behind that end, from the event that it counts from.
     pub behind: Vec<Step<W>>,
 }
 
@@ -147,7 +147,8 @@ impl<W: Weight> Dispatcher<W> {
             .map(|wait| wait.link)
     }
 
-    /// What keeps a node from happening earlier, or later: from the event that it counts from.
+    /// The path that keeps a node from happening earlier, or later: from the event that it counts
+    /// from.
     pub fn behind(&self, node: NodeId, end: WindowEnd) -> Vec<Step<W>> {
         let window = &self.windows[node.index()][end as usize];
         let mut last = window.as_ref().map(|(time, edge)| (time, *edge));

@@ -6,7 +6,7 @@ use super::graph::{EdgeId, Graph};
 use super::{Conflict, LinkId, UncertainNetwork};
 use crate::{NodeId, Weight};
 
-/// What is left behind by earlier searches may become so many times as much as one search finds.
+/// Leftovers of earlier searches may grow to this multiple of one search's results.
 const MOST_LEFTOVERS: usize = 4;
 
 /// A dynamically controllable network whose links can be given other bounds, one at a time.

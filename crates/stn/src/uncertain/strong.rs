@@ -94,7 +94,7 @@ impl<W: Weight> UncertainNetwork<W> {
         (root, links)
     }
 
-    /// What a requirement says of the points that the executor chooses.
+    /// A requirement in terms of the points that the executor chooses.
     fn reduced(&self, id: ConstraintId) -> Reduced<W> {
         let constraint = self.requirements.constraint(id);
         let (from, from_links) = self.chain(constraint.from);

@@ -11,7 +11,7 @@ use crate::{Constraint, Network};
 pub struct WholeNetwork {
     /// The network in these numbers.
     pub network: UncertainNetwork<i64>,
-    /// What they are numbers of.
+    /// The unit.
     pub unit: Unit,
 }
 
@@ -19,7 +19,7 @@ pub struct WholeNetwork {
 #[derive(Clone, Copy, Debug)]
 pub struct Unit {
     denominator: CommonDenominator,
-    /// What no bound may exceed, so that no sum overflows.
+    /// The largest bound, so that no sum overflows.
     largest: i64,
 }
 
@@ -33,7 +33,7 @@ impl Unit {
             .then_some(whole)
     }
 
-    /// So many units.
+    /// This number of units.
     pub fn fraction(self, whole: i64) -> Rational {
         self.denominator.fraction(whole)
     }

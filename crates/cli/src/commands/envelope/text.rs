@@ -240,7 +240,7 @@ fn met(conditions: &Conditions) -> Option<String> {
     (!met.is_empty()).then(|| met.join(" "))
 }
 
-/// What foresight would be worth, in one sentence.
+/// The worth of foresight, in one sentence.
 fn worth(foresight: &Foresight) -> String {
     /// Of a long list only the first are named.
     const MOST_NAMED: usize = 4;

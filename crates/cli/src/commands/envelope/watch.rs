@@ -1,7 +1,8 @@
 //! Watches the clock and Ctrl-C while an envelope is computed, and shows how far it has come.
 //!
-//! A single question to the library can take long, and it looks at no clock. So it works on a thread of
-//! its own: when it has not come to an end soon after its time is up, what it told last is the answer.
+//! A single question to the library can take long, and it looks at no clock. So it works on a
+//! thread of its own: when it has not come to an end soon after its time is up, what it told last
+//! is the answer.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -77,7 +78,8 @@ impl Watch {
         loop {
             match receiver.recv_timeout(TICK) {
                 Ok(answer) => return answer,
-                // A thread that is gone without an answer has panicked, which has ended the program.
+                // A thread that is gone without an answer has panicked, which has ended the
+                // program.
                 Err(RecvTimeoutError::Disconnected) => {
                     return envelope(request, &mut self.stopwatch);
                 }

@@ -64,7 +64,7 @@ pub(super) fn repaired(planner: &str, objection: &str) -> String {
     )
 }
 
-/// What is wrong with a planner, and what to do about it.
+/// The failure of a planner, with advice.
 pub(super) fn failure(failure: PlannerFailure) -> Failure {
     let in_words = failure.to_string();
     match failure.outcome {

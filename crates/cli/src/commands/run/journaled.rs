@@ -24,8 +24,8 @@ impl Kept {
     }
 }
 
-/// Writes each entry into a journal. Before the world is told to start or to cancel something, that is on
-/// the disk; all else is handed to the operating system at once.
+/// Writes each entry into a journal. Before the world is told to start or to cancel something, that
+/// is on the disk; all else is handed to the operating system at once.
 pub(super) struct JournalWriter<'a> {
     pub(super) task: Arc<Task>,
     pub(super) file: &'a mut JournalFile,
@@ -43,8 +43,8 @@ impl Recorder for JournalWriter<'_> {
     }
 }
 
-/// A world that starts nothing any more when the journal has lost a record. What runs is still told to
-/// stop: the run is over, in order.
+/// A world that starts nothing any more when the journal has lost a record. What runs is still told
+/// to stop: the run is over, in order.
 pub(super) struct Careful<W> {
     pub(super) inner: W,
     pub(super) kept: Kept,

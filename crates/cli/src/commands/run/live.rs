@@ -19,7 +19,7 @@ pub(super) struct Live<'a> {
     inner: &'a mut dyn Recorder,
     line: Progress,
     clock: Clock,
-    /// What was started and has not ended, by ticket.
+    /// Actions that have started and not ended, by ticket.
     running: BTreeMap<u64, String>,
     replans: usize,
 }

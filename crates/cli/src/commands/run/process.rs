@@ -71,8 +71,8 @@ impl ProcessWorld {
         Self::greeted(command, task, manners, interrupt, &hello())
     }
 
-    /// The same for a run that was cut off: the program is told what is known of what was under way, and that the
-    /// tickets below `given` were given.
+    /// The same for a run that was cut off: the program is told what is known of what was under
+    /// way, and that the tickets below `given` were given.
     pub(super) fn resume(
         command: &str,
         task: &Arc<Task>,

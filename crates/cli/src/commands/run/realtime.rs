@@ -46,7 +46,8 @@ impl Pace {
         on_the_wall(time, &self.factor).saturating_sub(passed)
     }
 
-    /// What the world's clock will read in so long a time, by the thousandth of a second.
+    /// The reading of the world's clock after this time on the wall clock, rounded to a thousandth
+    /// of a second.
     fn after(&self, while_on_the_wall: Duration) -> Rational {
         let passed = self.clock.elapsed().saturating_sub(self.stopped());
         let millis = (passed + while_on_the_wall).as_millis();

@@ -1,9 +1,9 @@
 //! `elbowroom run --resume`: goes on with a run whose program has died.
 //!
-//! Everything that a run decides follows from what the world reported and what the planner answered, and
-//! both stand in the journal. So the run is played again up to where its journal ends, without a word to the
-//! world; there the world itself takes over. `docs/formats/journal.md` has the rules for what was under
-//! way.
+//! Everything that a run decides follows from what the world reported and what the planner
+//! answered, and both stand in the journal. So the run is played again up to where its journal
+//! ends, without a word to the world; there the world itself takes over. `docs/formats/journal.md`
+//! has the rules for what was under way.
 
 mod past;
 mod under_way;
@@ -220,7 +220,8 @@ struct PastWorld<'a> {
 }
 
 impl PastWorld<'_> {
-    /// The world itself, started again if need be. Then it is asked what became of what was under way.
+    /// The world itself, started again if need be. Then it is asked what became of what was under
+    /// way.
     fn present(&mut self) -> Result<&mut ProcessWorld, WorldError> {
         if self.past.difference().is_some() {
             return Err(WorldError::new("the journal leads to other decisions"));
@@ -280,8 +281,8 @@ impl PastWorld<'_> {
                     },
                 });
             }
-            // Whether the world has heard it is not known, and it may be told twice. What it knows nothing
-            // of may go on all the same, and is to stop.
+            // Whether the world has heard it is not known, and it may be told twice. What it knows
+            // nothing of may go on all the same, and is to stop.
             if open.is_cancelled || !is_told {
                 let ticket = Ticket(*ticket);
                 world.command(&self.last, &Command::Cancel { ticket })?;

@@ -91,7 +91,7 @@ fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
     }
 }
 
-/// What to do about arguments, or files, that do not go together.
+/// Advice on arguments, or files, that contradict each other.
 pub(super) fn contradiction(error: SpecError) -> Failure {
     let hint = match &error {
         SpecError::World(wrong) => {

@@ -27,7 +27,7 @@ pub struct EnvelopeAnswer {
     pub domain: String,
     /// The problem's name.
     pub problem: String,
-    /// What the request calls the plan.
+    /// The name of the plan, as the request gives it.
     pub plan: String,
     /// How the answer was found.
     pub settings: EnvelopeSettings,
@@ -50,14 +50,15 @@ pub enum EnvelopeFormat {
 pub struct EnvelopeSettings {
     /// How boxes were looked for.
     pub method: Method,
-    /// What is guaranteed inside the envelope.
+    /// The guarantee inside the envelope.
     pub guarantee: Guarantee,
     /// How steps changed after a success.
     pub growth: Growth,
     /// The search ends when all steps are below this.
     #[serde(with = "exact")]
     pub precision: Rational,
-    /// If there is one, the precision of each parameter was this share of its nominal value instead.
+    /// If there is one, the precision of each parameter was this share of its nominal value
+    /// instead.
     #[serde(
         with = "exact::option",
         default,
@@ -77,7 +78,7 @@ pub struct EnvelopeSettings {
 pub enum EnvelopeFinding {
     /// There is an envelope.
     Envelope {
-        /// What is left open, and how far each may deviate.
+        /// The parameters, and how far each may deviate.
         parameters: Vec<Room>,
         /// Durations that the domain leaves to the executor, and that do not vary.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -93,13 +94,13 @@ pub enum EnvelopeFinding {
         /// By how much everything may deviate at once, if that is known.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         balance: Option<Balance>,
-        /// What the box is the greatest of, if the best one was asked for.
+        /// The objective of the box, if the largest one was asked for.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         best: Option<Best>,
         /// How the conditions that the plan has to meet are met.
         #[serde(default)]
         conditions: Conditions,
-        /// What it would be worth to know values in advance, if anything.
+        /// The worth of knowing values in advance, if there is any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         foresight: Option<Foresight>,
         /// When each action happens, as planned and anywhere in the envelope.
@@ -116,14 +117,14 @@ pub enum EnvelopeFinding {
     Fails(Failing),
     /// The box asked about lies inside the envelope.
     Inside {
-        /// What is left open, and the box.
+        /// The parameters and their intervals.
         parameters: Vec<Range>,
     },
     /// It does not.
     Outside {
-        /// What is left open, and the box.
+        /// The parameters and their intervals.
         parameters: Vec<Range>,
-        /// What can happen in it.
+        /// A counterexample inside the box.
         counterexample: Counterexample,
     },
     /// Nothing is known yet.
@@ -144,9 +145,9 @@ pub enum Failing {
     },
     /// It has no schedule, or one that breaks it.
     AsPlanned {
-        /// What is left open.
+        /// The parameters.
         parameters: Vec<Quantity>,
-        /// What can happen.
+        /// The counterexample.
         counterexample: Counterexample,
     },
 }
@@ -192,9 +193,10 @@ pub struct Room {
     /// The quantity and its interval.
     #[serde(flatten)]
     pub range: Range,
-    /// What keeps the lower end, in words; `None` if nothing does, or if it is not known.
+    /// The reason why the lower end cannot move further, in words; `None` if there is none, or if
+    /// it is not known.
     pub lower_limit: Option<String>,
-    /// What keeps the upper end.
+    /// The reason why the upper end cannot move further.
     pub upper_limit: Option<String>,
 }
 
@@ -276,12 +278,12 @@ pub enum MovedEnd {
 /// A violated requirement, with values and a schedule that violate it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counterexample {
-    /// What goes wrong, in words.
+    /// The failure in words.
     pub message: String,
     /// By how much, where that is one number.
     #[serde(with = "exact::option")]
     pub shortfall: Option<Rational>,
-    /// What the judge says about the schedule, if it was asked.
+    /// The judge's verdict on the schedule, if it was asked.
     pub verdict: Option<String>,
     /// The parameters' values, by name.
     pub values: IndexMap<String, Exact>,
@@ -446,7 +448,7 @@ impl Makespans {
 }
 
 impl Subject<'_> {
-    /// What is left open.
+    /// The parameters.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         let parameters = self.plan.parameters.iter().enumerate();
         parameters
@@ -466,7 +468,7 @@ impl Subject<'_> {
             .collect()
     }
 
-    /// What is left open, with its interval in a box.
+    /// The parameters, each with its interval in a box.
     pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
         let quantities = self.quantities().into_iter().zip(envelope.intervals());
         quantities

@@ -9,8 +9,8 @@ use super::search::flow;
 use crate::answers::{RequestError, Watcher, exact};
 use crate::flow::FlowError;
 
-/// By how much everything that is left open may deviate from its nominal value at once, as shares of
-/// these.
+/// By how much everything that is left open may deviate from its nominal value at once, as shares
+/// of these.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Balance {
     /// Upwards.

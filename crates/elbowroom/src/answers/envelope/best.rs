@@ -14,10 +14,10 @@ use super::worth::{Worth, worths};
 use crate::answers::{EnvelopeProgress, Event, Halt, RequestError, Watcher, exact};
 use crate::flow::FlowError;
 
-/// What a box is the greatest of, and how much greater another could be.
+/// The objective of a box, and how much better another box could be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Best {
-    /// What it is the greatest of.
+    /// The objective.
     pub objective: Objective,
     /// Whether both ends of an interval had to be equally far from the nominal value.
     pub symmetric: bool,
@@ -28,14 +28,14 @@ pub struct Best {
     /// of widths.
     #[serde(with = "exact")]
     pub value: Rational,
-    /// What no box exceeds.
+    /// An upper bound on the objective of all boxes.
     #[serde(with = "exact")]
     pub bound: Rational,
     /// Whether it is proved that there is no better box.
     #[serde(rename = "proved")]
     pub is_proved: bool,
-    /// Why no box has more than `bound`, for [`elbowroom_verify`] to check; `None` if the search was
-    /// ended before it was done, or if that could not be told of all ends.
+    /// Why no box has more than `bound`, for [`elbowroom_verify`] to check; `None` if the search
+    /// was ended before it was done, or if that could not be told of all ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate: Option<Certificate>,
     /// What it would be worth to relax bounds of the plan, the most first.
@@ -43,8 +43,8 @@ pub struct Best {
     pub worth: Vec<Worth>,
 }
 
-/// The best box, or why the plan does not even work as planned; what the box is the best of; and why
-/// the watcher wanted no more, if it did.
+/// The best box, or why the plan does not even work as planned; what the box is the best of; and
+/// why the watcher wanted no more, if it did.
 type Found = (Result<DecoupledEnvelope, Objection>, Best, Option<Halt>);
 
 /// Looks for the best box.

@@ -13,7 +13,8 @@ use elbowroom_verify::{
 
 use super::Subject;
 
-/// The certificate of a proof, with those of its cuts, and of the plan's constraints, that are used.
+/// The certificate of a proof, with those of its cuts, and of the plan's constraints, that are
+/// used.
 pub(super) fn certificate(
     subject: &Subject<'_>,
     settings: &BestSettings,
@@ -129,9 +130,9 @@ fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
     is_used
 }
 
-/// Those constraints that proofs are about, without numbers that no proof uses; the proofs get their
-/// new positions. A proof about times
-/// that are fixed in advance is also about all durations that are not.
+/// Those constraints that proofs are about, without numbers that no proof uses; the proofs get
+/// their new positions. A proof about times that are fixed in advance is also about all durations
+/// that are not.
 fn used_constraints(all: Vec<Constraint>, proofs: &mut [Proof]) -> Vec<Constraint> {
     let mut is_used = vec![false; all.len()];
     let mut sides = vec![[false; 2]; all.len()];

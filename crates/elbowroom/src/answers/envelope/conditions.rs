@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Conditions {
     /// Bounds on the difference of two times: the plan's network implies them.
     pub differences: usize,
-    /// Conditions on numbers, and on several differences at once: every schedule of the network meets
-    /// them.
+    /// Conditions on numbers, and on several differences at once: every schedule of the network
+    /// meets them.
     pub all_schedules: usize,
     /// Bounds that were added to the network for the dispatcher to keep to
     /// ([`EnvelopeRequest::enforce`](super::EnvelopeRequest::enforce)).

@@ -28,7 +28,7 @@ pub struct Foresight {
     pub weak_width: Exact,
 }
 
-/// What foresight would be worth, if an end of the box is kept where it is by its want.
+/// The worth of foresight, if a need for it is what keeps an end of the box where it is.
 pub(super) fn foresight(
     subject: &Subject<'_>,
     oracle: &mut Oracle,

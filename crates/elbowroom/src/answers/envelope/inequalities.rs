@@ -35,8 +35,8 @@ const MOST_CUTS: usize = 64;
 /// [`times`](Self::times)) and parameters (`p0` is the first of the answer's), and `<=` or `<`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inequalities {
-    /// The labels of the time points, as in STN plan files. The first is time zero. Requirements may use
-    /// one more: a moment inside an action.
+    /// The labels of the time points, as in STN plan files. The first is time zero. Requirements
+    /// may use one more: a moment inside an action.
     pub times: Vec<String>,
     /// Bounds on differences of times.
     pub network: Vec<NetworkRow>,
@@ -60,8 +60,8 @@ pub struct NetworkRow {
 pub struct RequirementRow {
     /// What is required.
     pub words: String,
-    /// Whether it is the order of two happenings. If that is broken, nothing follows from the rest: in
-    /// another order the plan may work, too.
+    /// Whether it is the order of two happenings. If that is broken, nothing follows from the rest:
+    /// in another order the plan may work, too.
     pub is_order: bool,
     /// Broken if, for one of these, all inequalities hold at once.
     pub broken_if: Vec<Vec<String>>,

@@ -12,7 +12,7 @@ use crate::answers::Watcher;
 const SHARP: i64 = 1_000_000_000;
 /// How often the step is doubled to see what stops an end: the search has tried no end further.
 const FARTHER: usize = 1;
-/// What lies further out than this share of the nominal value is not what limits an end.
+/// Reasons further out than this share of the nominal value do not limit an end.
 const NEAR: (i64, i64) = (1, 4);
 
 /// For each parameter, what keeps the lower and the upper end of its interval; `None` if nothing
@@ -62,7 +62,7 @@ pub(super) fn what_limits(
     words
 }
 
-/// What refuses each end that far out.
+/// The objections to each end, that far out.
 fn at_distance(
     subject: &Subject<'_>,
     oracle: &mut Oracle,

@@ -66,7 +66,7 @@ pub struct TimedFacts {
     pub time: Exact,
     /// The times anywhere in the envelope.
     pub window: WindowAnswer,
-    /// What happens: `(open office) becomes false`.
+    /// The changes, such as `(open office) becomes false`.
     pub changes: Vec<String>,
     /// The parameter that its time is, if it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -213,7 +213,7 @@ impl Times<'_> {
     }
 }
 
-/// What a group of timed initials changes, in words.
+/// The changes of a group of timed initials, in words.
 pub fn changes(task: &Task, timed: usize) -> Vec<String> {
     let words = |change: &Change| match change {
         Change::Add(fact) => format!("{} becomes true", task.fact_name(*fact)),

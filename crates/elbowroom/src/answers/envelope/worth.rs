@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::Subject;
 use crate::answers::exact;
 
-/// What the objective gains for each unit by which a bound of the plan is relaxed, as long as nothing
-/// else comes to limit it.
+/// What the objective gains for each unit by which a bound of the plan is relaxed, as long as
+/// nothing else comes to limit it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Worth {
     /// The bound, in words.

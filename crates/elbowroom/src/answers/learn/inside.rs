@@ -16,15 +16,15 @@ use crate::answers::envelope::{EnvelopeRequest, envelope};
 use crate::answers::{RequestError, Watcher, exact};
 use crate::flow::FlowError;
 
-/// Asks for intervals that hold all durations of the next execution of a plan at once, with a probability of
-/// at least `probability`, and whether they lie inside what the plan survives.
+/// Asks for intervals that hold all durations of the next execution of a plan at once, with a
+/// probability of at least `probability`, and whether they lie inside what the plan survives.
 #[derive(Clone, Debug)]
 pub struct InsideRequest {
     /// The problem.
     pub task: Arc<Task>,
     /// The plan.
     pub plan: AnyPlan,
-    /// What the plan has to survive.
+    /// The guarantee that the plan must keep.
     pub guarantee: Guarantee,
     /// The probability, greater than 0 and less than 1.
     pub probability: f64,
@@ -41,12 +41,12 @@ pub struct ConformalBox {
     pub intervals: Vec<ConformalInterval>,
 }
 
-/// What the intervals are worth.
+/// The use of the intervals for the plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// All durations of the next run lie in the intervals with the probability that was asked for, and the
-    /// plan survives all that lies in them.
+    /// All durations of the next run lie in the intervals with the probability that was asked for,
+    /// and the plan survives all that lies in them.
     Inside,
     /// The first holds, but the plan does not survive everything in the intervals.
     Outside,
@@ -74,8 +74,8 @@ pub struct ConformalInterval {
     pub upper: End,
     /// With which probability the duration may lie outside.
     pub miss: f64,
-    /// How far the envelope's interval was stretched around the planned duration: up to 1, the interval lies
-    /// inside the envelope. `None` if no stretching is enough.
+    /// How far the envelope's interval was stretched around the planned duration: up to 1, the
+    /// interval lies inside the envelope. `None` if no stretching is enough.
     pub factor: Option<f64>,
     /// How many samples were used for it.
     pub samples: usize,

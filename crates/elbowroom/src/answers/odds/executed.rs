@@ -18,7 +18,7 @@ use crate::flow;
 /// The number of plans that are remembered.
 const MEMORY: usize = 2000;
 
-/// What came of executing the plan.
+/// The results of executing the plan with one executor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExecutedAnswer {
     /// By whom.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{OrderAnswer, Subject, planned};
 use crate::answers::{RequestError, Watcher};
 
-/// What another order, retrying, or another plan would gain.
+/// The gain of another order, of retrying, and of another plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GainsAnswer {
     /// The best order of this plan; `None` if the search found none.

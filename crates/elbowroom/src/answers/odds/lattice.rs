@@ -30,7 +30,7 @@ pub struct LatticeAnswer {
     pub order: Vec<usize>,
 }
 
-/// What an order can have behind it.
+/// A set of happenings that an order can have behind it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetAnswer {
     /// The happenings in words.

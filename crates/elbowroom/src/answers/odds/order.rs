@@ -29,7 +29,7 @@ pub struct OrderAnswer {
     pub has_time: bool,
     /// The happenings.
     pub happenings: Vec<HappeningAnswer>,
-    /// What must hold after them: the goal.
+    /// The layer after the last happening: the goal.
     pub goal: LayerAnswer,
     /// Where the probability is lost. All masses and the probability add up to 1.
     pub losses: Vec<LossAnswer>,
@@ -59,11 +59,12 @@ pub struct HappeningAnswer {
     pub latest: Option<Rational>,
     /// That everything up to here succeeds, and what is under way then can go on.
     pub probability_so_far: f64,
-    /// What must hold before it for the rest to work if nothing more goes wrong.
+    /// The layer before it: the facts that must hold for the rest to work if nothing else goes
+    /// wrong.
     pub layer: LayerAnswer,
 }
 
-/// What must hold between two happenings.
+/// A layer: the facts that must hold between two happenings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerAnswer {
     /// Facts that must be true, facts that must be false as `(not …)`, other conditions as PDDL
@@ -80,7 +81,7 @@ pub struct LossAnswer {
     pub happening: Option<usize>,
     /// The happening in words.
     pub at: String,
-    /// What was asked there.
+    /// The reason for the loss.
     #[serde(flatten)]
     pub reason: LossReason,
     /// The share.
@@ -216,7 +217,7 @@ impl OrderAnswer {
     }
 }
 
-/// What is lost at a happening, but for the goal.
+/// The probability lost at a happening, apart from the goal.
 fn lost(losses: &[Loss], position: Option<usize>) -> f64 {
     let here = losses
         .iter()

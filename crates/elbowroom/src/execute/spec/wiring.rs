@@ -45,7 +45,7 @@ pub enum SpecError {
     /// A simulation was asked for.
     #[error("the world is a process; it cannot be simulated")]
     Process,
-    /// What a world that spoils plans needs, is not there.
+    /// A requirement of a world that spoils plans is missing.
     #[error(transparent)]
     Spoiler(#[from] SpoilerError),
 }
@@ -102,8 +102,8 @@ impl RunSpec {
     }
 
     /// Whom [`Self::planner`] names, with the limits of the run; to be asked with `clock` and
-    /// `goes_on`, as in [`Embedded`]. For executors that look for likelier plans, it is the one that
-    /// makes the likeliest in the world of `model`.
+    /// `goes_on`, as in [`Embedded`]. For executors that look for likelier plans, it is the one
+    /// that makes the likeliest in the world of `model`.
     ///
     /// # Errors
     /// When the planner is not known, or has been set a limit that it does not have.
@@ -206,8 +206,8 @@ impl RunSpec {
     }
 
     /// The execution that the specification is of; who plans, the plan to begin with, and the world
-    /// are still to be said. What executors take to be likely is found out within limits that do not
-    /// depend on the machine.
+    /// are still to be said. What executors take to be likely is found out within limits that do
+    /// not depend on the machine.
     ///
     /// # Errors
     /// When its files cannot be read, or the members do not go together.

@@ -189,7 +189,7 @@ pub(super) fn record(run: &mut Run, node: NodeId, changes: Vec<Recorded>) {
     }
 }
 
-/// What an update does to a fluent; `None` if a number it needs is undefined.
+/// A fluent after an update; `None` if a number it needs is undefined.
 pub(super) fn updated(
     reading: &Reading<'_>,
     operator: UpdateOperator,

@@ -62,8 +62,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only if
-    /// the time of one is open.
+    /// Interfering happenings are at least epsilon apart. Of two timed initials that is asked only
+    /// if the time of one is open.
     fn separate(&mut self, world: &World, group: &[usize]) -> Step {
         for (position, &node) in group.iter().enumerate() {
             for &other in world.placed.iter().chain(&group[..position]) {

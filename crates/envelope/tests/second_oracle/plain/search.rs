@@ -200,7 +200,8 @@ impl<'a> Search<'a> {
         let since = Polynomial::difference(Symbol::Moment, Symbol::Time(last));
         let until = Polynomial::difference(Symbol::Time(node), Symbol::Moment);
         for (&id, running) in &world.running {
-            // The over-all interval is open; at a group within it, the state after the group counts.
+            // The over-all interval is open; at a group within it, the state after the group
+            // counts.
             let since_relation = if running.is_new {
                 Relation::Below
             } else {

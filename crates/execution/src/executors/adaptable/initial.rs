@@ -10,9 +10,9 @@ use elbowroom_probability::{Belief, Likelihoods};
 use crate::event::Ending;
 use crate::executor::News;
 
-/// How likely initial facts hold of which nothing has been heard since: the `[beliefs]` of a likelihood
-/// file. A fact is heard of when its change is reported, when an action has an effect on it, and when
-/// an action starts or ends that needs it then.
+/// How likely initial facts hold of which nothing has been heard since: the `[beliefs]` of a
+/// likelihood file. A fact is heard of when its change is reported, when an action has an effect on
+/// it, and when an action starts or ends that needs it then.
 #[derive(Clone, Debug)]
 pub(super) struct Initial(BTreeMap<(PredicateId, Vec<ObjectId>), f64>);
 
@@ -151,8 +151,8 @@ mod tests {
             measured: Vec::new(),
         };
         initial.learn(&started, Some(&step.action), &task);
-        // It was here, and from now on its being on the floor is what effects and reports say: in the
-        // state of the beginning, it is.
+        // It was here, and from now on its being on the floor is what effects and reports say: in
+        // the state of the beginning, it is.
         close(believed(&initial, &task), [1.0, 1.0, 0.3, 0.2]);
         let ended = |ending| News::Ended {
             step: StepId(0),

@@ -26,8 +26,8 @@ const MOST_HAPPENINGS: usize = 200_000;
 /// An action is given up when it has failed so often in a row that this is how likely that was.
 const TOO_UNLIKELY: f64 = 1e-6;
 
-/// However unlikely it is to start, it is not tried more often than this in a row: where starts take
-/// no time, neither does trying again.
+/// However unlikely it is to start, it is not tried more often than this in a row: where starts
+/// take no time, neither does trying again.
 const MOST_FAILURES: i32 = 1000;
 
 /// So often in a row a failure is put down to a condition that does not hold.
@@ -42,15 +42,15 @@ pub(super) struct Rest {
     /// The plan's steps in the order of the model's instances.
     steps: Vec<Step>,
     chooser: Chooser,
-    /// What was told to start and has not ended, and when it has started, on the plan's clock.
+    /// Instances that were told to start and have not ended, with their starts on the plan's clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
     /// Starts and ends that have been observed lately, on the plan's clock.
     recent: Vec<(NodeId, Rational)>,
     /// How often each instance has failed in a row.
     failures: BTreeMap<InstanceId, i32>,
-    /// What was new last: what came before no order was left.
+    /// The latest event, before which there was still an order.
     latest: Option<Behind>,
-    /// What was told to stop and has not.
+    /// Steps that were told to stop and have not.
     let_go: BTreeSet<StepId>,
     /// How often each instance was told to stop.
     times_let_go: BTreeMap<InstanceId, u32>,
@@ -85,7 +85,7 @@ impl Rest {
         }
     }
 
-    /// What is under way ends by its duration; when the rest happens is decided then.
+    /// The window of a step under way; when the others happen is decided then.
     pub(super) fn window(&self, step: StepId, is_end: bool) -> Option<Planned> {
         let (instance, start) = self.under_way.get(&step)?;
         let start = start.as_ref().filter(|_| is_end)?;
@@ -160,7 +160,7 @@ impl Rest {
         Some(&self.steps[instance.index()].action)
     }
 
-    /// What is new, by name.
+    /// The news, by name.
     fn named(&self, news: &News, belief: &Progression) -> Option<Behind> {
         let action = |step: &StepId| {
             let (instance, _) = self.under_way.get(step)?;
@@ -200,7 +200,7 @@ impl Rest {
         }
     }
 
-    /// What has happened so lately that what interferes with it has to wait.
+    /// Happenings so recent that those which interfere with them have to wait.
     fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
         let epsilon = self.mission.task.epsilon();
         self.recent.retain(|(_, time)| time + epsilon > *now);

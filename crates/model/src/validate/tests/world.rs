@@ -115,7 +115,7 @@ impl World {
         self.schema(name, body)
     }
 
-    /// What the judge says of a plan: `valid`, or the violation.
+    /// The judge's verdict on a plan: `valid`, or the violation.
     pub(super) fn judge(&self, plan: &str) -> String {
         match self.verdict(plan) {
             Verdict::Valid(_) => "valid".to_owned(),

@@ -89,7 +89,7 @@ impl Stepper<'_> {
             .then_some(())
     }
 
-    /// What is under way still finds its over-all condition true.
+    /// Whether the over-all conditions of the actions under way still hold.
     pub(super) fn keeps_conditions(&self, state: &State) -> Option<()> {
         if state.symbolic.is_some() {
             return self.keeps_facts(state);

@@ -15,9 +15,9 @@ pub(crate) struct Beginning {
     /// By the search's numbers; the truth of derived facts is left open.
     pub(crate) facts: Vec<bool>,
     pub(crate) values: Vec<Option<Rational>>,
-    /// What the metric has summed up so far.
+    /// The cost so far, by the metric.
     pub(crate) cost: Rational,
-    /// What is under way: the first actions, in their order.
+    /// The actions under way: the first actions, in their order.
     pub(crate) running: Vec<Running>,
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct Running {
     pub(crate) duration: Option<Rational>,
 }
 
-/// What is under way in a situation, and whether its times lie on the grid.
+/// The actions under way in a situation, and whether their times lie on the grid.
 pub(super) fn running(situation: &Situation, scale: Scale) -> (Vec<Running>, bool) {
     let mut is_exact = true;
     let running = situation.running.iter().map(|running| {

@@ -2,8 +2,8 @@
 //!
 //! `(over all (>= (charge) 0))` minds a decrease and welcomes an increase. What spoils it must not
 //! slip, in time, into an action that it comes after in the order of choices; what mends it must
-//! not slip out. The other way round both are welcome, so that actions that only use up a consumable
-//! are free to run side by side.
+//! not slip out. The other way round both are welcome, so that actions that only use up a
+//! consumable are free to run side by side.
 
 use elbowroom_model::ground::{Change, Condition, Effect, Expression, FluentId};
 use elbowroom_model::problem::{Comparison, UpdateOperator};

@@ -1,4 +1,5 @@
-//! Which happenings must keep what distance: separations first, then annotations for those that matter.
+//! Which happenings must keep what distance: separations first, then annotations for those that
+//! matter.
 
 use elbowroom_model::Footprint;
 use elbowroom_model::Task;

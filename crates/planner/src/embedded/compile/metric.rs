@@ -71,7 +71,7 @@ pub(super) struct Draft {
 #[derive(Debug)]
 struct Sum {
     weight: Rational,
-    /// What is added to it.
+    /// The amounts that are added to it.
     amounts: Vec<Expression>,
 }
 
@@ -150,7 +150,8 @@ impl Draft {
         });
     }
 
-    /// What a change of a fluent that is added up costs; `None` if the fluent is none of these.
+    /// The cost of a change of a fluent in the metric's sum; `None` if the fluent is not part of
+    /// it.
     pub(super) fn cost(
         &self,
         fluent: FluentId,
@@ -166,7 +167,7 @@ impl Draft {
         Some(Expression::Multiply(parts))
     }
 
-    /// What has been spent in the beginning on what is added up.
+    /// The cost at the beginning of the fluents in the metric's sum.
     pub(super) fn initial_cost(&self, situation: &Situation) -> Rational {
         let values = &situation.state.values;
         let costs = self.summed.iter();

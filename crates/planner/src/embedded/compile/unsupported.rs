@@ -6,7 +6,7 @@ use elbowroom_model::ground;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the embedded planner does not handle {feature} ({place}); try an external planner")]
 pub struct Unsupported {
-    /// What it is.
+    /// The feature that is not supported.
     pub feature: String,
     /// Where it was met.
     pub place: String,

@@ -18,11 +18,12 @@ pub(super) enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Operator {
     pub(super) kind: Kind,
-    /// What holds just before, and was brought about by then.
+    /// Propositions that hold just before, and were brought about by then.
     pub(super) needs: Vec<usize>,
-    /// What else holds just before; it may have been brought about again, and that at any time.
+    /// Further propositions that hold just before, but may have been brought about again at any
+    /// time.
     pub(super) keeps: Vec<usize>,
-    /// What may hold afterwards by its doing.
+    /// Propositions that may hold afterwards because of it.
     pub(super) adds: Vec<usize>,
     /// Whether an atom, by number, surely does not hold both before and afterwards.
     pub(super) ends: Vec<bool>,
@@ -241,7 +242,8 @@ impl Model {
         }
     }
 
-    /// What may hold by the snap's doing. A conditional effect may always happen.
+    /// Propositions that may hold because of the snap action. A conditional effect may always
+    /// happen.
     fn made_by(&self, snap: &Snap) -> Vec<usize> {
         let adds = snap.adds.iter().map(|&fact| Literal::new(fact, true));
         let deletes = snap.deletes.iter().map(|&fact| Literal::new(fact, false));
@@ -256,7 +258,7 @@ impl Model {
         self.known(adds.chain(deletes).chain(conditional))
     }
 
-    /// What surely does not last. An addition wins over a deletion.
+    /// Propositions that surely do not persist. An addition wins over a deletion.
     fn ended_by(&self, snap: &Snap) -> Vec<bool> {
         let mut ends = vec![false; self.atom_count];
         for &fact in &snap.deletes {

@@ -1,4 +1,5 @@
-//! No state that a plan goes through is a dead end, not even if the plan must end as early as it can.
+//! No state that a plan goes through is a dead end, not even if the plan must end as early as it
+//! can.
 
 use std::fmt::Write;
 

@@ -2,9 +2,10 @@
 //!
 //! Nothing is ever lost in a relaxed plan, so one litre fills every bottle, and a battery that
 //! cannot be charged takes a robot everywhere. Here the steps of a relaxed plan draw on what there
-//! is: a step that is to be repeated until a number is reached is repeated as often as its consumable
-//! allows, and other steps that add to that number do the rest. What is missing then is no proof,
-//! since another relaxed plan might make do with less; but such a state has its turn last.
+//! is: a step that is to be repeated until a number is reached is repeated as often as its
+//! consumable allows, and other steps that add to that number do the rest. What is missing then is
+//! no proof, since another relaxed plan might make do with less; but such a state has its turn
+//! last.
 
 use elbowroom_model::problem::UpdateOperator;
 use elbowroom_num::Rational;
@@ -18,9 +19,9 @@ use super::resources::{amounts, note_floors, snaps_of};
 #[derive(Clone, Debug)]
 pub(crate) struct Consumable {
     fluent: u32,
-    /// What has to be left.
+    /// The amount that must remain.
     floor: f64,
-    /// What there is in the beginning, besides.
+    /// The amount at the beginning, above the floor.
     size: f64,
 }
 
@@ -36,7 +37,7 @@ impl Consumable {
     }
 }
 
-/// What is used up by constants, tested, and never filled up.
+/// Fluents that constants use up, that are tested, and that nothing fills up.
 pub(crate) fn consumables(compiled: &Compiled) -> Vec<Consumable> {
     let mut floors: Vec<Option<f64>> = vec![None; compiled.fluents.len()];
     for action in &compiled.actions {
@@ -90,7 +91,7 @@ pub(super) struct Consumables {
     draws: Vec<Vec<(usize, f64)>>,
     /// For each test the operators that add to its difference, and how much.
     adders: Vec<Vec<(u32, f64)>>,
-    /// What a relaxed plan leaves of each.
+    /// The amount of each that a relaxed plan leaves.
     left: Vec<f64>,
 }
 

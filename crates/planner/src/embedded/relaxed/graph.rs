@@ -140,7 +140,7 @@ impl Graph {
         }
     }
 
-    /// What one more of an operator counts for: an end needs another start.
+    /// The cost of one more of an operator: an end needs another start.
     pub(crate) fn cost_of_repetition(&self, operator: u32) -> u32 {
         let data = &self.operators[operator as usize];
         let start = match data.kind {

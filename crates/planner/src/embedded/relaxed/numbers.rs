@@ -54,7 +54,7 @@ impl Gain {
     }
 }
 
-/// What the updates of one happening do to a test.
+/// The gain for a test by the updates of one happening.
 pub(super) fn gain(compiled: &Compiled, test: u32, updates: &[&Update]) -> Gain {
     if let Some(gap) = gap_after(compiled, test, updates) {
         return if gap == 0.0 {

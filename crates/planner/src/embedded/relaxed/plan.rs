@@ -7,7 +7,7 @@ use super::super::state::State;
 use super::graph::Kind;
 use super::{Estimate, Relaxed};
 
-/// What a relaxed plan counts for, besides, that takes what is not there.
+/// The additional cost of a relaxed plan that uses more than there is.
 const OVERDRAWN: u32 = 1 << 20;
 
 impl Relaxed<'_> {
@@ -99,8 +99,8 @@ impl Relaxed<'_> {
         true
     }
 
-    /// Closes the gap of a test by steps that add to its difference, each as often as the consumables
-    /// allow, beginning with the cheapest. Whether it is such a test.
+    /// Closes the gap of a test by steps that add to its difference, each as often as the
+    /// consumables allow, beginning with the cheapest. Whether it is such a test.
     fn add_up(
         &mut self,
         proposition: u32,

@@ -3,8 +3,8 @@
 //! Nothing is ever lost in a relaxed plan, not even what its steps consume: one charge of a battery
 //! takes a robot everywhere. So what the steps of a relaxed plan use up is counted, and where that
 //! is more than there is, steps that fill it up are added. (The balance of producers and consumers
-//! is LPRPG's idea; Coles, Fox, Long & Smith, ICAPS 2008. Here no linear program is solved, only the
-//! sum over one relaxed plan is looked at.)
+//! is LPRPG's idea; Coles, Fox, Long & Smith, ICAPS 2008. Here no linear program is solved, only
+//! the sum over one relaxed plan is looked at.)
 
 use elbowroom_model::problem::{Comparison, UpdateOperator};
 
@@ -17,7 +17,7 @@ use super::graph::{Graph, Kind};
 #[derive(Clone, Debug)]
 struct Resource {
     fluent: u32,
-    /// What has to be left.
+    /// The amount that must remain.
     floor: f64,
     /// The operators that fill it up, and by how much.
     feeds: Vec<(u32, f64)>,
@@ -38,7 +38,7 @@ pub(super) struct Resources {
     list: Vec<Resource>,
     /// For each operator what it adds to resources, or, negative, takes.
     changes: Vec<Vec<(usize, f64)>>,
-    /// What a relaxed plan leaves of each.
+    /// The amount of each that a relaxed plan leaves.
     left: Vec<f64>,
     is_settled: Vec<bool>,
 }
@@ -204,7 +204,7 @@ pub(super) fn note_floors(compiled: &Compiled, action: &Action, floors: &mut [Op
     }
 }
 
-/// What a condition asks for at least of a fluent.
+/// The least value of a fluent that a condition asks for.
 fn least(compiled: &Compiled, condition: &Formula, fluent: u32) -> Option<f64> {
     let bounds = condition.tests.iter().filter_map(|&test| {
         let test = &compiled.tests[test as usize];

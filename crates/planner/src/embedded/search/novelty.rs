@@ -5,9 +5,9 @@
 //! leaves plateaus on which an estimate is blind.
 //!
 //! This is best-first width search (Lipovetzky & Geffner, AAAI 2017), in two forms. In BFWS(f₂) the
-//! worth of a state is how many goals it lacks, and its estimate. In BFWS(f₅) it is how many goals it
-//! lacks, and how much of a relaxed plan has been brought about on the way to it since that number
-//! last fell; that needs no estimate, but for a relaxed plan where the number falls.
+//! worth of a state is how many goals it lacks, and its estimate. In BFWS(f₅) it is how many goals
+//! it lacks, and how much of a relaxed plan has been brought about on the way to it since that
+//! number last fell; that needs no estimate, but for a relaxed plan where the number falls.
 
 use super::super::compile::Compiled;
 use super::super::formula::{Formula, Literal};
@@ -21,7 +21,7 @@ pub(super) struct Novelty {
     /// For each worth, a bit for each fact, then one for each pair.
     seen: Map<(u32, u32), Vec<u64>>,
     holding: Vec<usize>,
-    /// What relaxed plans bring about, of states in which a goal was reached.
+    /// The effects of relaxed plans, of states in which a goal was reached.
     relaxed_plans: Vec<Vec<Literal>>,
 }
 

@@ -25,7 +25,7 @@ pub(crate) struct Strategy {
     pub(crate) saves_consumables: bool,
     /// Whether the estimate counts what a relaxed plan uses up, and fills it up.
     pub(crate) replenishes: bool,
-    /// What is looked for.
+    /// The aim.
     pub(crate) aim: Aim,
 }
 
@@ -35,8 +35,8 @@ pub(crate) enum NoveltyOf {
     /// Of the states that are expanded, among those of as much of the goal and the same estimate
     /// (BFWS(f₂); Lipovetzky & Geffner, AAAI 2017).
     Expanded,
-    /// Of each successor, among those of as much of the goal and of a relaxed plan (BFWS(f₅)). States
-    /// are estimated only where they have one more goal.
+    /// Of each successor, among those of as much of the goal and of a relaxed plan (BFWS(f₅)).
+    /// States are estimated only where they have one more goal.
     Successors,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct File {
     pub(super) reports: Option<Spanned<Section>>,
 }
 
-/// Whatever can stand in one section; which of it may, depends on the section.
+/// All keys of one section; which are allowed depends on the section.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Section {

@@ -54,8 +54,8 @@ impl Past {
         false
     }
 
-    /// Whether the last entry stands in the journal: what it tells the world, the world was told, or may
-    /// have been.
+    /// Whether the last entry stands in the journal: what it tells the world, the world was told,
+    /// or may have been.
     pub(super) fn has_last(&self) -> bool {
         self.played.load(Ordering::SeqCst) <= self.lines.len()
     }

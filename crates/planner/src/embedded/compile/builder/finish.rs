@@ -1,5 +1,5 @@
-//! The compiled problem, once all actions are numbered: annotations, timed initials, and what follows
-//! from looking at all actions together.
+//! The compiled problem, once all actions are numbered: annotations, timed initials, and what
+//! follows from looking at all actions together.
 
 use elbowroom_model::ground::{self, Change as ModelChange, Condition};
 use elbowroom_model::reachability::Grounding;
@@ -146,8 +146,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Gives the happenings their annotations, and notes which timed initials must come after them, or
-    /// would break an over-all condition.
+    /// Gives the happenings their annotations, and notes which timed initials must come after them,
+    /// or would break an over-all condition.
     fn annotate(
         &mut self,
         annotations: &Annotations,

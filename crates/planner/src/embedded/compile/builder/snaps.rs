@@ -54,7 +54,7 @@ impl Builder<'_> {
         snap
     }
 
-    /// What a change does to the search's numbers, if it does anything.
+    /// The effect of a change on the search's numbers, if there is any.
     fn change(&mut self, change: &ModelChange) -> Option<Change> {
         match change {
             ModelChange::Add(fact) => self.symbols.known_fact(*fact).map(Change::Add),
@@ -77,7 +77,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What a change adds to what the metric sums up.
+    /// The addition of a change to the metric's sum.
     fn cost(&self, change: &ModelChange) -> Option<ground::Expression> {
         let ModelChange::Update {
             operator,

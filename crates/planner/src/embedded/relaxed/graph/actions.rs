@@ -152,7 +152,7 @@ impl Graph {
         gains
     }
 
-    /// Whatever is tested of the fluent may come about.
+    /// Adds every gain of the fluent that a test can ask for.
     pub(super) fn add_any_gain(&self, fluent: u32, gains: &mut Vec<(u32, Gain)>) {
         for &test in &self.tests_of_fluent[fluent as usize] {
             gains.retain(|(known, _)| *known != test);

@@ -84,7 +84,7 @@ impl Stays {
         stays
     }
 
-    /// What an action needs besides the facts themselves.
+    /// The needs of an action apart from its preconditions.
     pub(super) fn needs<'a>(
         &'a self,
         compiled: &'a Compiled,
@@ -95,7 +95,7 @@ impl Stays {
         facts.filter_map(move |fact| self.by_need.get(&(fact, least)).copied())
     }
 
-    /// What the start of an action makes true besides the facts themselves.
+    /// The additions of an action's start apart from its effects.
     pub(super) fn offers<'a>(
         &'a self,
         compiled: &Compiled,
