@@ -209,7 +209,8 @@ pub enum Refusal {
     },
     /// The ends of a parameter's interval do not decide what happens between them.
     #[error(
-        "parameter {name} is multiplied by itself, or by a time that it also bounds, or with several numbers of one condition; give it a value, or vary one of these only"
+        "parameter {name} is multiplied by itself, or by a time that it also bounds, or with \
+         several numbers of one condition; give it a value, or vary one of these only"
     )]
     Coupled {
         /// The parameter.

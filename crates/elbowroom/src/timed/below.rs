@@ -111,7 +111,10 @@ impl<'a> Below<'a> {
         }
         // Where more facts are never worse, nothing is worse than harm both before and after all
         // else.
-        let is_harm = |happening: &Happening| matches!(happening, Happening::Event(event) if world.events[*event].is_harmful());
+        let is_harm = |happening: &Happening| match happening {
+            Happening::Event(event) => world.events[*event].is_harmful(),
+            Happening::End(..) => false,
+        };
         let (harm, rest): (Vec<_>, Vec<_>) = happenings.iter().copied().partition(is_harm);
         if rest.len() > MOST_ORDERED {
             return None;
