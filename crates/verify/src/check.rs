@@ -95,7 +95,7 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
         }
     }
     certificate.reasons = reasons;
-    certificate.proves = claim::proves(&certificate).to_owned();
+    certificate.proves = String::from(claim::proves(&certificate));
     certificate.assumes = claim::assumes(&certificate);
     Ok(certificate)
 }

@@ -153,7 +153,7 @@ impl Reader<'_> {
                 Limit::Parameter(parameter) => {
                     *counts
                         .get_mut(*parameter)
-                        .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign
+                        .ok_or(Flaw::NoSuch("parameter", *parameter))? += sign;
                 }
             }
         }
