@@ -15,8 +15,8 @@ use super::{NotTabulated, Settings, Side, TimedOptimum, optimum};
 /// The values of all states on the grid of the bound from below, by which each move can be weighed.
 ///
 /// Whoever always makes the move of most worth at the boundaries of cells succeeds at least with
-/// the probability [`TimedOptimum::lower`], but for [`HASTE`] and for the ε that happenings are
-/// kept apart.
+/// the probability [`TimedOptimum::lower`], but for the ten-thousandth that it gives at most for
+/// being earlier, and for the ε that happenings are kept apart.
 #[derive(Debug)]
 pub struct Policy {
     world: TimedWorld,
