@@ -11,7 +11,8 @@ const elbowroom = path.resolve(process.argv[2]);
 const plans = ["delivery", "battery", "match", "paintshop", "tank"];
 const answers = {};
 for (const name of plans) {
-  const own = [...pddl(name), path.join(cases, name, "plan.plan")];
+  // Durations that the executor chooses have sliders where they are asked for.
+  const own = [...pddl(name), path.join(cases, name, "plan.plan"), "--vary", "durations"];
   const text = run("envelope", ...own, "--json");
   fs.writeFileSync(file(`${name}.json`), text);
   answers[name] = { own, page: page(`${name}.html`, file(`${name}.json`)), ...JSON.parse(text) };
