@@ -2,6 +2,7 @@
 
 use elbowroom_num::Rational;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use crate::certificate::{Certificate, Guarantee, Reasons};
 use crate::check::{Verified, verify};
@@ -15,6 +16,12 @@ pub enum AnswerError {
     /// It is no answer with a largest box.
     #[error("this is no answer of `elbowroom envelope --method best --json`: {0}")]
     Unreadable(#[from] serde_json::Error),
+    /// It is about no largest box.
+    #[error(
+        "the answer has no largest box: it was made by another method, nothing may deviate, or the \
+         plan does not work as planned"
+    )]
+    NoBox,
     /// It has no certificate.
     #[error(
         "the answer has no certificate: its search was ended before it was done, or some ends could \
@@ -26,11 +33,17 @@ pub enum AnswerError {
     Flaw(#[from] Flaw),
 }
 
-/// What is read of an answer; the rest is about something else.
+/// The part that all answers of `elbowroom envelope` have.
 #[derive(Deserialize)]
-struct Answer {
+struct AnyAnswer {
     #[allow(dead_code, reason = "read so that nothing else is taken for an answer")]
     format: Format,
+    best: Option<IgnoredAny>,
+}
+
+/// The part of an answer with a largest box that the certificate is about.
+#[derive(Deserialize)]
+struct Answer {
     settings: Settings,
     parameters: Vec<Room>,
     best: Best,
@@ -90,6 +103,8 @@ struct End {
 /// # Errors
 /// When the text is no such answer, or the first thing in it that is not so.
 pub fn verify_answer(text: &str) -> Result<Verified, AnswerError> {
+    let any: AnyAnswer = serde_json::from_str(text)?;
+    any.best.ok_or(AnswerError::NoBox)?;
     let answer: Answer = serde_json::from_str(text)?;
     let best = &answer.best;
     let certificate = best.certificate.as_ref();

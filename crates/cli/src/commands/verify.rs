@@ -23,8 +23,8 @@ pub(crate) fn run(arguments: &VerifyArgs, output: &mut Output) -> Answer {
             }
             Ok(Exit::Yes)
         }
-        Err(AnswerError::Unreadable(error)) => Err(Failure::new(
-            AnswerError::Unreadable(error),
+        Err(unsuitable @ (AnswerError::Unreadable(_) | AnswerError::NoBox)) => Err(Failure::new(
+            unsuitable,
             "`elbowroom envelope DOMAIN PROBLEM PLAN --method best --json` makes one",
         )),
         Err(wrong) => {

@@ -10,6 +10,7 @@ mod inequalities;
 mod limits;
 mod search;
 pub mod timeline;
+mod told;
 mod worth;
 
 use std::ops::ControlFlow;

@@ -93,11 +93,7 @@ impl Expansion for Above<'_> {
     }
 
     fn initial(&self) -> Vec<(f64, State)> {
-        let state = State {
-            facts: self.world.initial,
-            happened: 0,
-            running: Vec::new(),
-        };
+        let state = State::initial(self.world);
         vec![(1.0, state)]
     }
 

@@ -166,11 +166,7 @@ impl Expansion for Below<'_> {
     }
 
     fn initial(&self) -> Vec<(f64, State)> {
-        let state = State {
-            facts: self.world.initial,
-            happened: 0,
-            running: Vec::new(),
-        };
+        let state = State::initial(self.world);
         let mut states = vec![(1.0, state)];
         for (event, p) in self.chances.before.iter().enumerate() {
             if *p > 0.0 {

@@ -81,6 +81,15 @@ pub(super) trait Expansion {
 pub(super) type Hopes = IndexMap<(Facts, u64, u32), bool>;
 
 impl State {
+    /// The state before anything has been done, or has happened by itself.
+    pub(super) fn initial(world: &TimedWorld) -> Self {
+        Self {
+            facts: world.initial,
+            happened: 0,
+            running: Vec::new(),
+        }
+    }
+
     pub(super) fn under_way(&self) -> u64 {
         self.running
             .iter()

@@ -48,7 +48,12 @@ pub(super) fn search(
         (StopReason::Converged | StopReason::Cancelled, None) => Stop::Converged,
     };
     let (search_envelope, best) = match how.method {
-        Method::Best if search.envelope.is_ok() && stop == Stop::Converged => {
+        // Where nothing may deviate there is no box to be the largest.
+        Method::Best
+            if search.envelope.is_ok()
+                && stop == Stop::Converged
+                && !subject.plan.parameters.is_empty() =>
+        {
             let start = search.envelope.as_ref().ok();
             let (found, best, halt) = best(subject, &mut oracle, start, watcher)?;
             stop = halt.map_or(stop, Stop::from);

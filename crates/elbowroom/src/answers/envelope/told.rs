@@ -1,0 +1,186 @@
+//! The parts of an answer, from what the search and the explainer found.
+
+use elbowroom_envelope::Widening;
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{
+    DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan, Schedule, Side,
+    Valuation,
+};
+
+use super::Subject;
+use super::answer::{
+    Chosen, Counterexample, Happening, Makespans, MovedEnd, Quantity, QuantityKind, Range, Room,
+    Stop, Widened,
+};
+use crate::answers::{Exact, Halt};
+use crate::explain::{Explanation, Shortfall};
+use crate::makespan::earliest_end;
+
+impl From<Halt> for Stop {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::TimeLimit => Self::TimeLimit,
+            Halt::Cancelled => Self::Cancelled,
+        }
+    }
+}
+
+impl From<ParameterKind> for QuantityKind {
+    fn from(kind: ParameterKind) -> Self {
+        match kind {
+            ParameterKind::Duration(_) => Self::Duration,
+            ParameterKind::Constant(_) => Self::Constant,
+            ParameterKind::Domain => Self::Domain,
+            ParameterKind::Initial(_) => Self::Initial,
+            ParameterKind::Timed(_) => Self::Timed,
+            ParameterKind::Bound => Self::Bound,
+        }
+    }
+}
+
+impl Range {
+    /// The interval.
+    pub fn interval(&self) -> Interval {
+        Interval {
+            lower: self.lower.clone(),
+            upper: self.upper.clone(),
+        }
+    }
+}
+
+impl Widened {
+    pub(super) fn of(plan: &ParametrizedPlan, widening: &Widening<'_>, seconds: f64) -> Self {
+        let end = widening.end;
+        let moved = end
+            .side
+            .of(widening.envelope.interval(end.parameter))
+            .clone();
+        Self {
+            seconds,
+            checks: widening.checks,
+            parameter: plan.parameter(end.parameter).name.clone(),
+            end: match end.side {
+                Side::Lower => MovedEnd::Lower(moved),
+                Side::Upper => MovedEnd::Upper(moved),
+            },
+        }
+    }
+}
+
+impl Makespans {
+    pub(super) fn of(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
+        let at = |side: Side| {
+            let ends = envelope.intervals().iter();
+            let values: Option<Valuation> = ends.map(|i| side.of(i).value().cloned()).collect();
+            earliest_end(plan, &values?)
+        };
+        Some(Self {
+            nominal: earliest_end(plan, &plan.nominal())?,
+            at_lower: at(Side::Lower),
+            at_upper: at(Side::Upper),
+        })
+    }
+}
+
+impl Subject<'_> {
+    /// The parameters.
+    pub(super) fn quantities(&self) -> Vec<Quantity> {
+        let parameters = self.plan.parameters.iter().enumerate();
+        parameters
+            .map(|(index, parameter)| Quantity {
+                name: parameter.name.clone(),
+                quantity: self.explainer.quantity(ParameterId::from(index)),
+                kind: parameter.kind.into(),
+                action: match parameter.kind {
+                    ParameterKind::Duration(of) | ParameterKind::Constant(of) => {
+                        Some(self.plan.plan.instance(of).action.name.clone())
+                    }
+                    _ => None,
+                },
+                nominal: parameter.nominal.clone(),
+                weight: parameter.weight.clone(),
+            })
+            .collect()
+    }
+
+    /// The parameters, each with its interval in a box.
+    pub(super) fn ranges(&self, envelope: &DecoupledEnvelope) -> Vec<Range> {
+        let quantities = self.quantities().into_iter().zip(envelope.intervals());
+        quantities
+            .map(|(quantity, interval)| Range {
+                quantity,
+                lower: interval.lower.clone(),
+                upper: interval.upper.clone(),
+            })
+            .collect()
+    }
+
+    /// The durations that the executor chooses.
+    pub(super) fn chosen(&self) -> Vec<Chosen> {
+        let told = self.plan.told.iter();
+        told.map(|(id, duration)| {
+            let instance = self.plan.plan.instance(*id);
+            Chosen {
+                instance: instance.label.clone(),
+                action: instance.action.name.clone(),
+                duration: Exact(duration.clone()),
+            }
+        })
+        .collect()
+    }
+
+    /// The same with what limits it.
+    pub(super) fn rooms(
+        &self,
+        envelope: &DecoupledEnvelope,
+        limits: Vec<[Option<String>; 2]>,
+    ) -> Vec<Room> {
+        let ranges = self.ranges(envelope).into_iter().zip(limits);
+        ranges
+            .map(|(range, [lower_limit, upper_limit])| Room {
+                range,
+                lower_limit,
+                upper_limit,
+            })
+            .collect()
+    }
+
+    /// The example of an explanation.
+    pub(super) fn counterexample(&self, explanation: &Explanation) -> Counterexample {
+        let names = self.plan.parameters.iter().map(|p| p.name.clone());
+        let values = explanation.valuation.iter().cloned().map(Exact);
+        let shortfall = explanation.shortfall.as_ref();
+        let times = explanation.schedule.as_ref();
+        Counterexample {
+            message: explanation.reason.clone(),
+            shortfall: shortfall.and_then(Shortfall::value).cloned(),
+            verdict: explanation.verdict.clone(),
+            values: names.zip(values).collect(),
+            schedule: times.map_or_else(Vec::new, |times| self.happenings(times)),
+            plays: explanation.plays.clone(),
+        }
+    }
+
+    fn happenings(&self, times: &Schedule) -> Vec<Happening> {
+        let plan = &self.plan.plan;
+        let at = |node: NodeId| Exact(times[node].clone());
+        let mut happenings: Vec<Happening> = plan
+            .instances
+            .iter()
+            .map(|instance| Happening {
+                instance: instance.label.clone(),
+                action: instance.action.name.clone(),
+                start: Exact(Rational::ZERO),
+                end: None,
+            })
+            .collect();
+        for (node, what) in plan.nodes() {
+            match what {
+                Node::Start(of) | Node::Instant(of) => happenings[of.index()].start = at(node),
+                Node::End(of) => happenings[of.index()].end = Some(at(node)),
+                _ => {}
+            }
+        }
+        happenings
+    }
+}
