@@ -83,11 +83,20 @@ fn certificates_of_all_cases_are_accepted() {
                 for symmetric in [false, true] {
                     let outcome = largest(&task, &plan, guarantee, objective, symmetric);
                     let what = format!("{name}, {guarantee:?}, {objective:?}, {symmetric}");
-                    let EnvelopeFinding::Envelope { best, .. } = &outcome.answer.finding else {
+                    let finding = &outcome.answer.finding;
+                    let EnvelopeFinding::Envelope {
+                        best, parameters, ..
+                    } = finding
+                    else {
                         println!("{what}: no envelope");
                         continue;
                     };
-                    let best = best.as_ref().expect("a largest box");
+                    let Some(best) = best else {
+                        assert!(parameters.is_empty(), "{what}");
+                        let verdict = verify_answer(&written(&outcome));
+                        assert!(matches!(verdict, Err(AnswerError::NoBox)), "{what}");
+                        continue;
+                    };
                     match verify_answer(&written(&outcome)) {
                         Ok(verified) => {
                             assert_eq!(
@@ -312,7 +321,7 @@ fn of_published(
     let seconds = begun.elapsed().as_secs_f64();
     match verdict {
         Ok(verified) => Some((verified.assumed, seconds)),
-        Err(AnswerError::NoCertificate | AnswerError::Unreadable(_)) => None,
+        Err(AnswerError::NoCertificate | AnswerError::NoBox) => None,
         Err(wrong) => panic!("{}, {guarantee:?}, {objective:?}: {wrong}", instance.name),
     }
 }
