@@ -61,17 +61,24 @@ pub(crate) fn any_plan(task: &Task, path: &Path, output: &mut Output) -> Result<
     Ok(AnyPlan::TimeTriggered(plan))
 }
 
-/// Reads a plan with fixed times.
+/// The advice for who gives a network where a plan with fixed times is needed.
+pub(crate) const FIXED_TIMES: &str = "give a plan with fixed times; its network is made from it";
+
+/// Reads a plan with fixed times; the advice is for who gives a network.
 pub(crate) fn time_triggered(
     task: &Task,
     path: &Path,
+    advice: &str,
     output: &mut Output,
 ) -> Result<TimeTriggeredPlan, Failure> {
     match any_plan(task, path, output)? {
         AnyPlan::TimeTriggered(plan) => Ok(plan),
         AnyPlan::Stn(_) => Err(Failure::new(
-            format!("{} is an STN plan file", path.display()),
-            "give a plan with fixed times; its network is made from it",
+            format!(
+                "{} is an STN plan file, which stands for many plans",
+                path.display()
+            ),
+            advice,
         )),
     }
 }

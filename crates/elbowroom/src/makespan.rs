@@ -1,17 +1,37 @@
 //! How long a plan takes.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Node, ParametrizedPlan, Valuation};
-use elbowroom_stn::{ConsistentNetwork, NodeId};
+use elbowroom_plan::{Node, ParametrizedPlan, Valuation, network_node};
+use elbowroom_stn::{ConsistentNetwork, Constraint, Network, NodeId};
 
-/// The end time of the last action if everything starts as early as it can and the parameters have
-/// these values; `None` if the plan has no schedule then.
+/// The end time of the last action if everything starts as early as it can, the parameters have
+/// these values, and actions take as long as they are told to; `None` if the plan has no schedule
+/// then.
 pub fn earliest_end(plan: &ParametrizedPlan, valuation: &Valuation) -> Option<Rational> {
-    let network = ConsistentNetwork::try_from(plan.plan.network(valuation)).ok()?;
+    let network = as_told(plan, plan.plan.network(valuation))?;
     let schedule = network.earliest_schedule(NodeId(0));
     plan.plan
         .nodes()
         .filter(|(_, node)| !matches!(node, Node::Timed(_)))
         .map(|(id, _)| schedule.times()[id.index()].clone())
         .max()
+}
+
+/// The schedules of a plan in which the durations that the executor chooses are as planned, as it
+/// tells actions ([`ParametrizedPlan::told`]), or, if there is none, all; `None` if there is none
+/// at all.
+///
+/// A plan that works for other durations only is guaranteed in the weak sense at most.
+pub(crate) fn as_told(plan: &ParametrizedPlan, network: Network) -> Option<ConsistentNetwork> {
+    let mut told = network.clone();
+    for constraint in &plan.plan.constraints {
+        if let Some(duration) = plan.told_by(constraint) {
+            let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+            told.add(Constraint::at_least(from, to, duration.clone()));
+            told.add(Constraint::at_most(from, to, duration.clone()));
+        }
+    }
+    ConsistentNetwork::try_from(told)
+        .or_else(|_| ConsistentNetwork::try_from(network))
+        .ok()
 }

@@ -371,3 +371,28 @@ fn the_windows_of_a_timeline_are_all_that_the_corners_of_the_box_allow() {
         assert_eq!(said, (&known.0, &known.1), "{action:?}");
     }
 }
+
+/// Filling takes 15 in the plan, and draining 10, after a separation of 0.001. The domain leaves
+/// both to the executor.
+#[test]
+fn a_timeline_shows_durations_that_the_executor_chooses_as_it_tells_them() {
+    let (task, plan) = read("tank");
+    let outcome = asked(&EnvelopeRequest::new(&task, plan));
+    let EnvelopeFinding::Envelope {
+        timeline,
+        makespans,
+        ..
+    } = &outcome.answer.finding
+    else {
+        panic!("an envelope");
+    };
+    let ends: Vec<Rational> = timeline
+        .iter()
+        .flat_map(|timeline| &timeline.actions)
+        .filter_map(|action| Some(action.end.as_ref()?.0.clone()))
+        .collect();
+    let millis = |number: i64| Rational::from(number) / Rational::from(1000);
+    assert_eq!(ends, [millis(15_000), millis(25_001)]);
+    let makespans = makespans.as_ref().expect("a schedule");
+    assert_eq!(makespans.nominal, millis(25_001));
+}

@@ -18,6 +18,23 @@
 //! the envelope is not what a certificate proves: `elbowroom envelope --contains` checks that.
 //!
 //! This crate knows exact numbers, and nothing of planning, networks or search.
+//!
+//! Work of 10 seconds has to end while a light burns, for 5. How far may both deviate if nobody
+//! knows in advance how long they take? By 20 %, and the certificate has the cycle of bounds that
+//! would be negative if it were more.
+//!
+//! ```
+//! use elbowroom_verify::{AnswerError, verify_answer};
+//!
+//! let answer = include_str!("../examples/lamp.json");
+//! let verified = verify_answer(answer)?;
+//! assert_eq!(verified.value, verified.bound, "no box is better than this one");
+//! assert_eq!((verified.proofs, verified.assumed), (1, 0));
+//!
+//! let forged = answer.replace("2499/12500", "1/4");
+//! assert!(matches!(verify_answer(&forged), Err(AnswerError::Flaw(_))));
+//! # Ok::<(), AnswerError>(())
+//! ```
 
 mod answer;
 mod bounds;

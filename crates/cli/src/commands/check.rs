@@ -1,16 +1,14 @@
 //! `elbowroom check`: is the plan valid?
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use elbowroom::AnyPlan;
 use elbowroom::answers::RequestError;
 use elbowroom::answers::check::{
     CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PlanChecked, ProblemRead,
     check,
 };
+use elbowroom::model::Task;
 use elbowroom::model::validate::Settings;
-use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::text::{Record, Severity};
 
 use crate::args::{CheckArgs, DiagnosticsForm};
@@ -20,6 +18,10 @@ use crate::look::{BAD, FAINT, GOOD, Look, STRONG, styled};
 use crate::output::Output;
 use crate::words::counted;
 use crate::{input, number, output};
+
+/// The advice for who gives a network.
+const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
+                            fixed times";
 
 /// Only the tightest margins are shown to people; `--json` has all.
 const MARGINS_SHOWN: usize = 8;
@@ -55,7 +57,7 @@ fn line(finding: &Record) -> String {
 fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
     let plan = match &arguments.plan {
-        Some(path) => Some(plan(&task, path, output)?),
+        Some(path) => Some(input::time_triggered(&task, path, FOR_NETWORKS, output)?),
         None => None,
     };
     let name = arguments
@@ -90,21 +92,6 @@ fn judge(arguments: &CheckArgs, output: &mut Output) -> Answer {
         }) => Exit::No,
         _ => Exit::Yes,
     })
-}
-
-/// The plan, with fixed times.
-fn plan(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPlan, Failure> {
-    match input::any_plan(task, path, output)? {
-        AnyPlan::TimeTriggered(plan) => Ok(plan),
-        AnyPlan::Stn(_) => Err(Failure::new(
-            format!(
-                "{} is an STN plan file, which stands for many plans",
-                path.display()
-            ),
-            "`elbowroom envelope` says whether all of them work; `check` judges a plan with \
-             fixed times",
-        )),
-    }
 }
 
 fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {

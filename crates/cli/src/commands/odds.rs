@@ -21,7 +21,12 @@ pub(crate) fn run(arguments: &OddsArgs, output: &mut Output) -> Answer {
     let settings = settings(arguments)?;
     let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
     let plan = match &arguments.plan {
-        Some(path) => Some(input::time_triggered(&task, path, output)?),
+        Some(path) => Some(input::time_triggered(
+            &task,
+            path,
+            input::FIXED_TIMES,
+            output,
+        )?),
         None => None,
     };
     let text = input::source(&arguments.likelihoods, "likelihoods")?;

@@ -52,7 +52,12 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
     let (spec, world) = spec::of(arguments, domain, problem)?;
     let task = task(&spec, output)?;
     let first = match arguments.plan() {
-        Some(path) => Some(input::time_triggered(&task, path, output)?),
+        Some(path) => Some(input::time_triggered(
+            &task,
+            path,
+            input::FIXED_TIMES,
+            output,
+        )?),
         None => None,
     };
     // What is wrong with a file is told before anything is done.

@@ -2,9 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::Path;
 
-use elbowroom::AnyPlan;
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
 use elbowroom::model::validate::Settings;
 use elbowroom::model::{Task, TimeTriggeredPlan};
@@ -14,6 +12,9 @@ use crate::args::ValArgs;
 use crate::exit::{Answer, Exit, Failure};
 use crate::output::Output;
 use crate::{input, output};
+
+/// The advice for who gives a network.
+const FOR_NETWORKS: &str = "`elbowroom envelope` says whether all of them work";
 
 /// Digits after the point; times with so many are told apart by whoever reads them.
 const DIGITS: u32 = 6;
@@ -29,7 +30,7 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
     };
     let mut tally = Tally::default();
     for path in &arguments.plans {
-        let plan = match read(&task, path, output) {
+        let plan = match input::time_triggered(&task, path, FOR_NETWORKS, output) {
             Ok(plan) => plan,
             Err(failure) => {
                 output::print("Bad plan description!\n")?;
@@ -62,19 +63,6 @@ pub(crate) fn run(arguments: &ValArgs, output: &mut Output) -> Answer {
         (true, false) => Exit::No,
         (true, true) => Exit::Yes,
     })
-}
-
-fn read(task: &Task, path: &Path, output: &mut Output) -> Result<TimeTriggeredPlan, Failure> {
-    match input::any_plan(task, path, output)? {
-        AnyPlan::TimeTriggered(plan) => Ok(plan),
-        AnyPlan::Stn(_) => Err(Failure::new(
-            format!(
-                "{} is an STN plan file, which stands for many plans",
-                path.display()
-            ),
-            "`elbowroom envelope` says whether all of them work",
-        )),
-    }
 }
 
 /// The results of the plans so far.

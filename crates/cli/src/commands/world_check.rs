@@ -102,7 +102,7 @@ fn script(
         problem: problem.clone(),
     };
     let task = input::task(&files, &Rational::new(1, 1000), output)?;
-    let steps = input::time_triggered(&task, plan, output)?.steps;
+    let steps = input::time_triggered(&task, plan, input::FIXED_TIMES, output)?.steps;
     let actions = steps.into_iter().filter_map(|step| {
         let duration = step.duration?;
         Some((step.action.name, duration))

@@ -9,11 +9,12 @@ use elbowroom_plan::{
     Bound, DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan,
     network_node,
 };
-use elbowroom_stn::{ConsistentNetwork, Constraint, Network, Windows};
+use elbowroom_stn::{Constraint, Network, Windows};
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use crate::answers::Exact;
+use crate::makespan::as_told;
 
 /// The plan in time: what a chart of it shows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -77,9 +78,9 @@ impl Timeline {
     /// The times of a plan, in a box around its planned values; `None` if it has no schedule there.
     pub fn of(task: &Task, plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Option<Self> {
         let zero = network_node(NodeId::ZERO);
-        let nominal = ConsistentNetwork::try_from(plan.plan.network(&plan.nominal())).ok()?;
+        let nominal = as_told(plan, plan.plan.network(&plan.nominal()))?;
         let nominal = nominal.earliest_schedule(zero);
-        let windows = ConsistentNetwork::try_from(relaxed(plan, envelope)).ok()?;
+        let windows = as_told(plan, relaxed(plan, envelope))?;
         let times = Times {
             nominal: nominal.times(),
             windows: &windows.windows(zero),
