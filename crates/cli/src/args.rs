@@ -2,6 +2,7 @@
 
 mod compare;
 mod envelope;
+mod export;
 mod learn;
 mod network;
 mod number;
@@ -19,6 +20,7 @@ use elbowroom::num::Rational;
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use envelope::{EnvelopeArgs, Growth, Order, controllable};
+pub(crate) use export::{ExportArgs, ExportFormat};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};
@@ -108,6 +110,8 @@ pub(crate) enum Command {
     Odds(Box<OddsArgs>),
     /// Decide consistency and controllability of a temporal network
     Network(NetworkArgs),
+    /// Write a plan's network, or its envelope, for other programs to check
+    Export(Box<ExportArgs>),
     /// Check, without any search, that an answer's box is the largest
     Verify(VerifyArgs),
     /// Validate plans and answer in VAL's words, for editors and scripts that know VAL
@@ -135,7 +139,11 @@ impl Command {
             Self::Odds(arguments) => arguments.json,
             Self::Network(arguments) => arguments.json,
             Self::Verify(arguments) => arguments.json,
-            Self::Val(_) | Self::Report(_) | Self::Completions(_) | Self::Man(_) => false,
+            Self::Export(_)
+            | Self::Val(_)
+            | Self::Report(_)
+            | Self::Completions(_)
+            | Self::Man(_) => false,
         }
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod envelope;
+pub(crate) mod export;
 pub(crate) mod learn;
 pub(crate) mod network;
 pub(crate) mod odds;

@@ -51,6 +51,7 @@ pub fn run(line: Vec<OsString>) -> u8 {
         Command::Learn(arguments) => commands::learn::run(&arguments, &mut output),
         Command::Odds(arguments) => commands::odds::run(&arguments, &mut output),
         Command::Network(arguments) => commands::network::run(&arguments, &mut output),
+        Command::Export(arguments) => commands::export::run(&arguments, &mut output),
         Command::Verify(arguments) => commands::verify::run(&arguments, &mut output),
         Command::Val(arguments) => commands::val::run(&arguments, &mut output),
         Command::Report(arguments) => commands::report::run(&arguments),

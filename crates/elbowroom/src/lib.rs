@@ -126,6 +126,8 @@
 //! - [`answers`]: the questions of the command line as requests, with progress and cancelling.
 //! - [`flow`]: from a plan to its envelope in one call or step by step.
 //! - [`execute`](mod@execute): executes plans.
+//! - [`export`]: what other programs can check: a plan's network as an STNU, a box or the region as
+//!   SMT-LIB.
 //! - [`graph`]: networks as graphs for Graphviz.
 //! - [`timed`]: what the best of all executors could reach on a clock, and the policy that reaches
 //!   it.
@@ -160,8 +162,10 @@ pub mod answers;
 mod box_text;
 pub mod execute;
 mod explain;
+pub mod export;
 pub mod flow;
 pub mod graph;
+mod linear_form;
 mod makespan;
 pub mod network;
 mod plan_file;

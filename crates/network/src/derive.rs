@@ -1,7 +1,7 @@
 //! Other forms of a network, as networks of their own.
 
 use elbowroom_num::Rational;
-use elbowroom_stn::uncertain::{Dispatchable, UncertainNetwork};
+use elbowroom_stn::uncertain::{ContingentLink, Dispatchable, UncertainNetwork};
 use elbowroom_stn::{ConsistentNetwork, Constraint, NegativeCycle, Network};
 
 use crate::file::{Format, GivenWait, NetworkFile};
@@ -58,6 +58,47 @@ impl NetworkFile {
             delay: wait.delay.clone(),
         });
         self.with(network, waits.collect())
+    }
+
+    /// The network in whole numbers, as most programs want them, and how many of its units make one
+    /// of this network's. Links that can only take one time become requirements: most programs want
+    /// links with room between their bounds. `None` if a number becomes too large for that.
+    ///
+    /// How durations are distributed and waits are left out.
+    pub fn in_whole_numbers(&self) -> Option<(Self, Rational)> {
+        let whole = self.network.whole()?;
+        let factor = whole.unit.fraction(1).reciprocal()?;
+        let mut requirements = Network::with_nodes(self.points.len());
+        for constraint in whole.network.requirements().constraints() {
+            let bound = Rational::from(constraint.bound);
+            requirements.add(Constraint::at_most(constraint.from, constraint.to, bound));
+        }
+        let mut links = Vec::new();
+        for link in whole.network.links() {
+            let (begin, end, lower) = (link.activation, link.end, Rational::from(link.lower));
+            if link.upper == Some(link.lower) {
+                requirements.add(Constraint::at_most(begin, end, lower.clone()));
+                requirements.add(Constraint::at_least(begin, end, lower));
+                continue;
+            }
+            links.push(ContingentLink {
+                activation: begin,
+                end,
+                lower,
+                upper: link.upper.map(Rational::from),
+            });
+        }
+        let file = Self {
+            format: Format::Elbowroom,
+            durations: vec![None; links.len()],
+            network: UncertainNetwork::new(requirements, links)
+                .expect("the links are some of a network"),
+            correlations: Vec::new(),
+            waits: Vec::new(),
+            remarks: Vec::new(),
+            ..self.clone()
+        };
+        Some((file, factor))
     }
 
     /// The same points and links with other requirements.

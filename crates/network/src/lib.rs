@@ -3,8 +3,8 @@
 //! [`read`] takes the bytes of a file in any of them and answers with a [`NetworkFile`]: time
 //! points with names, requirements, contingent links, and how their durations are distributed.
 //! Numbers are exact. What cannot be read is refused with the place in the text and what to do
-//! ([`Diagnostics`]). [`write_json`] and [`write_graphml`] write networks so that [`read()`] reads
-//! them back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
+//! ([`Diagnostics`]). [`write_json`], [`write_graphml`] and [`write_plain`] write networks so that
+//! [`read()`] reads them back, [`NetworkFile::minimal`] and [`NetworkFile::dispatchable`] derive other forms, and
 //! [`weak()`] decides whether there is a schedule for whatever the world does.
 //!
 //! This crate looks at no files, no clock and no random numbers.
@@ -39,4 +39,4 @@ pub use file::{Correlation, Duration, Format, GivenWait, NetworkFile};
 pub use read::read;
 pub use weak::{Weak, weak};
 pub use words::number;
-pub use write::{write_graphml, write_json};
+pub use write::{write_graphml, write_json, write_plain};

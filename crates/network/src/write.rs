@@ -151,6 +151,43 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
+/// A network as sections of plain text (`# KIND OF NETWORK`). How durations are distributed and
+/// waits have no place there. `None` if a link has no upper bound, or a time point's name cannot
+/// stand there: it is empty, or has a space, a quote or `#` in it.
+pub fn write_plain(file: &NetworkFile) -> Option<String> {
+    let is_bad = |letter: char| letter.is_whitespace() || matches!(letter, '#' | '"' | '\'');
+    let mut points = file.points.iter();
+    if points.any(|point| point.is_empty() || point.contains(is_bad)) {
+        return None;
+    }
+    let name = |node| file.point(node);
+    let links = file.network.links().iter();
+    let links: Option<Vec<String>> = links
+        .map(|link| {
+            let (begin, end) = (name(link.activation), name(link.end));
+            let upper = link.upper.as_ref()?;
+            Some(format!("{begin} {} {upper} {end}\n", link.lower))
+        })
+        .collect();
+    let links = links?;
+    let edges = file.network.requirements().constraints().iter();
+    let edges: Vec<String> = edges
+        .map(|edge| format!("{} {} {}\n", name(edge.from), edge.bound, name(edge.to)))
+        .collect();
+    let kind = if file.is_certain() { "STN" } else { "STNU" };
+    Some(format!(
+        "# KIND OF NETWORK\n{kind}\n# Num Time-Points\n{}\n# Num Ordinary Edges\n{}\n\
+         # Num Contingent Links\n{}\n# Time-Point Names\n{}\n# Ordinary Edges\n{}\
+         # Contingent Links\n{}",
+        file.points.len(),
+        edges.len(),
+        links.len(),
+        file.points.join(" "),
+        edges.concat(),
+        links.concat()
+    ))
+}
+
 /// A network in GraphML as the CSTNU Tool reads it; that tool knows whole numbers only, so others
 /// are for us. How durations are distributed has no place there. `None` if a wait has no end but
 /// that of its link, which has no place there either.

@@ -75,7 +75,7 @@ fn exit(outcome: &EnvelopeOutcome) -> Exit {
     }
 }
 
-fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Failure> {
+pub(crate) fn specifications(texts: &[String]) -> Result<Vec<VarySpec>, Failure> {
     let specs = texts.iter().map(|text| text.parse::<VarySpec>());
     let specs: Result<_, _> = specs.collect();
     specs.map_err(|error| Failure::new(error, ""))

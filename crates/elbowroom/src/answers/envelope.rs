@@ -164,13 +164,7 @@ pub fn envelope(
     watcher: &mut dyn Watcher,
 ) -> Result<EnvelopeOutcome, RequestError> {
     let (plan, enforced) = match opened(request, watcher) {
-        Ok(plan) if request.enforce => {
-            let enforced = elbowroom_envelope::enforced(&request.task, &plan);
-            // Without a schedule there is nothing to keep to, which will be said with its reason.
-            let (plan, count) = enforced.unwrap_or((plan, 0));
-            (Arc::new(plan), count)
-        }
-        Ok(plan) => (Arc::new(plan), 0),
+        Ok((plan, enforced)) => (Arc::new(plan), enforced),
         Err(FlowError::Invalid(violation)) => {
             let violation = (&*violation).into();
             let failing = Failing::Invalid { violation };
@@ -250,22 +244,31 @@ pub fn so_far(
     outcome
 }
 
-/// The plan with what is left open.
-fn opened(
+/// The plan that a request is about, with what it leaves open, and how many bounds were added for
+/// the dispatcher to keep to.
+///
+/// # Errors
+/// When the judge rejects the plan, or the request names what the plan does not have.
+pub(crate) fn opened(
     request: &EnvelopeRequest,
     watcher: &mut dyn Watcher,
-) -> Result<ParametrizedPlan, FlowError> {
+) -> Result<(ParametrizedPlan, usize), FlowError> {
     let task = &request.task;
-    match &request.plan {
-        AnyPlan::Stn(plan) => Ok(flow::open_more(task, plan.clone(), &request.vary)?),
+    let plan = match &request.plan {
+        AnyPlan::Stn(plan) => flow::open_more(task, plan.clone(), &request.vary)?,
         AnyPlan::TimeTriggered(plan) => {
             let freed = flow::free(task, plan)?;
             if let Some(violation) = &freed.repaired {
                 watcher.notice(&Event::Repaired(violation));
             }
-            flow::open(task, freed, &request.vary)
+            flow::open(task, freed, &request.vary)?
         }
+    };
+    if !request.enforce {
+        return Ok((plan, 0));
     }
+    // Without a schedule there is nothing to keep to, which will be said with its reason.
+    Ok(elbowroom_envelope::enforced(task, &plan).unwrap_or((plan, 0)))
 }
 
 /// Whether a box lies inside the envelope.

@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use elbowroom_model::Task;
 use elbowroom_model::ground::Change;
-use elbowroom_num::{Interval, Rational};
+use elbowroom_num::Rational;
 use elbowroom_plan::{
-    Bound, DecoupledEnvelope, Node, NodeId, ParameterId, ParameterKind, ParametrizedPlan,
-    network_node,
+    DecoupledEnvelope, Node, NodeId, ParameterKind, ParametrizedPlan, network_node,
 };
-use elbowroom_stn::{Constraint, Network, Windows};
+use elbowroom_stn::Windows;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use crate::answers::Exact;
+use crate::linear_form::relaxed;
 use crate::makespan::as_told;
 
 /// The plan in time: what a chart of it shows.
@@ -158,40 +158,6 @@ pub fn types<'a>(
         }
     }
     types
-}
-
-/// The network with each parameter free within its interval.
-pub(super) fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
-    let mut network = Network::with_nodes(plan.plan.nodes.len());
-    let zero = network_node(NodeId::ZERO);
-    for (node, _) in plan.plan.nodes().skip(1) {
-        network.add(Constraint::at_least(
-            zero,
-            network_node(node),
-            Rational::ZERO,
-        ));
-    }
-    let interval = |id: ParameterId| -> &Interval { envelope.interval(id) };
-    for constraint in &plan.plan.constraints {
-        let (from, to) = (network_node(constraint.from), network_node(constraint.to));
-        let lower = match &constraint.lower {
-            Bound::Infinite => None,
-            Bound::Finite(value) => Some(value.clone()),
-            Bound::Parameter(id) => interval(*id).lower.value().cloned(),
-        };
-        let upper = match &constraint.upper {
-            Bound::Infinite => None,
-            Bound::Finite(value) => Some(value.clone()),
-            Bound::Parameter(id) => interval(*id).upper.value().cloned(),
-        };
-        if let Some(lower) = lower {
-            network.add(Constraint::at_least(from, to, lower));
-        }
-        if let Some(upper) = upper {
-            network.add(Constraint::at_most(from, to, upper));
-        }
-    }
-    network
 }
 
 /// Times by node.

@@ -1,0 +1,192 @@
+//! `elbowroom export`: what other programs can check.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::answers::{EnvelopeAnswer, EnvelopeRequest, Event, Halt, Watcher};
+use elbowroom::envelope::Guarantee;
+use elbowroom::export::{self, ExportError};
+use elbowroom::flow::FlowError;
+use elbowroom::model::Task;
+use elbowroom::network::{NetworkFile, write_graphml, write_json, write_plain};
+use elbowroom::parse_box;
+use elbowroom::plan::{DecoupledEnvelope, ParametrizedPlan};
+
+use crate::args::{self, ExportArgs, ExportFormat};
+use crate::commands::envelope::specifications;
+use crate::exit::{Answer, Exit, Failure};
+use crate::limits::push_wrapped;
+use crate::look::{BAD, HINT, Look, styled};
+use crate::output::Output;
+use crate::{input, output};
+
+/// Writes a network, a box check or a region.
+pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
+    if arguments.format == ExportFormat::Stnu {
+        refuse_what_networks_do_not_have(arguments)?;
+    }
+    let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
+    let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let mut vary = specifications(&arguments.vary)?;
+    vary.extend(specifications(&args::controllable(
+        &arguments.controllable,
+    ))?);
+    let request = EnvelopeRequest {
+        vary,
+        enforce: arguments.enforce,
+        ..EnvelopeRequest::new(&task, plan)
+    };
+    let plan = match export::opened(&request, &mut Repairs(&arguments.plan)) {
+        Ok(plan) => plan,
+        Err(FlowError::Invalid(violation)) => {
+            let file = arguments.plan.display();
+            let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
+            push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
+            output::tell(text.trim_end());
+            return Ok(Exit::No);
+        }
+        Err(error) => return Err(Failure::new(error, "")),
+    };
+    let asked = asked(arguments, &plan, &task)?;
+    let written = match (arguments.format, asked) {
+        (ExportFormat::Stnu, Some((envelope, _))) => {
+            let file = export::stnu(&task, &plan, &envelope);
+            Ok(network(arguments.output.as_deref(), &file.map_err(failure)?)?)
+        }
+        (ExportFormat::Stnu, None) => {
+            return Err(Failure::new(
+                "a network with uncertainty needs a box: what the world may do",
+                "give one with --contains BOX, or --envelope ANSWER.json",
+            ));
+        }
+        (ExportFormat::Smt2, Some((envelope, guarantee))) => {
+            export::box_check(&task, &plan, &envelope, guarantee)
+        }
+        (ExportFormat::Smt2, None) => export::region(&task, &plan),
+    };
+    let text = match written {
+        // That the box is not inside is an answer.
+        Err(error @ ExportError::NoSchedule) => {
+            output::tell(&format!("{}: {error}", styled(BAD, "outside")));
+            return Ok(Exit::No);
+        }
+        written => written.map_err(failure)?,
+    };
+    match &arguments.output {
+        Some(path) => output::write_file(path, &text)?,
+        None => output::print(&text)?,
+    }
+    Ok(Exit::Yes)
+}
+
+fn refuse_what_networks_do_not_have(arguments: &ExportArgs) -> Result<(), Failure> {
+    match arguments.guarantee {
+        None => Ok(()),
+        Some(_) => Err(Failure::new(
+            "--guarantee is about smt2: the network is the same for each guarantee",
+            "leave it out",
+        )),
+    }
+}
+
+/// The box and the guarantee asked about; `None` for the region.
+fn asked(
+    arguments: &ExportArgs,
+    plan: &ParametrizedPlan,
+    task: &Task,
+) -> Result<Option<(DecoupledEnvelope, Guarantee)>, Failure> {
+    let guarantee: Option<Guarantee> = arguments.guarantee.map(Into::into);
+    if let Some(text) = &arguments.contains {
+        let envelope = parse_box(text, plan);
+        let envelope = envelope.map_err(|error| Failure::new(format!("--contains: {error}"), ""))?;
+        return Ok(Some((envelope, guarantee.unwrap_or_default())));
+    }
+    let Some(path) = &arguments.envelope else {
+        return match guarantee {
+            None | Some(Guarantee::Weak) => Ok(None),
+            Some(_) => Err(Failure::new(
+                "the region is that of the weak guarantee; the others are about boxes",
+                "give a box with --contains BOX or --envelope ANSWER.json, or leave out --guarantee",
+            )),
+        };
+    };
+    let source = input::source(path, "answer")?;
+    let answer: EnvelopeAnswer = serde_json::from_str(source.text()).map_err(|error| {
+        Failure::new(
+            format!("this is no answer of `elbowroom envelope --json`: {error}"),
+            "`elbowroom envelope DOMAIN PROBLEM PLAN --json` prints one",
+        )
+    })?;
+    if answer.settings.epsilon != *task.epsilon() {
+        return Err(Failure::new(
+            format!(
+                "the answer is about an epsilon of {}, not {}",
+                answer.settings.epsilon,
+                task.epsilon()
+            ),
+            format!("say --epsilon {}", answer.settings.epsilon),
+        ));
+    }
+    let envelope = export::box_of(&answer, plan).map_err(failure)?;
+    Ok(Some((
+        envelope,
+        guarantee.unwrap_or(answer.settings.guarantee),
+    )))
+}
+
+/// The network in the format that the name of the file asks for.
+fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
+    let ending = path.and_then(Path::extension);
+    let has_ending = |wanted: &str| ending.is_some_and(|own| own.eq_ignore_ascii_case(wanted));
+    if has_ending("json") {
+        return Ok(write_json(file));
+    }
+    let to_json = "write to a file that ends in .json: nothing is lost there";
+    let Some((whole, factor)) = file.in_whole_numbers() else {
+        return Err(Failure::new(
+            "the numbers of this network become too large if they have to be whole",
+            to_json,
+        ));
+    };
+    if let Some(link) = whole.network.links().iter().find(|link| link.upper.is_none()) {
+        return Err(Failure::new(
+            format!(
+                "{} may come at any time after {}, for which there is no place in this format",
+                whole.point(link.end),
+                whole.point(link.activation)
+            ),
+            format!("give the interval an upper end, or {to_json}"),
+        ));
+    }
+    if factor != 1.into() {
+        output::tell(&format!(
+            "{}: in whole numbers; the unit of time is 1/{factor} of the plan's",
+            styled(HINT, "note")
+        ));
+    }
+    let text = if has_ending("txt") {
+        write_plain(&whole)
+    } else {
+        write_graphml(&whole)
+    };
+    text.ok_or_else(|| Failure::new("there is no place for this network in this format", to_json))
+}
+
+fn failure(error: ExportError) -> Failure {
+    Failure::new(error, "")
+}
+
+/// Tells of plans whose times are taken otherwise than they stand there.
+struct Repairs<'a>(&'a Path);
+
+impl Watcher for Repairs<'_> {
+    fn flow(&mut self) -> std::ops::ControlFlow<Halt> {
+        std::ops::ControlFlow::Continue(())
+    }
+
+    fn notice(&mut self, event: &Event<'_>) {
+        if let Event::Repaired(violation) = event {
+            input::tell_repair(self.0, violation);
+        }
+    }
+}

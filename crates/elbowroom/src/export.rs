@@ -1,0 +1,245 @@
+//! What other programs can check: a second witness for what is claimed here.
+//!
+//! - [`stnu`]: the network of a plan whose parameters lie in a box, as an STNU for any checker of
+//!   controllability.
+//! - [`box_check`]: whether a plan is guaranteed to work in a box, as SMT-LIB 2: each answer is
+//!   `unsat` exactly if it is.
+//! - [`region`]: all values for which a plan works, as SMT-LIB 2.
+//!
+//! Dynamic controllability is a game, which SMT-LIB has no words for: [`box_check`] then says only
+//! that every schedule is valid, and [`stnu`] has the other half.
+//!
+//! ```
+//! use std::sync::Arc;
+//!
+//! use elbowroom::answers::{EnvelopeRequest, Unwatched};
+//! use elbowroom::envelope::Guarantee;
+//! use elbowroom::export::{box_check, opened};
+//! use elbowroom::model::Task;
+//! use elbowroom::parse_box;
+//! use elbowroom::pddl::{self, Source};
+//!
+//! let domain = Source::new(
+//!     "post.pddl",
+//!     "(define (domain post)
+//!        (:requirements :durative-actions :timed-initial-literals)
+//!        (:predicates (open) (delivered))
+//!        (:durative-action deliver :parameters () :duration (= ?duration 10)
+//!          :condition (at end (open)) :effect (at end (delivered))))",
+//! );
+//! let problem = Source::new(
+//!     "letter.pddl",
+//!     "(define (problem letter) (:domain post)
+//!        (:init (open) (at 30 (not (open)))) (:goal (delivered)))",
+//! );
+//! let task = Arc::new(Task::new(pddl::read_problem(&domain, &problem)?.0));
+//! let (plan, _) = pddl::read_plan(&Source::new("plan", "0: (deliver) [10]"), &task)?;
+//! let plan = opened(&EnvelopeRequest::new(&task, plan), &mut Unwatched)?;
+//! let envelope = parse_box("dur_0=[5,28]", &plan)?;
+//! let text = box_check(&task, &plan, &envelope, Guarantee::Weak)?;
+//! assert_eq!(text.matches("(check-sat)").count(), 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod names;
+mod smt;
+mod write;
+
+use elbowroom_envelope::Guarantee;
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_model::Task;
+use elbowroom_network::{Format, NetworkFile};
+use elbowroom_plan::{
+    BoxEnd, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, network_node,
+};
+
+use crate::answers::envelope::{self, EnvelopeFinding, Range};
+use crate::answers::{EnvelopeAnswer, EnvelopeRequest, Watcher};
+use crate::flow::FlowError;
+use crate::linear_form::LinearForm;
+
+/// How many places of a moment inside an action are told apart.
+const MOST_PLACES: usize = 4_096;
+
+/// What is asked for cannot be written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// Nothing can be said about schedules that are not there.
+    #[error(
+        "the plan has no schedule at the values of this box that are nearest to the nominal ones, \
+         so the box is not inside the envelope, and there are no conditions to write"
+    )]
+    NoSchedule,
+    /// The plan is beyond writing out.
+    #[error("this plan is beyond what can be written: {0}")]
+    Refused(Refusal),
+    /// A bound has to hold for values without limit.
+    #[error(
+        "a bound of the plan has to hold whatever the value of {parameter} is, and that has no \
+         limit: give its interval an end"
+    )]
+    Unlimited {
+        /// The parameter's name.
+        parameter: String,
+    },
+    /// The box in an answer is one of other parameters.
+    #[error(
+        "the answer is about other parameters than this plan has ({}): give the same domain, \
+         problem, plan and --vary as for the answer",
+        difference
+    )]
+    OtherParameters {
+        /// What differs.
+        difference: String,
+    },
+    /// The answer has no box.
+    #[error("the answer has no box: the plan fails, or the search had found nothing yet")]
+    NoBox,
+}
+
+/// The plan that a request is about, with what it leaves open.
+///
+/// # Errors
+/// When the judge rejects the plan, or the request names what the plan does not have.
+pub fn opened(
+    request: &EnvelopeRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<ParametrizedPlan, FlowError> {
+    Ok(envelope::opened(request, watcher)?.0)
+}
+
+/// The box that an answer is about: the envelope that was found, or the box that was asked about.
+///
+/// # Errors
+/// When the answer has no box, or one of other parameters.
+pub fn box_of(
+    answer: &EnvelopeAnswer,
+    plan: &ParametrizedPlan,
+) -> Result<DecoupledEnvelope, ExportError> {
+    let ranges: Vec<&Range> = match &answer.finding {
+        EnvelopeFinding::Envelope { parameters, .. } => {
+            parameters.iter().map(|room| &room.range).collect()
+        }
+        EnvelopeFinding::Inside { parameters } | EnvelopeFinding::Outside { parameters, .. } => {
+            parameters.iter().collect()
+        }
+        EnvelopeFinding::Fails(_) | EnvelopeFinding::None { .. } => {
+            return Err(ExportError::NoBox);
+        }
+    };
+    let differs = |difference: String| Err(ExportError::OtherParameters { difference });
+    if ranges.len() != plan.parameters.len() {
+        return differs(format!("{}, not {}", ranges.len(), plan.parameters.len()));
+    }
+    for (range, parameter) in ranges.iter().zip(&plan.parameters) {
+        let (theirs, ours) = (&range.quantity, parameter);
+        if theirs.name != ours.name {
+            return differs(format!("{}, not {}", theirs.name, ours.name));
+        }
+        if theirs.nominal != ours.nominal {
+            let (name, theirs, ours) = (&ours.name, &theirs.nominal, &ours.nominal);
+            return differs(format!("{name} is {theirs} as planned, not {ours}"));
+        }
+    }
+    let intervals = ranges.iter().map(|range| elbowroom_num::Interval {
+        lower: range.lower.clone(),
+        upper: range.upper.clone(),
+    });
+    DecoupledEnvelope::new(plan, intervals.collect()).ok_or(ExportError::NoBox)
+}
+
+/// The network of a plan for whoever relies on a box: what the world decides there are contingent
+/// links, what is never observed holds at its worst. It is the network that the dynamic and the
+/// strong guarantee are about. Time zero is called `Z`.
+///
+/// # Errors
+/// When a bound has to hold for values without limit.
+pub fn stnu(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+) -> Result<NetworkFile, ExportError> {
+    let network = plan.uncertain_network(envelope);
+    let network = network.map_err(|impossible| unlimited(plan, envelope, impossible.0))?;
+    Ok(NetworkFile {
+        format: Format::Elbowroom,
+        name: task.problem().name.clone(),
+        points: names::points(&plan.plan),
+        reference: Some(network_node(NodeId::ZERO)),
+        durations: vec![None; network.network.links().len()],
+        network: network.network,
+        correlations: Vec::new(),
+        waits: Vec::new(),
+        remarks: Vec::new(),
+    })
+}
+
+/// Whether the plan is guaranteed to work in a box, as SMT-LIB 2, with comments. It asks several
+/// questions, each after a `(reset)`; all are answered `unsat` exactly if the box is inside. With
+/// the dynamic guarantee, that is only so if the network of [`stnu`] is dynamically controllable,
+/// too.
+///
+/// # Errors
+/// When the plan has no schedule at the values nearest to the nominal ones, or is beyond writing
+/// out.
+pub fn box_check(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+    guarantee: Guarantee,
+) -> Result<String, ExportError> {
+    let around = envelope.nearest(&plan.nominal());
+    let form = LinearForm::new(task, plan, envelope, &around, MOST_PLACES).map_err(refused)?;
+    let text = smt::Text::new(task, plan, &form);
+    let mut written = text.box_heading(envelope, guarantee);
+    text.conditions(envelope, &mut written);
+    match guarantee {
+        Guarantee::Weak => text.schedules(envelope, &mut written),
+        Guarantee::Strong => {
+            let network = plan.uncertain_network(envelope);
+            let network = network.map_err(|impossible| unlimited(plan, envelope, impossible.0))?;
+            text.fixed_times(&network.network, &mut written);
+        }
+        _ => {}
+    }
+    Ok(written)
+}
+
+/// All values for which the plan has a schedule, and every schedule is valid, as SMT-LIB 2, with
+/// comments: the region of the weak guarantee, as far as happenings keep the order that they have
+/// at the nominal values.
+///
+/// # Errors
+/// When the plan has no schedule at its nominal values, or is beyond writing out.
+pub fn region(task: &Task, plan: &ParametrizedPlan) -> Result<String, ExportError> {
+    let ranges = DecoupledEnvelope::ranges(plan);
+    let form = LinearForm::new(task, plan, &ranges, &plan.nominal(), MOST_PLACES);
+    let form = form.map_err(refused)?;
+    Ok(smt::Text::new(task, plan, &form).region(&ranges))
+}
+
+fn refused(refusal: Refusal) -> ExportError {
+    match refusal {
+        Refusal::NoNominalSchedule => ExportError::NoSchedule,
+        refusal => ExportError::Refused(refusal),
+    }
+}
+
+/// The parameter without a limit in a constraint that has to hold whatever its value.
+fn unlimited(
+    plan: &ParametrizedPlan,
+    envelope: &DecoupledEnvelope,
+    constraint: usize,
+) -> ExportError {
+    let constraint = &plan.plan.constraints[constraint];
+    let ids = [&constraint.lower, &constraint.upper].map(elbowroom_plan::Bound::parameter);
+    let is_unlimited = |id: &ParameterId| {
+        BoxEnd::all(plan.parameters.len())
+            .any(|end| end.parameter == *id && end.reach(envelope).is_none())
+    };
+    let id = ids.into_iter().flatten().find(is_unlimited);
+    ExportError::Unlimited {
+        parameter: id.map_or_else(String::new, |id| plan.parameter(id).name.clone()),
+    }
+}

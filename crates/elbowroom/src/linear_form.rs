@@ -1,0 +1,280 @@
+//! What every schedule of a plan has to satisfy, as linear inequalities without anything left to
+//! unfold: what pages and other programs are given to check values by.
+
+use std::collections::BTreeMap;
+
+use elbowroom_envelope::linear::Linear;
+use elbowroom_envelope::obligations::{
+    BadCase, Difference, Inequality, Obligation, Obligations, OverAll, Refusal, Requirement,
+};
+use elbowroom_envelope::reduction::Reduction;
+use elbowroom_model::Task;
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::{
+    Bound, Constraint, DecoupledEnvelope, NodeId, ParameterId, ParametrizedPlan, Side, Valuation,
+    network_node,
+};
+use elbowroom_stn::{ConsistentNetwork, Network, Windows};
+
+/// A plan's network and requirements, for values in a box.
+///
+/// The plan works with values of the box exactly if the network has a schedule and no bad case
+/// holds in any of its schedules.
+#[derive(Clone, Debug)]
+pub(crate) struct LinearForm {
+    /// The bounds on differences of times. That nothing happens before time zero is one of them.
+    pub(crate) network: Vec<NetworkBound>,
+    /// The requirements, with all their bad cases. These may use a moment inside an action: the
+    /// node after the plan's last.
+    pub(crate) obligations: Vec<Obligation>,
+}
+
+/// A bound on a difference of times.
+#[derive(Clone, Debug)]
+pub(crate) struct NetworkBound {
+    /// Holds in every schedule.
+    pub(crate) inequality: Inequality,
+    /// The plan's constraint that it comes from, by position, and which of its sides; `None` if it
+    /// only says that a node comes at 0 or later.
+    pub(crate) source: Option<(usize, Side)>,
+}
+
+impl LinearForm {
+    /// That of a plan for the values in `values`, in which happenings come in the order that they
+    /// have at `around`. Of the places that a moment inside an action can have among events, up to
+    /// `most_places` are told apart.
+    ///
+    /// # Errors
+    /// When there is no schedule at `around`, or the plan is beyond writing out.
+    pub(crate) fn new(
+        task: &Task,
+        plan: &ParametrizedPlan,
+        values: &DecoupledEnvelope,
+        around: &Valuation,
+        most_places: usize,
+    ) -> Result<Self, Refusal> {
+        let zero = network_node(NodeId::ZERO);
+        let schedule = ConsistentNetwork::try_from(plan.plan.network(around));
+        let schedule = schedule.map_err(|_| Refusal::NoNominalSchedule)?;
+        let schedule = schedule.earliest_schedule(zero);
+        let schedule = schedule.times().iter().cloned().collect();
+        let reduction = Reduction::new(plan);
+        let compiled = Obligations::compile(task, plan, &schedule, &reduction.substitution)?;
+        let order = Order::of(plan, values, &compiled.over_all)?;
+        let mut obligations = compiled.direct;
+        for over_all in &compiled.over_all {
+            obligations.push(Obligation {
+                requirement: Requirement::OverAll {
+                    instance: over_all.instance,
+                    condition: over_all.condition.clone(),
+                },
+                bad_cases: unfolded(task, plan, over_all, &order, most_places)?,
+            });
+        }
+        Ok(Self {
+            network: bounds(plan),
+            obligations,
+        })
+    }
+}
+
+/// A difference of times as an inequality.
+pub(crate) fn inequality(difference: &Difference) -> Inequality {
+    let mut expression = Linear::difference(difference.from, difference.to);
+    expression.constant = -&difference.bound;
+    Inequality {
+        expression,
+        is_strict: difference.is_strict,
+    }
+}
+
+/// The plan's own bounds.
+fn bounds(plan: &ParametrizedPlan) -> Vec<NetworkBound> {
+    let nodes = plan.plan.nodes().skip(1);
+    let mut bounds: Vec<NetworkBound> = nodes
+        .map(|(node, _)| NetworkBound {
+            inequality: inequality(&Difference::not_after(NodeId::ZERO, node)),
+            source: None,
+        })
+        .collect();
+    for (index, constraint) in plan.plan.constraints.iter().enumerate() {
+        for side in Side::BOTH {
+            bounds.extend(bound(constraint, side).map(|expression| NetworkBound {
+                inequality: Inequality {
+                    expression,
+                    is_strict: false,
+                },
+                source: Some((index, side)),
+            }));
+        }
+    }
+    bounds
+}
+
+/// One side of a constraint, as what is not above zero; `None` if there is no bound on that side.
+fn bound(constraint: &Constraint, side: Side) -> Option<Linear> {
+    let (bound, from, to) = match side {
+        Side::Lower => (&constraint.lower, constraint.to, constraint.from),
+        Side::Upper => (&constraint.upper, constraint.from, constraint.to),
+    };
+    let sign = match side {
+        Side::Lower => Rational::ONE,
+        Side::Upper => Rational::from(-1),
+    };
+    let mut expression = Linear::difference(from, to);
+    match bound {
+        Bound::Infinite => return None,
+        Bound::Finite(value) => expression.add_scaled(&Linear::constant(value.clone()), &sign),
+        Bound::Parameter(id) => expression.add_scaled(&Linear::parameter(*id), &sign),
+    }
+    Some(expression)
+}
+
+/// The ways in which an over-all condition can be broken, for each place that its moment can have
+/// among the events that it depends on.
+fn unfolded(
+    task: &Task,
+    plan: &ParametrizedPlan,
+    over_all: &OverAll,
+    order: &Order,
+    most_places: usize,
+) -> Result<Vec<BadCase>, Refusal> {
+    let mut cuts = Vec::new();
+    if !order.cuts(over_all, most_places, &mut Vec::new(), &mut cuts) {
+        return Err(Refusal::TooManyCases {
+            place: plan.plan.instance(over_all.instance).action.name.clone(),
+            limit: most_places,
+        });
+    }
+    let mut cases = Vec::new();
+    for happened in cuts {
+        let moment = over_all.moment;
+        let mut differences = vec![
+            Difference::before(over_all.start, moment),
+            Difference::before(moment, over_all.end),
+        ];
+        let events = over_all.events.iter().zip(&happened);
+        differences.extend(events.map(|(&event, &has_happened)| {
+            if has_happened {
+                Difference::not_after(event, moment)
+            } else {
+                Difference::before(moment, event)
+            }
+        }));
+        let cut = |node: NodeId| {
+            let position = over_all.events.iter().position(|event| *event == node);
+            position.is_some_and(|position| happened[position])
+        };
+        for mut inequalities in over_all.cases(task, &plan.plan, &cut)? {
+            inequalities.extend(over_all.assumptions.iter().cloned());
+            cases.push(BadCase {
+                differences: differences.clone(),
+                inequalities,
+            });
+        }
+    }
+    Ok(cases)
+}
+
+/// Which events come first whatever the values.
+struct Order(BTreeMap<NodeId, Windows>);
+
+impl Order {
+    fn of(
+        plan: &ParametrizedPlan,
+        values: &DecoupledEnvelope,
+        over_all: &[OverAll],
+    ) -> Result<Self, Refusal> {
+        if over_all.is_empty() {
+            return Ok(Self(BTreeMap::new()));
+        }
+        let network = ConsistentNetwork::try_from(relaxed(plan, values));
+        let network = network.map_err(|_| Refusal::NoNominalSchedule)?;
+        let mut windows = BTreeMap::new();
+        for own in over_all {
+            for &node in own.events.iter().chain([&own.start, &own.end]) {
+                let seen_from = || network.windows(network_node(node));
+                windows.entry(node).or_insert_with(seen_from);
+            }
+        }
+        Ok(Self(windows))
+    }
+
+    fn is_never_after(&self, first: NodeId, second: NodeId) -> bool {
+        let seen_from = self.0.get(&second);
+        let latest = seen_from.and_then(|windows| windows[network_node(first)].latest.as_ref());
+        latest.is_some_and(|latest| *latest <= Rational::ZERO)
+    }
+
+    /// Which of the events can have happened at a moment inside the action, in all ways; whether
+    /// these are no more than `most`.
+    fn cuts(
+        &self,
+        over_all: &OverAll,
+        most: usize,
+        happened: &mut Vec<bool>,
+        found: &mut Vec<Vec<bool>>,
+    ) -> bool {
+        let Some(&event) = over_all.events.get(happened.len()) else {
+            found.push(happened.clone());
+            return found.len() <= most;
+        };
+        let placed = over_all.events.iter().zip(happened.iter());
+        let mut can_be = [
+            !self.is_never_after(event, over_all.start),
+            !self.is_never_after(over_all.end, event),
+        ];
+        for (&other, &has_happened) in placed {
+            if has_happened {
+                can_be[0] &= !self.is_never_after(event, other);
+            } else {
+                can_be[1] &= !self.is_never_after(other, event);
+            }
+        }
+        for has_happened in [false, true] {
+            if can_be[usize::from(has_happened)] {
+                happened.push(has_happened);
+                let is_complete = self.cuts(over_all, most, happened, found);
+                happened.pop();
+                if !is_complete {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
+
+/// The network with each parameter free within its interval.
+pub(crate) fn relaxed(plan: &ParametrizedPlan, envelope: &DecoupledEnvelope) -> Network {
+    let mut network = Network::with_nodes(plan.plan.nodes.len());
+    let zero = network_node(NodeId::ZERO);
+    for (node, _) in plan.plan.nodes().skip(1) {
+        network.add(elbowroom_stn::Constraint::at_least(
+            zero,
+            network_node(node),
+            Rational::ZERO,
+        ));
+    }
+    let interval = |id: ParameterId| -> &Interval { envelope.interval(id) };
+    for constraint in &plan.plan.constraints {
+        let (from, to) = (network_node(constraint.from), network_node(constraint.to));
+        let lower = match &constraint.lower {
+            Bound::Infinite => None,
+            Bound::Finite(value) => Some(value.clone()),
+            Bound::Parameter(id) => interval(*id).lower.value().cloned(),
+        };
+        let upper = match &constraint.upper {
+            Bound::Infinite => None,
+            Bound::Finite(value) => Some(value.clone()),
+            Bound::Parameter(id) => interval(*id).upper.value().cloned(),
+        };
+        if let Some(lower) = lower {
+            network.add(elbowroom_stn::Constraint::at_least(from, to, lower));
+        }
+        if let Some(upper) = upper {
+            network.add(elbowroom_stn::Constraint::at_most(from, to, upper));
+        }
+    }
+    network
+}
