@@ -109,7 +109,11 @@ fn is_controllable(file: &NetworkFile) -> bool {
     let json = write_json(file);
     let (whole, _) = file.in_whole_numbers().expect("small numbers");
     // Links without an upper bound have no place in the other formats.
-    let is_bounded = whole.network.links().iter().all(|link| link.upper.is_some());
+    let is_bounded = whole
+        .network
+        .links()
+        .iter()
+        .all(|link| link.upper.is_some());
     let texts = [
         Some(("network.json", json)),
         is_bounded.then(|| ("network.stnu", write_graphml(&whole).expect("no waits"))),
@@ -126,7 +130,10 @@ fn is_controllable(file: &NetworkFile) -> bool {
             == Verdict::Yes
     });
     let verdicts: Vec<bool> = verdicts.collect();
-    assert!(verdicts.iter().all(|own| *own == verdicts[0]), "{verdicts:?}");
+    assert!(
+        verdicts.iter().all(|own| *own == verdicts[0]),
+        "{verdicts:?}"
+    );
     verdicts[0]
 }
 
@@ -280,10 +287,9 @@ fn the_region_has_a_point_exactly_if_the_plan_works_there() {
             let point = draw::valuation(&around, &mut random);
             let values = DecoupledEnvelope::point(&point);
             let ours = oracle.objection(&values).expect("within reach").is_none();
-            let names = text.lines().filter_map(|line| {
-                line.strip_prefix("(declare-const ")?
-                    .strip_suffix(" Real)")
-            });
+            let names = text
+                .lines()
+                .filter_map(|line| line.strip_prefix("(declare-const ")?.strip_suffix(" Real)"));
             let fixed = names.zip(&point).map(|(name, value)| {
                 let [numerator, denominator] = match value.to_string().split_once('/') {
                     Some((above, below)) => [above.to_owned(), below.to_owned()],

@@ -51,7 +51,10 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
     let written = match (arguments.format, asked) {
         (ExportFormat::Stnu, Some((envelope, _))) => {
             let file = export::stnu(&task, &plan, &envelope);
-            Ok(network(arguments.output.as_deref(), &file.map_err(failure)?)?)
+            Ok(network(
+                arguments.output.as_deref(),
+                &file.map_err(failure)?,
+            )?)
         }
         (ExportFormat::Stnu, None) => {
             return Err(Failure::new(
@@ -98,7 +101,8 @@ fn asked(
     let guarantee: Option<Guarantee> = arguments.guarantee.map(Into::into);
     if let Some(text) = &arguments.contains {
         let envelope = parse_box(text, plan);
-        let envelope = envelope.map_err(|error| Failure::new(format!("--contains: {error}"), ""))?;
+        let envelope =
+            envelope.map_err(|error| Failure::new(format!("--contains: {error}"), ""))?;
         return Ok(Some((envelope, guarantee.unwrap_or_default())));
     }
     let Some(path) = &arguments.envelope else {
@@ -148,7 +152,12 @@ fn network(path: Option<&Path>, file: &NetworkFile) -> Result<String, Failure> {
             to_json,
         ));
     };
-    if let Some(link) = whole.network.links().iter().find(|link| link.upper.is_none()) {
+    if let Some(link) = whole
+        .network
+        .links()
+        .iter()
+        .find(|link| link.upper.is_none())
+    {
         return Err(Failure::new(
             format!(
                 "{} may come at any time after {}, for which there is no place in this format",

@@ -82,8 +82,7 @@ impl<'a> Text<'a> {
     }
 
     fn words(&self, parameter: usize) -> String {
-        self.plan
-            .describe(self.task, ParameterId::from(parameter))
+        self.plan.describe(self.task, ParameterId::from(parameter))
     }
 
     /// The question whether some schedule is not valid.
@@ -124,11 +123,7 @@ impl<'a> Text<'a> {
         text.push_str("(set-logic LRA)\n");
         self.declare_parameters(text);
         self.assert_box(envelope, text);
-        let _ = writeln!(
-            text,
-            "(assert (not {}))\n(check-sat)",
-            self.has_schedule()
-        );
+        let _ = writeln!(text, "(assert (not {}))\n(check-sat)", self.has_schedule());
     }
 
     /// The question whether no fixed times do for all that the world can decide.
@@ -140,7 +135,8 @@ impl<'a> Text<'a> {
         );
         text.push_str("(set-logic LRA)\n");
         let links = network.links();
-        let delay = |link: usize| format!("d_{}", &self.symbols.times[links[link].end.index()][2..]);
+        let delay =
+            |link: usize| format!("d_{}", &self.symbols.times[links[link].end.index()][2..]);
         let time = |node: NodeId| {
             let own = |node: NodeId| match node.index() {
                 0 => "0.0".to_owned(),
@@ -246,7 +242,11 @@ impl<'a> Text<'a> {
             ];
             for (end, name, is_lower) in ends {
                 let Some(value) = end.value() else { continue };
-                let sign = if matches!(end, End::Open(_)) { "<" } else { "<=" };
+                let sign = if matches!(end, End::Open(_)) {
+                    "<"
+                } else {
+                    "<="
+                };
                 let value = number(value);
                 let (left, right) = if is_lower {
                     (&value, name)
@@ -305,10 +305,7 @@ fn quantified(quantifier: &str, names: Vec<String>, term: &str) -> String {
     if names.is_empty() {
         return term.to_owned();
     }
-    let names: Vec<String> = names
-        .iter()
-        .map(|name| format!("({name} Real)"))
-        .collect();
+    let names: Vec<String> = names.iter().map(|name| format!("({name} Real)")).collect();
     format!("({quantifier} ({})\n{term})", names.join(" "))
 }
 
