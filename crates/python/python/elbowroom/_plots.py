@@ -39,7 +39,10 @@ def _lanes(ax: Axes, labels: list[str], unit: str) -> Axes:
 
 
 def gantt(plan: Plan, envelope: Envelope | None, ax: Axes | None) -> Axes:
-    """A lane for each action; in the band its end may lie, if it starts when planned."""
+    """A lane for each action; in the band its end may lie, if it starts when planned.
+
+    A band that leads beyond three times the makespan is cut there, and says so.
+    """
     ax = axes(ax, len(plan.steps))
     rooms: dict[str, list[Any]] = {}
     for room in envelope.rows() if envelope is not None else ():
@@ -50,9 +53,12 @@ def gantt(plan: Plan, envelope: Envelope | None, ax: Axes | None) -> Axes:
         start, duration = float(step.start), float(step.duration or 0)
         if rooms.get(step.action):
             room = rooms[step.action].pop(0)
-            lower = float(room.lower)
-            upper = min(float(room.upper), 1.5 * last)
-            ax.barh(lane, upper - lower, left=start + lower, height=0.8, color=_BAND)
+            earliest, latest = start + float(room.lower), start + float(room.upper)
+            end = min(latest, 3 * last)
+            ax.barh(lane, end - earliest, left=earliest, height=0.8, color=_BAND)
+            if end < latest:
+                words = "no limit" if latest == math.inf else f"to {latest:g}"
+                ax.annotate(words, (end, lane), ha="right", va="center", fontsize=8)
         ax.barh(lane, duration or last / 200, left=start, height=0.4, color=_BAR)
     return _lanes(ax, [step.action for step in plan.steps], "time")
 
