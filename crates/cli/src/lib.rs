@@ -18,6 +18,7 @@ mod look;
 mod number;
 mod output;
 mod progress;
+mod serve;
 mod stopwatch;
 mod table;
 mod words;

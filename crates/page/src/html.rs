@@ -16,12 +16,45 @@ const SCRIPTS: &[&str] = &[
     include_str!("script/plots.js"),
     include_str!("script/points.js"),
     include_str!("script/sliders.js"),
+    include_str!("script/live.js"),
     include_str!("script/page.js"),
 ];
 
 /// The page as a file that needs nothing else.
 pub(crate) fn html(document: &Document) -> String {
+    filled(document, &FILE)
+}
+
+/// The page of a run that goes on, for the server that knows more of it.
+pub(crate) fn live(document: &Document) -> String {
+    filled(document, &LIVE)
+}
+
+/// The places in which a page that is a file differs from one that is served.
+struct Kind {
+    live: &'static str,
+    reach: &'static str,
+    foot: &'static str,
+}
+
+const FILE: Kind = Kind {
+    live: "",
+    reach: "",
+    foot: "Made by Elbowroom. This page is one file, and loads nothing.",
+};
+
+const LIVE: Kind = Kind {
+    live: " data-live",
+    reach: "; connect-src 'self'",
+    foot: "Served by Elbowroom while it runs the plan. <code>elbowroom report</code> makes a page that \
+           stays from the run's trace.",
+};
+
+fn filled(document: &Document, kind: &Kind) -> String {
     let parts = [
+        ("{live}", kind.live.to_owned()),
+        ("{reach}", kind.reach.to_owned()),
+        ("{foot}", kind.foot.to_owned()),
         ("{title}", as_text(&document.title)),
         ("{verdict}", as_text(&document.verdict.words)),
         ("{style}", STYLE.to_owned()),

@@ -96,6 +96,43 @@ pub fn page(name: &str, text: &str) -> Result<String, PageError> {
     Ok(html::html(&document(name, text)?))
 }
 
+/// The page about a run that goes on, from its trace so far. It follows the run by what its server
+/// tells: `events` is a stream of events, `change` whenever there is more and `over` with the
+/// document of the whole run; `document` is [`live_document`] as JSON. With `#token=…` in its
+/// address, it can also ask the server to `stop` the run.
+///
+/// # Errors
+/// When the text is no trace of a run, or damaged.
+pub fn live_page(name: &str, text: &str) -> Result<String, PageError> {
+    Ok(html::live(&live_document(name, text)?))
+}
+
+/// What the page about a run that goes on shows.
+///
+/// # Errors
+/// When the text is no trace of a run, or damaged.
+pub fn live_document(name: &str, text: &str) -> Result<Document, PageError> {
+    match format(text).as_deref() {
+        Some(TRACE) => of_trace(name, text, run::Record::Growing),
+        _ => Err(PageError::NoRun(name.to_owned())),
+    }
+}
+
+const TRACE: &str = "elbowroom-trace";
+
+fn of_trace(name: &str, text: &str, record: run::Record) -> Result<Document, PageError> {
+    let stored = Stored::read(text).map_err(|error| damaged(name, &error))?;
+    let spec: RunSpec = stored.header().map_err(|error| damaged(name, &error))?;
+    Ok(run::trace(name, &stored, &spec, record))
+}
+
+fn damaged(name: &str, error: &impl ToString) -> PageError {
+    PageError::Damaged {
+        name: name.to_owned(),
+        why: error.to_string(),
+    }
+}
+
 /// The run of a stored trace in the format of Perfetto, <https://ui.perfetto.dev>.
 ///
 /// # Errors
@@ -119,30 +156,20 @@ pub fn mcap(name: &str, text: &str) -> Result<Vec<u8>, PageError> {
 /// # Errors
 /// As [`page`].
 pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
-    let damaged = |why: String| PageError::Damaged {
-        name: name.to_owned(),
-        why,
-    };
     match format(text).as_deref() {
-        Some("elbowroom-trace") => {
-            let stored = Stored::read(text).map_err(|error| damaged(error.to_string()))?;
-            let spec: RunSpec = stored
-                .header()
-                .map_err(|error| damaged(error.to_string()))?;
-            Ok(run::trace(name, &stored, &spec))
-        }
+        Some(TRACE) => of_trace(name, text, run::Record::Ended),
         Some("elbowroom-envelope") => {
             read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it))
         }
         Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::found(&it)),
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
         Some("elbowroom-results") => {
-            let results = Results::read(text).map_err(|error| damaged(error.to_string()))?;
+            let results = Results::read(text).map_err(|error| damaged(name, &error))?;
             Ok(experiment::timed(&results))
         }
         Some("elbowroom-perturbed-results") => {
             let results = PerturbedResults::read(text);
-            let results = results.map_err(|error| damaged(error.to_string()))?;
+            let results = results.map_err(|error| damaged(name, &error))?;
             Ok(experiment::untimed(&results))
         }
         Some(format) => Err(PageError::OtherFormat {
@@ -167,8 +194,5 @@ fn format(text: &str) -> Option<String> {
 }
 
 fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, PageError> {
-    serde_json::from_str(text).map_err(|error| PageError::Damaged {
-        name: name.to_owned(),
-        why: error.to_string(),
-    })
+    serde_json::from_str(text).map_err(|error| damaged(name, &error))
 }

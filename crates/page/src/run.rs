@@ -25,11 +25,20 @@ use crate::run::bars::Bars;
 use crate::run::guarantee::Guarantees;
 use crate::run::log::Log;
 
-/// The page about a stored run.
+/// The state of a record whose run is not over in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Record {
+    /// It ends there.
+    Ended,
+    /// It grows while the run goes on.
+    Growing,
+}
+
+/// The page about a run.
 ///
 /// The problem is read for types of objects, deadlines and the values of numbers; if it cannot be,
 /// the page does without them.
-pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec) -> Document {
+pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record) -> Document {
     let mut texts = Texts::default();
     let task = task(spec).map(Arc::new);
     let mut belief = task.as_ref().map(|task| Belief::new(task, &mut texts));
@@ -100,10 +109,13 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec) -> Document {
             Some(report) => verdict(report),
             None => Verdict {
                 tone: Tone::Plain,
-                words: format!(
-                    "The trace ends at {} before the run was over.",
-                    nearest(&now)
-                ),
+                words: match record {
+                    Record::Ended => format!(
+                        "The trace ends at {} before the run was over.",
+                        nearest(&now)
+                    ),
+                    Record::Growing => format!("The run goes on; it is at {}.", nearest(&now)),
+                },
             },
         },
         facts,

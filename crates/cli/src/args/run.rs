@@ -8,10 +8,12 @@ use elbowroom::num::Rational;
 use super::envelope::{Guarantee, controllable};
 use super::number::{count, factor, positive, whole};
 use super::plan::EMBEDDED;
+use crate::serve::Address;
 
 #[derive(Args, Debug)]
 #[command(after_long_help = executors_help())]
 #[command(group(ArgGroup::new("programs").args(["world_process", "resume"])))]
+#[command(group(ArgGroup::new("clocks").args(["realtime", "world_process", "resume"]).multiple(true)))]
 pub(crate) struct RunArgs {
     /// The domain, in PDDL
     #[arg(value_name = "DOMAIN", required_unless_present_any = ["replay", "resume"])]
@@ -124,6 +126,18 @@ pub(crate) struct RunArgs {
         conflicts_with = "trace"
     )]
     pub(crate) journal: Option<PathBuf>,
+    /// Show the page of `elbowroom report` while the run goes on, at this port or HOST:PORT of this
+    /// machine; without one, at a free port. Only for this machine unless HOST says otherwise
+    #[arg(long, value_name = "ADDRESS", value_parser = Address::read, num_args = 0..=1)]
+    #[arg(
+        default_missing_value = "0",
+        require_equals = true,
+        requires = "clocks"
+    )]
+    pub(crate) serve: Option<Address>,
+    /// Let those who know the token in this file stop the run on that page
+    #[arg(long, value_name = "FILE", requires = "serve")]
+    pub(crate) control: Option<PathBuf>,
     /// Go on with the run of a journal, whose program has died: the world is asked what became of
     /// what was under way; all other options are taken from the journal
     #[arg(long, value_name = "FILE", conflicts_with_all = IN_THE_TRACE, conflicts_with = "replay")]

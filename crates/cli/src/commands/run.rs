@@ -6,6 +6,7 @@ mod process;
 mod realtime;
 mod replay;
 mod resume;
+mod shown;
 mod spec;
 mod text;
 mod trace_file;
@@ -82,11 +83,13 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return job.journaled(path, command, arguments, output);
     }
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
+    let board = shown::serve(arguments, &spec, &task, &interrupt)?;
     let outcome = {
         let mut sink = |line: &str| file.write(line);
         let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
         let written = writer.header(&spec);
         written.map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
+        let mut writer = shown::Shown::new(&mut writer, &task, board.as_ref());
         let mut writer = live::Live::new(&mut writer);
         let job = Job {
             spec: &spec,
@@ -109,6 +112,9 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
             None => job.simulated(&mut writer).map_err(contradiction)?,
         }
     };
+    if let Some(board) = board {
+        board.close();
+    }
     let trouble = file.close();
     let shown = show(arguments, &outcome, output);
     // The run has been what it was, whatever became of its record.
@@ -199,6 +205,7 @@ impl Job<'_> {
         };
         let kept = Kept::default();
         let interrupt = self.interrupt;
+        let board = shown::serve(arguments, self.spec, self.task, interrupt)?;
         let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
         let mut world = Careful {
             inner: world,
@@ -206,11 +213,12 @@ impl Job<'_> {
             refused: Vec::new(),
         };
         let outcome = {
-            let mut writer = JournalWriter {
+            let writer = JournalWriter {
                 task: Arc::clone(self.task),
                 file: &mut file,
                 kept: kept.clone(),
             };
+            let mut writer = shown::Shown::new(writer, self.task, board.as_ref());
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
                 .recorded_by(live::Live::new(&mut writer));
@@ -221,6 +229,9 @@ impl Job<'_> {
             execute(request, &mut world, &mut watch)
         };
         world.inner.stop();
+        if let Some(board) = board {
+            board.close();
+        }
         let outcome = outcome.map_err(contradiction)?;
         conclude(arguments, &outcome, file.trouble().as_deref(), output)
     }

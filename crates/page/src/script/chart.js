@@ -1,6 +1,7 @@
 // A chart that scrolls, zooms, and is walked through with the arrow keys.
 
-function chartView(chart, textOf, onPick) {
+// `life` ends when the chart is replaced by another.
+function chartView(chart, textOf, onPick, life) {
   const svg = shape("svg", { "aria-hidden": "true" });
   const sizer = element("div", {}, svg);
   const scroll = element("div", {
@@ -146,19 +147,22 @@ function chartView(chart, textOf, onPick) {
   }
   svg.addEventListener("pointermove", under);
   svg.addEventListener("click", under);
-  new ResizeObserver(repaint).observe(scroll);
-  addEventListener("beforeprint", () => { isPrinted = true; paint(); });
-  addEventListener("afterprint", () => { isPrinted = false; paint(); });
+  const resized = new ResizeObserver(repaint);
+  resized.observe(scroll);
+  life.addEventListener("abort", () => resized.disconnect());
+  addEventListener("beforeprint", () => { isPrinted = true; paint(); }, { signal: life });
+  addEventListener("afterprint", () => { isPrinted = false; paint(); }, { signal: life });
 
   const choose = (name, options, chosen, onChoose) => {
     const select = element("select", { onchange: () => onChoose(Number(select.value)) },
       ...options.map(([value, text]) => element("option", { value, selected: value === chosen }, text)));
     return element("label", {}, name, select);
   };
+  const lanes = choose("Lanes", chart.groupings.map((it, index) => [index, it.name]), grouping, (value) => { grouping = value; relayout(); });
   const relayout = () => { layout = packed(chart.bars, chart.groupings, grouping, plan, spread); pick(-1, false); paint(); };
   const spreading = element("input", { type: "checkbox", checked: spread, onchange: () => { spread = spreading.checked; relayout(); } });
   const controls = element("div", { class: "controls" },
-    choose("Lanes", chart.groupings.map((it, index) => [index, it.name]), grouping, (value) => { grouping = value; relayout(); }),
+    lanes,
     chart.plans.length
       ? choose("Plan", [[-1, "all"], ...chart.plans.map((name, index) => [index, name])], plan, (value) => { plan = value; relayout(); })
       : null,
@@ -181,7 +185,16 @@ function chartView(chart, textOf, onPick) {
 
   describe();
   const node = element("section", {}, element("h2", {}, chart.heading), controls, legend(chart), scroll, panel, marksList(chart), guaranteeTable(chart));
-  return { node, pick: (index) => pick(index, true), paint, move, cursor: (time) => { cursor = time; repaint(); } };
+  const chosen = () => ({ grouping, spread, zoom, left: scroll.scrollLeft, top: scroll.scrollTop, bar: current, name: chart.bars[current]?.name });
+  const restore = (before) => {
+    if (chart.groupings[before.grouping]) grouping = lanes.querySelector("select").value = before.grouping;
+    spreading.checked = spread = before.spread;
+    zoom = before.zoom;
+    relayout();
+    [scroll.scrollLeft, scroll.scrollTop] = [before.left, before.top];
+    if (before.bar >= 0 && chart.bars[before.bar]?.name === before.name) pick(before.bar, false);
+  };
+  return { node, pick: (index) => pick(index, true), paint, move, cursor: (time) => { cursor = time; repaint(); }, chosen, choose: restore };
 }
 
 // What the shapes mean; only those that occur.
@@ -197,7 +210,7 @@ function legend(chart) {
     outcome("succeeded", "done"),
     outcome("failed", "failed (crossed)"),
     outcome("cancelled", "cancelled"),
-    outcome("running", "not over when the record ends"),
+    outcome("running", "live" in document.documentElement.dataset ? "under way" : "not over when the record ends"),
     outcome("not-started", "planned, not started"),
     has((bar) => bar.starts) ? entry("may start", ...whisker("starts")) : null,
     has((bar) => bar.ends) ? entry("may end", ...whisker("ends")) : null,

@@ -1,43 +1,67 @@
-// Puts the page together.
+// Puts the page together, and again whenever there is more to show of a run that goes on.
 
-const data = JSON.parse(document.getElementById("data").textContent);
+let data = JSON.parse(document.getElementById("data").textContent);
 const textOf = (text) => (typeof text === "number" ? data.texts[text] : text);
 const main = document.getElementById("main");
-document.getElementById("verdict").classList.add(data.verdict.tone);
-document.querySelector("header").append(element("dl", { class: "facts" },
-  ...data.facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, words(value))))));
+const facts = element("dl", { class: "facts" });
+document.querySelector("header").append(facts);
+let views = [], life = null;
 
-let firstChart = null;
-const tables = [], moving = [], charts = [];
-for (const section of data.sections) {
-  if (section.type === "chart") {
-    const isFirst = firstChart === null;
-    const view = chartView(section, textOf, (bar) => { if (isFirst) for (const table of tables) table.pick?.(bar); });
-    main.append(view.node);
-    charts.push(view);
-    if (isFirst) firstChart = { view, section };
-    if (section.is_run) moving.push(view.cursor);
-  } else if (section.type === "table") {
-    const view = tableView(section, textOf, (bar) => firstChart?.view.pick(bar));
-    tables.push(view);
-    main.append(view.node);
-    if (view.at) moving.push(view.at);
-  } else if (section.type === "rates") {
-    main.append(ratesView(section));
-  } else if (section.type === "series") {
-    const view = seriesView(section);
-    main.append(view.node);
-    moving.push(view.at);
-  } else if (section.type === "sliders") {
-    main.append(slidersView(section, textOf, (spans) => firstChart?.view.move(spans)).node);
-  } else {
-    main.append(proseView(section));
+function show() {
+  // What the reader has chosen stays.
+  const kept = new Map(views.map(([heading, view]) => [heading, view.chosen?.()]));
+  life?.abort();
+  life = new AbortController();
+  views = [];
+  const parts = [];
+  document.title = data.title;
+  document.getElementById("title").textContent = data.title;
+  const verdict = document.getElementById("verdict");
+  verdict.className = `verdict ${data.verdict.tone}`;
+  verdict.textContent = data.verdict.words;
+  facts.replaceChildren(...data.facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, words(value)))));
+
+  let firstChart = null;
+  const tables = [], moving = [], charts = [];
+  const add = (heading, view) => {
+    parts.push(view.node);
+    views.push([heading, view]);
+    return view;
+  };
+  for (const section of data.sections) {
+    if (section.type === "chart") {
+      const isFirst = firstChart === null;
+      const view = add(section.heading, chartView(section, textOf, (bar) => { if (isFirst) for (const table of tables) table.pick?.(bar); }, life.signal));
+      charts.push(view);
+      if (isFirst) firstChart = { view, section };
+      if (section.is_run) moving.push(view.cursor);
+      if (isFirst && section.is_run && section.decisions.length) {
+        const scrub = add("scrub", scrubView(section, textOf, (time, isMoved) => { for (const move of moving) move(time, isMoved); }));
+        firstChart.scrub = scrub;
+      }
+    } else if (section.type === "table") {
+      const view = add(section.heading, tableView(section, textOf, (bar) => firstChart?.view.pick(bar)));
+      tables.push(view);
+      if (view.at) moving.push(view.at);
+    } else if (section.type === "rates") {
+      parts.push(ratesView(section));
+    } else if (section.type === "series") {
+      const view = add(section.heading, seriesView(section));
+      moving.push(view.at);
+    } else if (section.type === "sliders") {
+      parts.push(slidersView(section, textOf, (spans) => firstChart?.view.move(spans)).node);
+    } else {
+      parts.push(proseView(section));
+    }
   }
+  main.replaceChildren(...parts);
+  for (const [heading, view] of views) if (kept.get(heading)) view.choose(kept.get(heading));
+  firstChart?.scrub?.show();
+  for (const chart of charts) chart.paint();
 }
-if (firstChart?.section.is_run && firstChart.section.decisions.length) {
-  const scrub = scrubView(firstChart.section, textOf, (time, isMoved) => { for (const move of moving) move(time, isMoved); });
-  firstChart.view.node.after(scrub.node);
-  scrub.show();
+
+show();
+if ("live" in document.documentElement.dataset) {
+  facts.before(liveView((newer) => { data = newer; show(); }));
 }
-for (const chart of charts) chart.paint();
 document.documentElement.dataset.ready = "true";

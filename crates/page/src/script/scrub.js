@@ -73,5 +73,8 @@ function scrubView(chart, textOf, onTime) {
         element("button", { type: "button", onclick: () => go(1) }, "later")),
       slider),
     now);
-  return { node, show: () => show(last, false) };
+  // A reader who is at the end stays there when there is more.
+  const chosen = () => (Number(slider.value) < last ? { time: Number(slider.value) } : null);
+  const choose = (before) => { slider.value = before.time; };
+  return { node, show: () => show(Number(slider.value), false), chosen, choose };
 }

@@ -92,5 +92,12 @@ function tableView(table, textOf, onBar) {
     for (const row of body.querySelectorAll("tr.picked")) row.classList.remove("picked");
     body.querySelector(`tr[data-bar="${bar}"]`)?.classList.add("picked");
   }
-  return { node, at: table.times.length ? at : null, pick: table.bars.length ? pick : null };
+  const chosen = () => ({ query: search.value, offset, limit });
+  const choose = (before) => {
+    search.value = before.query;
+    query = before.query.toLowerCase();
+    ({ offset, limit } = before);
+    fill();
+  };
+  return { node, chosen, choose, at: table.times.length ? at : null, pick: table.bars.length ? pick : null };
 }

@@ -32,15 +32,17 @@ let browser;
 const tests = [];
 const test = (name, body) => tests.push([name, body]);
 
-// A tab in which nothing goes wrong unseen, and which reaches nothing.
+// A tab in which nothing goes wrong unseen, and which reaches nothing but the server that its page is from, if it is from one.
 async function open(name, options = {}, hash = "") {
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, offline: true, ...options });
   const tab = await context.newPage();
   tab.wrong = [];
   tab.on("pageerror", (error) => tab.wrong.push(String(error)));
   tab.on("console", (message) => { if (message.type() === "error") tab.wrong.push(message.text()); });
-  tab.on("request", (request) => { if (!/^(file|blob|about):/.test(request.url())) tab.wrong.push(`asks for ${request.url()}`); });
-  await tab.goto(pathToFileURL(name).href + hash);
+  const address = /^http:/.test(name) ? name : pathToFileURL(name).href;
+  const isOwn = (url) => /^(file|blob|about):/.test(url) || (address === name && url.startsWith(name));
+  tab.on("request", (request) => { if (!isOwn(request.url())) tab.wrong.push(`asks for ${request.url()}`); });
+  await tab.goto(address + hash);
   await tab.waitForFunction(() => document.documentElement.dataset.ready === "true", null, { timeout: 120_000 });
   return tab;
 }

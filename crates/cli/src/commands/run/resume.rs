@@ -24,6 +24,7 @@ use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
 
 use super::journaled::{Careful, JournalWriter, Kept};
 use super::process::{Manners, ProcessWorld};
+use super::shown::{self, Shown};
 use super::spec::contradiction;
 use crate::args::RunArgs;
 use crate::clock::Clock;
@@ -114,6 +115,7 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
     let interrupt = Interrupt::listen();
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
+    let board = shown::serve(arguments, &spec, &task, &interrupt)?;
     let outcome = {
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -132,15 +134,19 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
                 past: ReplayPlanner::new(&stored),
                 present: planner,
             })
-            .recorded_by(PastRecorder {
-                past: Arc::clone(&past),
-                task: Arc::clone(&task),
-                writer: JournalWriter {
+            .recorded_by(Shown::new(
+                PastRecorder {
+                    past: Arc::clone(&past),
                     task: Arc::clone(&task),
-                    file: &mut file,
-                    kept: kept.clone(),
+                    writer: JournalWriter {
+                        task: Arc::clone(&task),
+                        file: &mut file,
+                        kept: kept.clone(),
+                    },
                 },
-            });
+                &task,
+                board.as_ref(),
+            ));
         let mut world = Careful {
             inner: PastWorld {
                 replay: ReplayWorld::new(&stored, &task),
@@ -170,6 +176,9 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
         let outcome = execute(request, &mut world, &mut watch);
         if let Some(world) = world.inner.present {
             world.stop();
+        }
+        if let Some(board) = board {
+            board.close();
         }
         outcome.map_err(contradiction)?
     };

@@ -1,0 +1,363 @@
+//! The page of a run while it runs: a server for browsers.
+//!
+//! The run hands over its trace line by line ([`Board`]) and never waits: pages are made, and sent,
+//! by threads of the server, each of which serves one client.
+
+use std::fmt;
+use std::io::{self, Read as _, Write};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs as _};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use tiny_http::{Header, Method, Request, Response, Server};
+
+use crate::exit::Failure;
+use crate::interrupt::Interrupt;
+use crate::output;
+use crate::words::plain;
+
+/// The limit on clients that are served at once; others are asked to come back.
+const MOST_CLIENTS: usize = 64;
+
+/// How often a client that hears nothing new is told so, in order to notice that it has gone.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+
+/// How long clients have to fetch the end of the run.
+const FAREWELL: Duration = Duration::from_secs(2);
+
+/// The least length of a token, in bytes.
+const LEAST_TOKEN: usize = 16;
+
+/// The name of the trace on its page.
+const NAME: &str = "the run";
+
+/// The trace of a run so far.
+#[derive(Clone, Default)]
+pub(crate) struct Board(Arc<Shared>);
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+    /// The document of so many lines.
+    document: Mutex<Option<(usize, Arc<str>)>>,
+    clients: AtomicUsize,
+}
+
+#[derive(Default)]
+struct State {
+    trace: String,
+    lines: usize,
+    is_over: bool,
+    /// Clients that wait for news.
+    listeners: usize,
+}
+
+impl Board {
+    /// Adds a line of the trace, with its line feed.
+    pub(crate) fn add(&self, line: &str) {
+        let mut state = self.lock();
+        state.trace.push_str(line);
+        state.lines += 1;
+        drop(state);
+        self.0.changed.notify_all();
+    }
+
+    /// Says that the run is over, and waits a little for clients that fetch how it ended.
+    pub(crate) fn close(&self) {
+        let mut state = self.lock();
+        state.is_over = true;
+        self.0.changed.notify_all();
+        let waits = |state: &mut State| state.listeners > 0;
+        state = self
+            .0
+            .changed
+            .wait_timeout_while(state, FAREWELL, waits)
+            .unwrap_or_else(PoisonError::into_inner)
+            .0;
+        drop(state);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // A thread that failed while it held the lock has left whole lines.
+        let state = self.0.state.lock();
+        state.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the page shows now, as JSON; made once for all clients.
+    fn document(&self) -> Result<Arc<str>, String> {
+        let cached = self.0.document.lock();
+        let mut cached = cached.unwrap_or_else(PoisonError::into_inner);
+        let (lines, trace) = {
+            let state = self.lock();
+            if let Some((lines, document)) = &*cached
+                && *lines == state.lines
+            {
+                return Ok(Arc::clone(document));
+            }
+            (state.lines, state.trace.clone())
+        };
+        let document =
+            elbowroom_page::live_document(NAME, &trace).map_err(|error| error.to_string())?;
+        let text = serde_json::to_string(&document).map_err(|error| error.to_string())?;
+        let text: Arc<str> = text.into();
+        *cached = Some((lines, Arc::clone(&text)));
+        Ok(text)
+    }
+}
+
+/// The right to stop the run.
+pub(crate) struct Control {
+    token: String,
+    interrupt: Interrupt,
+}
+
+impl Control {
+    /// Whoever knows the token in this file may stop the run.
+    pub(crate) fn read(path: &Path, interrupt: Interrupt) -> Result<Self, Failure> {
+        let name = path.display();
+        let mut text = String::new();
+        std::fs::File::open(path)
+            .and_then(|file| file.take(4096).read_to_string(&mut text))
+            .map_err(|error| {
+                Failure::new(
+                    format!("cannot read the token in {name}: {}", plain(&error)),
+                    "`--control` names a file with a token in it",
+                )
+            })?;
+        let token = text.trim().to_owned();
+        let is_safe = token.bytes().all(|byte| byte.is_ascii_graphic());
+        if token.len() < LEAST_TOKEN || !is_safe {
+            return Err(Failure::new(
+                format!(
+                    "the token in {name} is not one word of {LEAST_TOKEN} or more printable ASCII characters"
+                ),
+                "make one, for example with `openssl rand -hex 16`",
+            ));
+        }
+        Ok(Self { token, interrupt })
+    }
+
+    /// Compares all bytes, so that the time it takes does not tell how many are right.
+    fn allows(&self, request: &Request) -> bool {
+        let expected = format!("Bearer {}", self.token);
+        let headers = request.headers().iter();
+        let mut given = headers.filter(|header| header.field.equiv("Authorization"));
+        given.next().is_some_and(|header| {
+            let given = header.value.as_str().as_bytes();
+            let pairs = given.iter().zip(expected.as_bytes());
+            let differences = pairs.fold(0, |differences, (a, b)| differences | (a ^ b));
+            given.len() == expected.len() && differences == 0
+        })
+    }
+}
+
+/// An address that the page is served at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Address(SocketAddr);
+
+impl Address {
+    /// Reads `PORT`, `HOST:PORT` or `HOST`; without a host, the page is for this machine only.
+    pub(crate) fn read(text: &str) -> Result<Self, String> {
+        let local = IpAddr::from([127, 0, 0, 1]);
+        if let Ok(port) = text.parse() {
+            return Ok(Self(SocketAddr::new(local, port)));
+        }
+        if let Ok(host) = text.parse::<IpAddr>() {
+            return Ok(Self(SocketAddr::new(host, 0)));
+        }
+        let found = text
+            .to_socket_addrs()
+            .or_else(|_| (text, 0).to_socket_addrs());
+        let found = found.ok().and_then(|mut all| all.next());
+        found.map(Self).ok_or_else(|| {
+            "it is no address; write a port such as 8080, or host and port such as 0.0.0.0:8080"
+                .to_owned()
+        })
+    }
+}
+
+/// Serves the page of a run, and says where.
+pub(crate) fn start(
+    address: Address,
+    board: Board,
+    control: Option<Control>,
+) -> Result<(), Failure> {
+    let failure = |why: &dyn fmt::Display| {
+        Failure::new(
+            format!("cannot serve the page at {}: {why}", address.0),
+            "choose another port; with port 0, a free one is taken",
+        )
+    };
+    let server = Server::http(address.0).map_err(|error| failure(&error))?;
+    let own = server.server_addr().to_ip().unwrap_or(address.0);
+    let with_token = if control.is_some() {
+        "; with #token=TOKEN at its end, the run can be stopped there"
+    } else {
+        ""
+    };
+    output::tell(&format!("the run is shown at http://{own}/{with_token}"));
+    let doorman = Arc::new(Doorman {
+        board,
+        control,
+        own,
+    });
+    thread::spawn(move || {
+        for request in server.incoming_requests() {
+            Arc::clone(&doorman).admit(request);
+        }
+    });
+    Ok(())
+}
+
+struct Doorman {
+    board: Board,
+    control: Option<Control>,
+    own: SocketAddr,
+}
+
+impl Doorman {
+    /// Serves a client in a thread of its own.
+    fn admit(self: Arc<Self>, request: Request) {
+        let clients = &self.board.0.clients;
+        if clients.fetch_add(1, Ordering::SeqCst) >= MOST_CLIENTS {
+            clients.fetch_sub(1, Ordering::SeqCst);
+            let _ = request.respond(plain_text(503, "too many clients; come back later\n"));
+            return;
+        }
+        thread::spawn(move || {
+            // A client that has gone away needs no answer.
+            let _ = self.serve(request);
+            self.board.0.clients.fetch_sub(1, Ordering::SeqCst);
+        });
+    }
+
+    fn serve(&self, request: Request) -> io::Result<()> {
+        if !self.is_asked_for(&request) {
+            return request.respond(plain_text(403, "this is not the page of that host\n"));
+        }
+        let path = request.url().split(['?', '#']).next().unwrap_or_default();
+        match (request.method(), path) {
+            (Method::Get, "/") => match self.page() {
+                Ok(page) => request.respond(typed(200, page, "text/html; charset=utf-8")),
+                Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
+            },
+            (Method::Get, "/document") => match self.board.document() {
+                Ok(document) => request.respond(typed(200, document.to_string(), JSON)),
+                Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
+            },
+            (Method::Get, "/events") => self.tell(request.into_writer()),
+            (Method::Post, "/stop") => {
+                let answer = self.stop(&request);
+                request.respond(answer)
+            }
+            (_, "/" | "/document" | "/events" | "/stop") => {
+                request.respond(plain_text(405, "not this way\n"))
+            }
+            _ => request.respond(plain_text(404, "there is only one page here: /\n")),
+        }
+    }
+
+    /// Whether the client wants this server: a page of somebody else's, whose name leads here, may
+    /// not read what is local.
+    fn is_asked_for(&self, request: &Request) -> bool {
+        if !self.own.ip().is_loopback() {
+            return true;
+        }
+        let headers = request.headers().iter();
+        let mut hosts = headers.filter(|header| header.field.equiv("Host"));
+        hosts.next().is_some_and(|header| {
+            let host = header.value.as_str();
+            let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+            let ip = name.trim_matches(['[', ']']).parse::<IpAddr>();
+            name.eq_ignore_ascii_case("localhost") || ip.is_ok_and(|ip| ip.is_loopback())
+        })
+    }
+
+    fn page(&self) -> Result<String, elbowroom_page::PageError> {
+        let trace = self.board.lock().trace.clone();
+        elbowroom_page::live_page(NAME, &trace)
+    }
+
+    fn stop(&self, request: &Request) -> Response<io::Cursor<Vec<u8>>> {
+        match &self.control {
+            None => plain_text(
+                403,
+                "this page is for looking only: run it with --control FILE\n",
+            ),
+            Some(control) if !control.allows(request) => plain_text(401, "this is not the token\n"),
+            Some(control) => {
+                control.interrupt.request();
+                plain_text(202, "The run is being stopped.\n")
+            }
+        }
+    }
+
+    /// Tells a client of every change, until the run is over or the client has gone.
+    fn tell(&self, mut client: Box<dyn Write + Send>) -> io::Result<()> {
+        self.board.lock().listeners += 1;
+        let told = self.tell_all(client.as_mut());
+        self.board.lock().listeners -= 1;
+        self.board.0.changed.notify_all();
+        told
+    }
+
+    fn tell_all(&self, client: &mut dyn Write) -> io::Result<()> {
+        client.write_all(
+            b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
+              X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
+        )?;
+        client.flush()?;
+        let mut told = 0;
+        loop {
+            let (lines, is_over) = {
+                let state = self.board.lock();
+                let waits = |state: &mut State| state.lines == told && !state.is_over;
+                let waited = self
+                    .board
+                    .0
+                    .changed
+                    .wait_timeout_while(state, SIGN_OF_LIFE, waits);
+                let state = waited.unwrap_or_else(PoisonError::into_inner).0;
+                (state.lines, state.is_over)
+            };
+            if is_over {
+                let document = self.board.document().map_err(io::Error::other)?;
+                write!(client, "event: over\ndata: {document}\n\n")?;
+                return client.flush();
+            }
+            if lines == told {
+                client.write_all(b": nothing new\n\n")?;
+            } else {
+                told = lines;
+                write!(client, "event: change\ndata: {lines}\n\n")?;
+            }
+            client.flush()?;
+        }
+    }
+}
+
+const JSON: &str = "application/json";
+
+fn plain_text(status: u16, text: &str) -> Response<io::Cursor<Vec<u8>>> {
+    typed(status, text.to_owned(), "text/plain; charset=utf-8")
+}
+
+fn typed(status: u16, text: String, kind: &str) -> Response<io::Cursor<Vec<u8>>> {
+    let headers = [
+        ("Content-Type", kind),
+        ("Cache-Control", "no-store"),
+        ("X-Content-Type-Options", "nosniff"),
+    ];
+    let response = Response::from_string(text).with_status_code(status);
+    headers.into_iter().fold(
+        response,
+        |response, (name, value)| match Header::from_bytes(name, value) {
+            Ok(header) => response.with_header(header),
+            Err(()) => response,
+        },
+    )
+}
