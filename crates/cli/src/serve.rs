@@ -32,7 +32,7 @@ const FAREWELL: Duration = Duration::from_secs(2);
 const LEAST_TOKEN: usize = 16;
 
 /// The name of the trace on its page.
-const NAME: &str = "the run";
+pub(crate) const NAME: &str = "the run";
 
 /// The trace of a run so far.
 #[derive(Clone, Default)]
@@ -64,6 +64,11 @@ impl Board {
         state.lines += 1;
         drop(state);
         self.0.changed.notify_all();
+    }
+
+    /// The trace so far.
+    pub(crate) fn trace(&self) -> String {
+        self.lock().trace.clone()
     }
 
     /// Says that the run is over, and waits a little for clients that fetch how it ended.
@@ -278,8 +283,7 @@ impl Doorman {
     }
 
     fn page(&self) -> Result<String, elbowroom_page::PageError> {
-        let trace = self.board.lock().trace.clone();
-        elbowroom_page::live_page(NAME, &trace)
+        elbowroom_page::live_page(NAME, &self.board.trace())
     }
 
     fn stop(&self, request: &Request) -> Response<io::Cursor<Vec<u8>>> {

@@ -117,6 +117,12 @@ pub(crate) struct RunArgs {
     /// Write a trace of the run to this file (docs/formats/trace.md)
     #[arg(long, value_name = "FILE.jsonl")]
     pub(crate) trace: Option<PathBuf>,
+    /// Write the run in the format of Perfetto (ui.perfetto.dev)
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub(crate) perfetto: Option<PathBuf>,
+    /// Write the run as an MCAP file, for Foxglove
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "replay")]
+    pub(crate) mcap: Option<PathBuf>,
     /// Write a journal of the run to this file (docs/formats/journal.md): a trace that survives a
     /// crash. Nothing is started that is not on the disk
     #[arg(
@@ -134,6 +140,7 @@ pub(crate) struct RunArgs {
         require_equals = true,
         requires = "clocks"
     )]
+    #[arg(conflicts_with = "replay")]
     pub(crate) serve: Option<Address>,
     /// Let those who know the token in this file stop the run on that page
     #[arg(long, value_name = "FILE", requires = "serve")]

@@ -36,6 +36,7 @@ use crate::stopwatch::Stopwatch;
 use crate::words::tame;
 use journaled::{Careful, JournalWriter, Kept};
 use realtime::{Pace, PacedPlanner, Realtime};
+use shown::Views;
 use spec::contradiction;
 use trace_file::TraceFile;
 
@@ -83,13 +84,13 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return job.journaled(path, command, arguments, output);
     }
     let mut file = TraceFile::open(arguments.trace.as_deref())?;
-    let board = shown::serve(arguments, &spec, &task, &interrupt)?;
+    let views = Views::open(arguments, &spec, &task, &interrupt)?;
     let outcome = {
         let mut sink = |line: &str| file.write(line);
         let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
         let written = writer.header(&spec);
         written.map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
-        let mut writer = shown::Shown::new(&mut writer, &task, board.as_ref());
+        let mut writer = views.shown(&mut writer, &task);
         let mut writer = live::Live::new(&mut writer);
         let job = Job {
             spec: &spec,
@@ -112,9 +113,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
             None => job.simulated(&mut writer).map_err(contradiction)?,
         }
     };
-    if let Some(board) = board {
-        board.close();
-    }
+    views.close();
     let trouble = file.close();
     let shown = show(arguments, &outcome, output);
     // The run has been what it was, whatever became of its record.
@@ -205,7 +204,7 @@ impl Job<'_> {
         };
         let kept = Kept::default();
         let interrupt = self.interrupt;
-        let board = shown::serve(arguments, self.spec, self.task, interrupt)?;
+        let views = Views::open(arguments, self.spec, self.task, interrupt)?;
         let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
         let mut world = Careful {
             inner: world,
@@ -218,7 +217,7 @@ impl Job<'_> {
                 file: &mut file,
                 kept: kept.clone(),
             };
-            let mut writer = shown::Shown::new(writer, self.task, board.as_ref());
+            let mut writer = views.shown(writer, self.task);
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
                 .recorded_by(live::Live::new(&mut writer));
@@ -229,9 +228,7 @@ impl Job<'_> {
             execute(request, &mut world, &mut watch)
         };
         world.inner.stop();
-        if let Some(board) = board {
-            board.close();
-        }
+        views.close();
         let outcome = outcome.map_err(contradiction)?;
         conclude(arguments, &outcome, file.trouble().as_deref(), output)
     }

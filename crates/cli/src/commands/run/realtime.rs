@@ -1,10 +1,11 @@
 //! A world on a wall clock.
 //!
-//! Its time 0 is the moment at which the run begins, before there is a plan. What is decided takes
-//! no time in the world, but making plans does: as long as it takes on the wall clock, times the
-//! factor. What happens meanwhile is reported afterwards, with the times at which it happened.
+//! Its time 0 is the moment at which the first plan is ready and the executor has prepared for it.
+//! What is decided takes no time in the world, but making further plans does: as long as it takes on
+//! the wall clock, times the factor. What happens meanwhile is reported afterwards, with the times
+//! at which it happened.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use elbowroom::execution::run::PlanningTime;
@@ -20,20 +21,36 @@ use crate::interrupt::Interrupt;
 
 /// A simulated clock that runs `factor` times as fast as the wall clock.
 pub(super) struct Pace {
-    clock: Clock,
+    /// Since the world was first told or asked something.
+    clock: OnceLock<Clock>,
     factor: Rational,
     /// The time for which the world's clock was stopped, on the wall clock.
     stopped: Mutex<Duration>,
 }
 
 impl Pace {
-    /// The world's time is 0 now.
+    /// The world's time is 0 until [`Pace::begin`].
     pub(super) fn new(factor: &Rational) -> Self {
         Self {
-            clock: Clock::start(),
+            clock: OnceLock::new(),
             factor: factor.clone(),
             stopped: Mutex::new(Duration::ZERO),
         }
+    }
+
+    /// The world's time passes from now on, unless it did so before.
+    fn begin(&self) {
+        self.clock.get_or_init(Clock::start);
+    }
+
+    fn has_begun(&self) -> bool {
+        self.clock.get().is_some()
+    }
+
+    /// How long the world's clock has been going, on the wall clock.
+    fn passed(&self) -> Duration {
+        let since = self.clock.get().map_or(Duration::ZERO, |it| it.elapsed());
+        since.saturating_sub(self.stopped())
     }
 
     fn stopped(&self) -> Duration {
@@ -42,22 +59,23 @@ impl Pace {
 
     /// The time until the world's clock reads `time`.
     fn left(&self, time: &Rational) -> Duration {
-        let passed = self.clock.elapsed().saturating_sub(self.stopped());
-        on_the_wall(time, &self.factor).saturating_sub(passed)
+        on_the_wall(time, &self.factor).saturating_sub(self.passed())
     }
 
     /// The reading of the world's clock after this time on the wall clock, rounded to a thousandth
     /// of a second.
     fn after(&self, while_on_the_wall: Duration) -> Rational {
-        let passed = self.clock.elapsed().saturating_sub(self.stopped());
-        let millis = (passed + while_on_the_wall).as_millis();
+        let millis = (self.passed() + while_on_the_wall).as_millis();
         let seconds = Rational::new(i64::try_from(millis).unwrap_or(i64::MAX), 1000);
         seconds * &self.factor
     }
 
     /// `spent` is all that planning took on the wall clock; in the world it takes `allowed`. For
-    /// what is longer, the world's clock was stopped.
+    /// what is longer, the world's clock was stopped. Before it goes there is nothing to stop.
     fn stop(&self, spent: Duration, allowed: &Rational) {
+        if !self.has_begun() {
+            return;
+        }
         let excess = spent.saturating_sub(on_the_wall(allowed, &self.factor));
         *self.stopped.lock().unwrap_or_else(PoisonError::into_inner) += excess;
     }
@@ -87,10 +105,12 @@ const NAP: Duration = Duration::from_millis(50);
 
 impl World for Realtime<'_> {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        self.pace.begin();
         self.inner.command(now, command)
     }
 
     fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        self.pace.begin();
         loop {
             let soon = self.pace.after(NAP);
             let passage = self.inner.wait(until.min(&soon))?;
@@ -124,7 +144,10 @@ impl Planner for PacedPlanner<'_> {
         let clock = Clock::start();
         let mut answer = self.inner.plan(task, situation);
         match self.planning_time {
-            PlanningTime::Measured => answer.seconds = Some(clock.seconds() * &self.pace.factor),
+            PlanningTime::Measured if self.pace.has_begun() => {
+                answer.seconds = Some(clock.seconds() * &self.pace.factor);
+            }
+            PlanningTime::Measured => answer.seconds = Some(Rational::ZERO),
             PlanningTime::Seconds(seconds) => self.pace.stop(clock.elapsed(), seconds),
         }
         answer
@@ -152,6 +175,9 @@ mod tests {
     #[test]
     fn the_clock_stands_still_while_planning_takes_longer_than_it_may() {
         let pace = Pace::new(&Rational::from(10));
+        pace.stop(Duration::from_secs(5), &Rational::ONE);
+        assert_eq!(pace.stopped(), Duration::ZERO, "it does not go yet");
+        pace.begin();
         // Two seconds of planning, of which the world sees three of its own, 0.3 on the wall.
         pace.stop(Duration::from_secs(2), &Rational::from(3));
         assert_eq!(pace.stopped(), Duration::from_millis(1700));

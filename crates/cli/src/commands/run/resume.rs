@@ -24,7 +24,7 @@ use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
 
 use super::journaled::{Careful, JournalWriter, Kept};
 use super::process::{Manners, ProcessWorld};
-use super::shown::{self, Shown};
+use super::shown::Views;
 use super::spec::contradiction;
 use crate::args::RunArgs;
 use crate::clock::Clock;
@@ -115,7 +115,7 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
     let interrupt = Interrupt::listen();
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
-    let board = shown::serve(arguments, &spec, &task, &interrupt)?;
+    let views = Views::open(arguments, &spec, &task, &interrupt)?;
     let outcome = {
         let begun = Clock::start();
         let clock = || begun.seconds();
@@ -134,7 +134,7 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
                 past: ReplayPlanner::new(&stored),
                 present: planner,
             })
-            .recorded_by(Shown::new(
+            .recorded_by(views.shown(
                 PastRecorder {
                     past: Arc::clone(&past),
                     task: Arc::clone(&task),
@@ -145,7 +145,6 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
                     },
                 },
                 &task,
-                board.as_ref(),
             ));
         let mut world = Careful {
             inner: PastWorld {
@@ -177,9 +176,7 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
         if let Some(world) = world.inner.present {
             world.stop();
         }
-        if let Some(board) = board {
-            board.close();
-        }
+        views.close();
         outcome.map_err(contradiction)?
     };
     if let Some(line) = past.difference() {
