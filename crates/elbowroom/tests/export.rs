@@ -4,8 +4,6 @@
 #![allow(clippy::print_stdout, reason = "counts are worth seeing")]
 
 mod shared;
-#[path = "../../../testing/skipped.rs"]
-mod skipped;
 
 use std::io::Write;
 use std::path::Path;
@@ -30,7 +28,7 @@ use rand_chacha::ChaCha8Rng;
 use shared::case::Case;
 use shared::draw;
 use shared::instances::{figure_3, figure_4};
-use skipped::skipped;
+use shared::skipped;
 
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong];
 
@@ -123,10 +121,7 @@ fn is_controllable(file: &NetworkFile) -> bool {
         let file = read(name, text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert!(file.remarks.is_empty(), "{:?}", file.remarks);
         let answer = examine(&file, &Request::default()).expect("nothing to simulate");
-        answer
-            .dynamic
-            .map_or(answer.consistent, |promise| promise)
-            .verdict
+        answer.dynamic.unwrap_or(answer.consistent).verdict
             == Verdict::Yes
     });
     let verdicts: Vec<bool> = verdicts.collect();

@@ -166,8 +166,8 @@ impl<'a> Text<'a> {
             .collect();
         within.push(format!("(not {})", lines(&kept)));
         let delays = (0..links.len()).map(delay);
-        let decided = quantified("exists", delays.collect(), &all(within));
-        let chosen = quantified("forall", chosen.collect(), &decided);
+        let decided = quantified("exists", &delays.collect::<Vec<_>>(), &all(within));
+        let chosen = quantified("forall", &chosen.collect::<Vec<_>>(), &decided);
         let _ = writeln!(text, "(assert {chosen})\n(check-sat)");
     }
 
@@ -200,7 +200,7 @@ impl<'a> Text<'a> {
         let mut times = self.chosen_times();
         times.push(self.moment().to_owned());
         let network = self.network();
-        let broken = quantified("exists", times, &format!("(and {network}\n{broken})"));
+        let broken = quantified("exists", &times, &format!("(and {network}\n{broken})"));
         let _ = writeln!(text, "(assert (not {broken}))\n(check-sat)");
         text
     }
@@ -266,7 +266,7 @@ impl<'a> Text<'a> {
     }
 
     fn has_schedule(&self) -> String {
-        quantified("exists", self.chosen_times(), &self.network())
+        quantified("exists", &self.chosen_times(), &self.network())
     }
 
     /// Some requirement is broken, with what it is in words.
@@ -301,7 +301,7 @@ fn lines(parts: &[String]) -> String {
 }
 
 /// A quantifier over real numbers; none if there are no names.
-fn quantified(quantifier: &str, names: Vec<String>, term: &str) -> String {
+fn quantified(quantifier: &str, names: &[String], term: &str) -> String {
     if names.is_empty() {
         return term.to_owned();
     }

@@ -24,11 +24,11 @@ impl Symbols {
                 &mut left
             };
             let mut parts: Vec<String> = factors.iter().map(|&part| part.to_owned()).collect();
-            let size = coefficient.abs();
-            if size != Rational::ONE || parts.is_empty() {
-                parts.insert(0, number(&size));
+            let factor = coefficient.abs();
+            if factor != Rational::ONE || parts.is_empty() {
+                parts.insert(0, number(&factor));
             }
-            side.push(applied("*", parts));
+            side.push(applied("*", &parts));
         };
         let Linear {
             constant,
@@ -54,13 +54,13 @@ impl Symbols {
             term(constant, &[]);
         }
         let sign = if inequality.is_strict { "<" } else { "<=" };
-        let sum = |parts| applied("+", parts);
+        let sum = |parts: Vec<String>| applied("+", &parts);
         format!("({sign} {} {})", sum(left), sum(right))
     }
 }
 
 /// An operator on some terms; one term stands for itself, and none is 0.
-fn applied(operator: &str, parts: Vec<String>) -> String {
+fn applied(operator: &str, parts: &[String]) -> String {
     match parts.len() {
         0 => "0.0".to_owned(),
         1 => parts.concat(),

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use elbowroom_model::Task;
 use elbowroom_pddl::{Source, read_problem};
-use skipped::skipped;
+pub(crate) use skipped::skipped;
 
 /// The folder of benchmark data, if it is there.
 pub(crate) fn data() -> Option<PathBuf> {
