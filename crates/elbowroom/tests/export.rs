@@ -121,8 +121,7 @@ fn is_controllable(file: &NetworkFile) -> bool {
         let file = read(name, text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert!(file.remarks.is_empty(), "{:?}", file.remarks);
         let answer = examine(&file, &Request::default()).expect("nothing to simulate");
-        answer.dynamic.unwrap_or(answer.consistent).verdict
-            == Verdict::Yes
+        answer.dynamic.unwrap_or(answer.consistent).verdict == Verdict::Yes
     });
     let verdicts: Vec<bool> = verdicts.collect();
     assert!(
