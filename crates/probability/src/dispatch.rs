@@ -9,6 +9,9 @@
 //! (The paper asks for less: that the start of an end is. But then an order could be taken up
 //! behind the end of an action that is still running, which would never be ended.)
 
+mod demands;
+mod following;
+
 use std::ops::ControlFlow;
 
 use elbowroom_num::Rational;
@@ -18,6 +21,7 @@ use crate::circumstances::Circumstances;
 use crate::network::TooCoupled;
 use crate::search::{OrderSearch, Progress};
 use crate::total_order::{Slot, TotalOrderPlan};
+use following::Following;
 
 /// The next step of an order's execution.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +69,10 @@ pub struct LayerDispatch {
     search: OrderSearch,
     reconsider: Reconsider,
     order: Option<TotalOrderPlan>,
+    /// How many timed initials had passed when it began.
+    passed: usize,
+    /// What is kept of the order; made when it is first followed.
+    following: Option<Following>,
 }
 
 impl LayerDispatch {
@@ -74,6 +82,8 @@ impl LayerDispatch {
             search,
             reconsider,
             order: None,
+            passed: 0,
+            following: None,
         }
     }
 
@@ -101,12 +111,18 @@ impl LayerDispatch {
         }
         if self.reconsider == Reconsider::WhenNoLayerFits
             && let Some(order) = &self.order
-            && let Some((position, slot)) = lattermost_layer(&self.search, order, circumstances)
         {
-            return Ok(next(order, position, slot, false));
+            let new = || Following::new(&self.search, order, self.passed);
+            let following = self.following.get_or_insert_with(new);
+            if let Some((position, slot)) = following.lattermost(&self.search, order, circumstances)
+            {
+                return Ok(next(order, position, slot, false));
+            }
         }
         let found = self.search.best_order(circumstances, watch)?;
         self.order = found.order;
+        self.passed = self.search.timed_passed(&circumstances.now);
+        self.following = None;
         let Some(order) = &self.order else {
             return Ok(Choice::Replan);
         };
@@ -139,6 +155,9 @@ pub fn goal_holds(model: &crate::Model, circumstances: &Circumstances) -> bool {
 /// The position of the happening after the lattermost layer that fits, and when it may be.
 ///
 /// A layer after which there is no time for the rest of the order does not fit.
+///
+/// This takes time in proportion to the order's length. [`LayerDispatch`] finds the same in less, from what
+/// it keeps of an order.
 pub fn lattermost_layer(
     search: &OrderSearch,
     order: &TotalOrderPlan,

@@ -46,6 +46,8 @@ pub struct Model {
     /// By node of the plan.
     pub(crate) events: Vec<Event>,
     pub(crate) goal: Requirement,
+    /// By instance: its start and its end, or its only node twice.
+    nodes_of: Vec<(NodeId, NodeId)>,
 }
 
 /// A happening, compiled.
@@ -147,17 +149,27 @@ impl Model {
 
     /// The start node of an instance, or its only node.
     pub fn start(&self, id: InstanceId) -> NodeId {
-        self.node_where(|node| matches!(node, Node::Start(i) | Node::Instant(i) if i == id))
+        self.nodes_of[id.index()].0
     }
 
     /// The end node of an instance, or its only node.
     pub fn end(&self, id: InstanceId) -> NodeId {
-        self.node_where(|node| matches!(node, Node::End(i) | Node::Instant(i) if i == id))
+        self.nodes_of[id.index()].1
     }
 
-    fn node_where(&self, is_it: impl Fn(Node) -> bool) -> NodeId {
-        let index = self.plan.nodes.iter().position(|&node| is_it(node));
-        NodeId::from(index.expect("every instance has its nodes"))
+    /// Start and end of each instance.
+    fn nodes_of(plan: &PartialOrderPlan) -> Vec<(NodeId, NodeId)> {
+        let mut nodes_of = vec![(NodeId::ZERO, NodeId::ZERO); plan.instances.len()];
+        for (index, node) in plan.nodes.iter().enumerate() {
+            let own = NodeId::from(index);
+            match *node {
+                Node::Start(id) => nodes_of[id.index()].0 = own,
+                Node::End(id) => nodes_of[id.index()].1 = own,
+                Node::Instant(id) => nodes_of[id.index()] = (own, own),
+                Node::Zero | Node::Timed(_) => {}
+            }
+        }
+        nodes_of
     }
 
     /// The plan's happenings as they are timed; ends before what begins at the same time. `steps`

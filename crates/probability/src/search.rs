@@ -21,6 +21,7 @@ mod chain;
 mod lattice;
 mod memo;
 mod nominal;
+mod queue;
 mod room;
 mod run;
 mod separations;
@@ -43,6 +44,7 @@ use cache::Cache;
 pub use lattice::{Lattice, LatticeEdge, LatticeLimits, LatticeNode, TooLarge};
 use nominal::Nominal;
 use room::Rooms;
+pub(crate) use room::{First, Rests};
 use run::Run;
 use separations::Separations;
 use symmetry::Symmetry;
@@ -306,10 +308,7 @@ impl OrderSearch {
     /// there is no time for the sequence.
     pub fn windows(&self, circumstances: &Circumstances, sequence: &[NodeId]) -> Option<Vec<Slot>> {
         let mut timing = Timing::new(&self.separations, circumstances)?;
-        let now = &circumstances.now;
-        let mut next_timed = self.separations.timed.iter();
-        let passed = next_timed.by_ref().take_while(|(_, time)| time <= now);
-        let mut next_timed = passed.count();
+        let mut next_timed = self.timed_passed(&circumstances.now);
         for &node in sequence {
             timing.push(&self.model, node, next_timed)?;
             let is_timed = matches!(self.model.plan().nodes[node.index()], Node::Timed(_));
@@ -321,5 +320,37 @@ impl OrderSearch {
             latest,
         };
         Some(timing.windows().into_iter().map(slot).collect())
+    }
+
+    /// How many of the timed initials that matter have passed.
+    pub(crate) fn timed_passed(&self, now: &Rational) -> usize {
+        let timed = self.separations.timed.iter();
+        timed.take_while(|(_, time)| time <= now).count()
+    }
+
+    /// The rests of an order from a position on, for so many timed initials to have passed before it.
+    pub(crate) fn rests(&self, order: &TotalOrderPlan, from: usize, passed: usize) -> Rests {
+        let running = order.layers.last().map_or(&[][..], |layer| &layer.running);
+        let sequence = &order.sequence[..];
+        Rests::of(
+            &self.model,
+            &self.separations,
+            (sequence, from),
+            passed,
+            running,
+        )
+    }
+
+    /// When the happening at a position may be, if the order goes on with it: the first of
+    /// [`OrderSearch::windows`], without the others.
+    pub(crate) fn first_of(
+        &self,
+        rests: &Rests,
+        order: &TotalOrderPlan,
+        position: usize,
+        circumstances: &Circumstances,
+    ) -> First {
+        let sequence = &order.sequence[..];
+        rests.first(&self.separations, (sequence, position), circumstances)
     }
 }

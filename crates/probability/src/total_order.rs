@@ -120,17 +120,23 @@ impl Layer {
     /// The same, whatever is under way.
     pub fn holds(&self, model: &Model, circumstances: &Circumstances) -> bool {
         let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
+        self.literals
+            .iter()
+            .all(|&(fact, truth)| is_likely(fact) == truth)
+            && self.conditions_hold(model, circumstances)
+    }
+
+    /// Whether the conditions on numbers and on several facts hold.
+    pub(crate) fn conditions_hold(&self, model: &Model, circumstances: &Circumstances) -> bool {
+        let is_likely = |fact: FactId| circumstances.belief.probability(fact) >= 0.5;
         let value = |leaf: &Expression| match leaf {
             Expression::Fluent(fluent) => circumstances.values.get(fluent).cloned(),
             _ => None,
         };
         let task = model.task();
-        self.literals
-            .iter()
-            .all(|&(fact, truth)| is_likely(fact) == truth)
-            && self.conditions.iter().all(|condition| {
-                // A number that is not known now cannot speak against it.
-                evaluate(task, condition, &is_likely, &value).unwrap_or(true)
-            })
+        self.conditions.iter().all(|condition| {
+            // A number that is not known now cannot speak against it.
+            evaluate(task, condition, &is_likely, &value).unwrap_or(true)
+        })
     }
 }

@@ -92,7 +92,7 @@ impl Events {
     }
 }
 
-struct Everywhere;
+pub(crate) struct Everywhere;
 
 impl Region for Everywhere {
     fn objection(&mut self, _: &Arc<Task>, _: &ParametrizedPlan, _: &Valuation) -> Option<String> {

@@ -87,6 +87,7 @@ pub(super) fn model(
         ..
     } = compiler;
     Ok(Model {
+        nodes_of: Model::nodes_of(&plan),
         task,
         plan,
         semantics,

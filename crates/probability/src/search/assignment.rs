@@ -1,10 +1,11 @@
 //! The assignment problem: the Hungarian method (Kuhn 1955, in the form of Jonker and Volgenant).
 
 /// With more rows than this, each row gets its best column; that is a bound, too, and quick.
-const MOST: usize = 24;
+pub(super) const MOST: usize = 24;
 
 /// At least the greatest product of one entry from each row, no two from one column, of a square
-/// matrix of numbers in [0, 1]. Exactly that for small matrices, up to rounding.
+/// matrix of numbers in [0, 1]. Exactly that for small matrices, up to rounding. Of large ones, rows
+/// may be without entries that are not their greatest.
 pub(super) fn best_product(rows: &[Vec<f64>]) -> f64 {
     if rows.len() > MOST {
         let best = |row: &Vec<f64>| row.iter().copied().fold(0.0, f64::max);

@@ -19,6 +19,7 @@ use elbowroom_plan::InstanceId;
 use super::assignment;
 use super::chain::Chain;
 use super::nominal::{Nominal, Truth};
+use super::queue::Queue;
 use super::separations::Separations;
 use crate::model::{Event, Model, Requirement, Semantics};
 use crate::network::PrunedNetwork;
@@ -35,6 +36,8 @@ pub(crate) struct Bounds {
     /// The conditions of its start.
     needs_at_start: Vec<Vec<(usize, bool)>>,
     goal: Vec<(usize, bool)>,
+    /// For each instance, the places in `goal` of the facts that its end changes.
+    goal_at_end: Vec<Vec<usize>>,
 }
 
 /// An upper bound for all completions of a sequence.
@@ -120,12 +123,24 @@ impl Bounds {
             note(model.event(*node), None, false);
         }
         let Requirement { literals: goal, .. } = model.goal.clone();
+        let mut goal_at_end = vec![Vec::new(); needs_at_end.len()];
+        for (place, (fact, _)) in goal.iter().enumerate() {
+            for setter in &setters[*fact] {
+                if let (Some(id), true) = (setter.by, setter.at_end) {
+                    let own: &mut Vec<usize> = &mut goal_at_end[id.index()];
+                    if own.last() != Some(&place) {
+                        own.push(place);
+                    }
+                }
+            }
+        }
         Self {
             setters,
             needs_at_end,
             needs_throughout,
             needs_at_start,
             goal,
+            goal_at_end,
         }
     }
 
@@ -181,13 +196,16 @@ impl Bounds {
         for id in network.running() {
             open.extend(&self.needs_at_end[id.index()]);
         }
-        let mut seen: Vec<(usize, bool)> = Vec::new();
+        let mut seen = vec![[false; 2]; self.setters.len()];
+        let mut is_needed = vec![false; self.needs_at_start.len()];
+        for id in &needed {
+            is_needed[id.index()] = true;
+        }
         while let Some(literal) = open.pop() {
-            if seen.contains(&literal) {
+            let (fact, truth) = literal;
+            if std::mem::replace(&mut seen[fact][usize::from(truth)], true) {
                 continue;
             }
-            seen.push(literal);
-            let (fact, truth) = literal;
             if !matches!(
                 (outlook.nominal.truth(fact), truth),
                 (Truth::False, true) | (Truth::True, false)
@@ -218,7 +236,8 @@ impl Bounds {
             if !has_any {
                 return None;
             }
-            if let Some(id) = only.filter(|id| !is_open && !needed.contains(id)) {
+            if let Some(id) = only.filter(|id| !is_open && !is_needed[id.index()]) {
+                is_needed[id.index()] = true;
                 needed.push(id);
                 open.extend(&self.needs_at_start[id.index()]);
                 open.extend(&self.needs_at_end[id.index()]);
@@ -226,13 +245,6 @@ impl Bounds {
         }
         Some(needed)
     }
-}
-
-/// The number of required action ends, and how many of them belong to running actions.
-#[derive(Clone, Copy)]
-struct Queue {
-    running: usize,
-    ends: usize,
 }
 
 struct Run<'a, 'm, 'n> {
@@ -293,7 +305,8 @@ impl Run<'_, '_, '_> {
             .copied()
             .collect();
         let mut brings: Vec<(Chain, f64)> = Vec::new();
-        for &(fact, truth) in &bounds.goal {
+        for &place in &bounds.goal_at_end[id.index()] {
+            let (fact, truth) = bounds.goal[place];
             if self.is_counted[fact] || !self.is_last_to_set(id, fact, truth) {
                 continue;
             }
@@ -316,16 +329,11 @@ impl Run<'_, '_, '_> {
                 .product();
             lasting * kept
         };
-        (0..queue.ends)
-            .map(|rank| {
-                let unstarted = queue.ends - queue.running.min(queue.ends);
-                let ends_after = queue.ends - 1 - rank;
-                let fewest = (rank + 1).saturating_sub(queue.running);
-                let early = with(rank + fewest, ends_after + unstarted - fewest);
-                let late = with(rank + unstarted, ends_after);
-                early.max(late)
-            })
-            .collect()
+        let mut share = |rank| {
+            let [early, late] = queue.neighbours(rank);
+            with(early.0, early.1).max(with(late.0, late.1))
+        };
+        queue.ranks().into_iter().map(&mut share).collect()
     }
 
     /// The best chance that what an end needs lasts until then, the end being `before` steps away

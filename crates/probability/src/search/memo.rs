@@ -53,8 +53,8 @@ struct Entry {
 #[derive(Clone, Debug)]
 struct Needs {
     /// By instance: its start and middle; its middle and end.
-    whole: Vec<Need>,
-    rest: Vec<Need>,
+    whole: Vec<Vec<(usize, u8)>>,
+    rest: Vec<Vec<(usize, u8)>>,
     goal: Need,
     /// Facts of which more may be worse although nothing needs them false.
     is_turbulent: Vec<bool>,
@@ -88,10 +88,10 @@ impl Memo {
                 include(&mut need, &event.condition);
                 include_guards(model, &mut need, event);
             }
-            rest.push(need.clone());
+            rest.push(sparse(&need));
             include(&mut need, &start.condition);
             include_guards(model, &mut need, start);
-            whole.push(need);
+            whole.push(sparse(&need));
         }
         let mut goal = vec![0; count];
         include(&mut goal, &model.goal);
@@ -219,9 +219,9 @@ fn part(own: f64, its: f64) -> f64 {
 impl Needs {
     fn of(&self, is_used: &[bool], running: &[InstanceId]) -> Need {
         let mut need = self.goal.clone();
-        let mut add = |part: &Need| {
-            for (all, one) in need.iter_mut().zip(part) {
-                *all |= one;
+        let mut add = |part: &[(usize, u8)]| {
+            for &(fact, one) in part {
+                need[fact] |= one;
             }
         };
         for (whole, _) in self.whole.iter().zip(is_used).filter(|(_, used)| !**used) {
@@ -241,6 +241,12 @@ impl Needs {
         }
         need
     }
+}
+
+/// What is needed at all: an action reads few of all facts.
+fn sparse(need: &Need) -> Vec<(usize, u8)> {
+    let facts = need.iter().copied().enumerate();
+    facts.filter(|(_, need)| *need != 0).collect()
 }
 
 fn include(need: &mut Need, requirement: &Requirement) {

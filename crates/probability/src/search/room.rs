@@ -7,12 +7,16 @@
 //! relaxing the paths through its new bounds, and what no longer matters is dropped with its row
 //! and column.
 
+mod rests;
+
 use elbowroom_num::Rational;
 use elbowroom_plan::{InstanceId, Node, NodeId};
 
 use super::separations::Separations;
 use crate::circumstances::Circumstances;
 use crate::model::Model;
+
+pub(crate) use rests::{First, Rests};
 
 /// The rooms of an order, after each of its happenings.
 #[derive(Clone, Debug)]

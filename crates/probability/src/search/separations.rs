@@ -14,8 +14,12 @@ pub(crate) struct Separations {
     pub(crate) epsilon: Rational,
     /// Whether two nodes must be ε apart; symmetric.
     apart: Vec<Vec<bool>>,
+    /// Whether anything must be ε apart from a node.
+    keeps_distance: Vec<bool>,
     /// For each node, those that may not come after it.
     never_after: Vec<Vec<NodeId>>,
+    /// For each node, those that it may not come after.
+    never_before: Vec<Vec<NodeId>>,
     /// The timed initials that matter, in order of time.
     pub(crate) timed: Vec<(NodeId, Rational)>,
     /// How many of them an order has: those up to the last that changes what the goal reads. The
@@ -49,11 +53,13 @@ impl Separations {
             })
             .collect();
         let mut never_after = vec![Vec::new(); plan.nodes.len()];
+        let mut never_before = vec![Vec::new(); plan.nodes.len()];
         for link in plan.links.iter().filter(|_| keeps_interference) {
             if link.kind == LinkKind::Interference {
                 apart[link.from.index()][link.to.index()] = true;
                 apart[link.to.index()][link.from.index()] = true;
                 never_after[link.to.index()].push(link.from);
+                never_before[link.from.index()].push(link.to);
             }
         }
         let goal = Footprint::of_condition(task, task.goal());
@@ -88,11 +94,14 @@ impl Separations {
         let timed: Vec<(NodeId, Rational)> = timed.collect();
         let is_for_goal =
             |(node, _): &(NodeId, Rational)| footprints[node.index()].writes_what_is_read_by(&goal);
+        let keeps_distance = apart.iter().map(|row| row.contains(&true)).collect();
         let ids = || plan.instances().map(|(id, _)| id);
         Self {
             epsilon: task.epsilon().clone(),
             apart,
             never_after,
+            never_before,
+            keeps_distance,
             timed_until_goal: timed
                 .iter()
                 .rposition(is_for_goal)
@@ -120,7 +129,7 @@ impl Separations {
 
     /// Whether anything must be `epsilon` apart from a happening.
     pub(crate) fn keeps_distance(&self, node: NodeId) -> bool {
-        self.apart[node.index()].contains(&true)
+        self.keeps_distance[node.index()]
     }
 
     /// By when a happening must be that is to come before the timed initials from `next_timed` on.
@@ -165,11 +174,7 @@ impl Separations {
 
     /// Whether `node` may come after all of these.
     pub(crate) fn may_follow(&self, node: NodeId, is_placed: &dyn Fn(NodeId) -> bool) -> bool {
-        // `never_after[placed]` holds `node`; the lists are short.
-        !self
-            .never_after
-            .iter()
-            .enumerate()
-            .any(|(at, before)| before.contains(&node) && is_placed(NodeId::from(at)))
+        let before = &self.never_before[node.index()];
+        !before.iter().any(|&other| is_placed(other))
     }
 }

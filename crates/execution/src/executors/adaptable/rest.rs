@@ -44,6 +44,8 @@ pub(super) struct Rest {
     chooser: Chooser,
     /// Instances that were told to start and have not ended, with their starts on the plan's clock.
     under_way: BTreeMap<StepId, (InstanceId, Option<Rational>)>,
+    /// The timed initials, on the plan's clock.
+    timed: Vec<(NodeId, Rational)>,
     /// Starts and ends that have been observed lately, on the plan's clock.
     recent: Vec<(NodeId, Rational)>,
     /// How often each instance has failed in a row.
@@ -69,7 +71,16 @@ impl Rest {
         let under_way = mission.instances.iter().zip(in_order);
         let under_way = under_way.map(|(&own, &in_order)| (StepId::from(own), in_order));
         let under_way = under_way.filter(|(step, _)| mission.running.contains_key(step));
+        let model = chooser.search().model();
+        let nodes = model.plan().nodes.iter().enumerate();
+        let timed = nodes.filter_map(|(at, node)| match node {
+            Node::Timed(index) => {
+                Some((NodeId::from(at), model.task().timed()[*index].time.clone()))
+            }
+            _ => None,
+        });
         Self {
+            timed: timed.collect(),
             under_way: under_way
                 .map(|(step, instance)| (step, (instance, Some(Rational::ZERO))))
                 .collect(),
@@ -204,16 +215,9 @@ impl Rest {
     fn lately(&mut self, now: &Rational) -> Vec<(NodeId, Rational)> {
         let epsilon = self.mission.task.epsilon();
         self.recent.retain(|(_, time)| time + epsilon > *now);
-        let model = self.chooser.search().model();
-        let nodes = model.plan().nodes.iter().enumerate();
-        let timed = nodes.filter_map(|(at, node)| match node {
-            Node::Timed(index) => {
-                Some((NodeId::from(at), model.task().timed()[*index].time.clone()))
-            }
-            _ => None,
-        });
         let is_recent = |(_, time): &(NodeId, Rational)| time <= now && time + epsilon > *now;
-        let mut lately: Vec<_> = timed.filter(is_recent).collect();
+        let timed = self.timed.iter();
+        let mut lately: Vec<_> = timed.filter(|timed| is_recent(timed)).cloned().collect();
         lately.extend(self.recent.iter().cloned());
         lately.sort_by(|a, b| a.1.cmp(&b.1));
         lately

@@ -1,0 +1,251 @@
+//! Which layers of an order fit, kept from one decision to the next: [`Demands`].
+
+use std::collections::BTreeMap;
+
+use elbowroom_model::ground::FactId;
+use elbowroom_plan::InstanceId;
+
+use crate::circumstances::Circumstances;
+use crate::total_order::TotalOrderPlan;
+
+/// What the layers of an order ask for that is either so or not so, and how many of their demands are
+/// not met at present. A demand is mostly the same for many layers in a row, so one of them is kept for
+/// all, and something that changes takes time in proportion to the logarithm of the order's length.
+#[derive(Clone, Debug)]
+pub(super) struct Demands {
+    by_subject: BTreeMap<Subject, Demand>,
+    unmet: Counts,
+    /// What was under way when the demands were last held against the circumstances.
+    running: Vec<InstanceId>,
+}
+
+/// What a demand is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Subject {
+    /// That a fact is more likely to hold than not.
+    Fact(FactId),
+    /// That an action is under way.
+    UnderWay(InstanceId),
+}
+
+#[derive(Clone, Debug, Default)]
+struct Demand {
+    /// How it is.
+    is: bool,
+    /// The layers that want it not to be, from the first to before the last, and those that want it
+    /// to be.
+    wanted: [Vec<(usize, usize)>; 2],
+}
+
+impl Demands {
+    /// Those of an order's layers before its happenings, as if nothing held and nothing was under way.
+    pub(super) fn of(order: &TotalOrderPlan) -> Self {
+        let count = order.sequence.len();
+        let mut demands = Self {
+            by_subject: BTreeMap::new(),
+            unmet: Counts::new(count),
+            running: Vec::new(),
+        };
+        for (position, layer) in order.layers.iter().take(count).enumerate() {
+            for &(fact, truth) in &layer.literals {
+                demands.want(Subject::Fact(fact), truth, position);
+            }
+            for &id in &layer.running {
+                demands.want(Subject::UnderWay(id), true, position);
+            }
+        }
+        for (subject, demand) in &mut demands.by_subject {
+            if let Subject::UnderWay(_) = subject {
+                demand.wanted[0] = gaps(&demand.wanted[1], count);
+            }
+            for &(from, to) in &demand.wanted[1] {
+                demands.unmet.add(from, to, 1);
+            }
+        }
+        demands
+    }
+
+    fn want(&mut self, subject: Subject, truth: bool, position: usize) {
+        let demand = self.by_subject.entry(subject).or_default();
+        let wanted = &mut demand.wanted[usize::from(truth)];
+        match wanted.last_mut() {
+            Some((_, to)) if *to == position => *to += 1,
+            _ => wanted.push((position, position + 1)),
+        }
+    }
+
+    /// Takes note of how things are; whether the order knows all that is under way.
+    pub(super) fn observe(&mut self, circumstances: &Circumstances) -> bool {
+        let running = circumstances.running.iter();
+        let running: Vec<InstanceId> = running.map(|running| running.instance).collect();
+        for id in std::mem::replace(&mut self.running, running.clone()) {
+            if !running.contains(&id) {
+                self.set(Subject::UnderWay(id), false);
+            }
+        }
+        let mut knows_all = true;
+        for id in running {
+            knows_all &= self.set(Subject::UnderWay(id), true);
+        }
+        for (subject, demand) in &mut self.by_subject {
+            let Subject::Fact(fact) = *subject else {
+                break;
+            };
+            let is_likely = circumstances.belief.probability(fact) >= 0.5;
+            demand.become_so(is_likely, &mut self.unmet);
+        }
+        knows_all
+    }
+
+    /// Whether any layer asks for it or for its opposite.
+    fn set(&mut self, subject: Subject, is: bool) -> bool {
+        let demand = self.by_subject.get_mut(&subject);
+        if let Some(demand) = demand {
+            demand.become_so(is, &mut self.unmet);
+            return true;
+        }
+        false
+    }
+
+    /// The position of the last layer before `before` of which all these demands are met.
+    pub(super) fn last_met(&self, before: usize) -> Option<usize> {
+        self.unmet.last_zero(before)
+    }
+}
+
+impl Demand {
+    fn become_so(&mut self, is: bool, unmet: &mut Counts) {
+        if std::mem::replace(&mut self.is, is) == is {
+            return;
+        }
+        for &(from, to) in &self.wanted[usize::from(!is)] {
+            unmet.add(from, to, 1);
+        }
+        for &(from, to) in &self.wanted[usize::from(is)] {
+            unmet.add(from, to, -1);
+        }
+    }
+}
+
+/// What lies between these ranges, up to `count`.
+fn gaps(ranges: &[(usize, usize)], count: usize) -> Vec<(usize, usize)> {
+    let begins = std::iter::once(0).chain(ranges.iter().map(|(_, to)| *to));
+    let ends = ranges.iter().map(|(from, _)| *from).chain([count]);
+    begins.zip(ends).filter(|(from, to)| from < to).collect()
+}
+
+/// Numbers in a row, none below 0, to which something is added for whole ranges: a segment tree.
+#[derive(Clone, Debug)]
+struct Counts {
+    count: usize,
+    /// The leaves are the last `width` nodes; the children of node `n` are `2 n` and `2 n + 1`.
+    width: usize,
+    /// By node: what was added to all below it, and the least sum below it with that.
+    added: Vec<i32>,
+    least: Vec<i32>,
+}
+
+impl Counts {
+    fn new(count: usize) -> Self {
+        let width = count.next_power_of_two();
+        Self {
+            count,
+            width,
+            added: vec![0; 2 * width],
+            least: vec![0; 2 * width],
+        }
+    }
+
+    /// Adds to the numbers from `from` to before `to`.
+    fn add(&mut self, from: usize, to: usize, amount: i32) {
+        self.add_below(1, (0, self.width), (from, to), amount);
+    }
+
+    fn add_below(&mut self, node: usize, own: (usize, usize), range: (usize, usize), amount: i32) {
+        if range.1 <= own.0 || own.1 <= range.0 {
+            return;
+        }
+        if range.0 <= own.0 && own.1 <= range.1 {
+            self.added[node] += amount;
+            self.least[node] += amount;
+            return;
+        }
+        let middle = usize::midpoint(own.0, own.1);
+        self.add_below(2 * node, (own.0, middle), range, amount);
+        self.add_below(2 * node + 1, (middle, own.1), range, amount);
+        self.least[node] = self.added[node] + self.least[2 * node].min(self.least[2 * node + 1]);
+    }
+
+    /// The position of the last 0 before `before`.
+    fn last_zero(&self, before: usize) -> Option<usize> {
+        self.zero_below(1, (0, self.width), before.min(self.count), 0)
+    }
+
+    fn zero_below(
+        &self,
+        node: usize,
+        (from, to): (usize, usize),
+        before: usize,
+        added_above: i32,
+    ) -> Option<usize> {
+        if from >= before || added_above + self.least[node] > 0 {
+            return None;
+        }
+        if to - from == 1 {
+            return Some(from);
+        }
+        let added = added_above + self.added[node];
+        let middle = usize::midpoint(from, to);
+        let right = self.zero_below(2 * node + 1, (middle, to), before, added);
+        right.or_else(|| self.zero_below(2 * node, (from, middle), before, added))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Counts, gaps};
+
+    #[test]
+    fn the_last_zero_is_that_of_a_plain_list() {
+        let mut seed: u32 = 7;
+        let mut draw = |below: usize| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            usize::try_from(seed >> 8).unwrap() % below
+        };
+        for count in [1, 2, 3, 7, 8, 13] {
+            let (mut counts, mut plain) = (Counts::new(count), vec![0; count]);
+            let mut ranges: Vec<(usize, usize)> = Vec::new();
+            for _ in 0..300 {
+                let amount = if ranges.len() < 3 || draw(2) == 0 {
+                    let from = draw(count);
+                    ranges.push((from, from + 1 + draw(count - from)));
+                    1
+                } else {
+                    let at = draw(ranges.len());
+                    let last = ranges.len() - 1;
+                    ranges.swap(at, last);
+                    -1
+                };
+                let (from, to) = ranges[ranges.len() - 1];
+                counts.add(from, to, amount);
+                plain[from..to]
+                    .iter_mut()
+                    .for_each(|number| *number += amount);
+                if amount < 0 {
+                    ranges.pop();
+                }
+                for before in 0..=count + 1 {
+                    let expected = (0..before.min(count)).rev().find(|&at| plain[at] == 0);
+                    assert_eq!(counts.last_zero(before), expected, "{plain:?} {before}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gaps_and_ranges_make_up_the_whole() {
+        assert_eq!(gaps(&[], 3), [(0, 3)]);
+        assert_eq!(gaps(&[(0, 1), (2, 3)], 3), [(1, 2)]);
+        assert_eq!(gaps(&[(1, 2)], 4), [(0, 1), (2, 4)]);
+    }
+}

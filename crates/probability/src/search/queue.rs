@@ -1,0 +1,98 @@
+//! Where an end can be among those that an order still needs: [`Queue`].
+
+use super::assignment;
+
+/// The number of required action ends, and how many of them belong to running actions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Queue {
+    pub(super) running: usize,
+    pub(super) ends: usize,
+}
+
+impl Queue {
+    /// How many happenings come before the end at a rank, and how many after it, if starts wait
+    /// for as long as they can, and if all are before it.
+    pub(super) fn neighbours(self, rank: usize) -> [(usize, usize); 2] {
+        let unstarted = self.ends - self.running.min(self.ends);
+        let ends_after = self.ends - 1 - rank;
+        let fewest = (rank + 1).saturating_sub(self.running);
+        [
+            (rank + fewest, ends_after + unstarted - fewest),
+            (rank + unstarted, ends_after),
+        ]
+    }
+
+    /// The ranks at which an end is looked at: in a short queue all of them, and in a long one, in
+    /// which each end takes the rank that is best for it, those among which the best one is.
+    ///
+    /// Chances decay, so that shares are log-convex from rank to rank, but for the first happening
+    /// and for where ends begin to need starts: the best rank is at an end of such a piece.
+    pub(super) fn ranks(self) -> Vec<usize> {
+        if self.ends <= assignment::MOST {
+            return (0..self.ends).collect();
+        }
+        let bend = self.running;
+        let pieces = [0, 1, 2, bend.saturating_sub(1), bend, bend + 1];
+        let last = [self.ends - 2, self.ends - 1];
+        let ranks = pieces.into_iter().chain(last);
+        let mut ranks: Vec<usize> = ranks.filter(|rank| *rank < self.ends).collect();
+        ranks.sort_unstable();
+        ranks.dedup();
+        ranks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Queue;
+    use crate::likelihoods::Flip;
+    use crate::search::chain::Chain;
+
+    /// One of the ranks that are looked at is the best of all, whatever decays.
+    #[test]
+    fn in_a_long_queue_the_best_rank_is_among_those_that_are_looked_at() {
+        let mut seed: u32 = 3;
+        let mut draw = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(seed >> 8) / f64::from(1 << 24)
+        };
+        for turn in 0..400 {
+            let queue = Queue {
+                running: turn % 37,
+                ends: 25 + turn % 41,
+            };
+            let mut chain = |truth| {
+                let scale = if draw() < 0.5 { 0.01 } else { 0.5 };
+                let flip = Flip {
+                    becomes_true: if draw() < 0.3 { 0.0 } else { scale * draw() },
+                    becomes_false: if draw() < 0.3 { 0.0 } else { scale * draw() },
+                };
+                (Chain::of(flip, truth), draw())
+            };
+            let needs: Vec<(Chain, f64)> = (0..turn % 3).map(|_| chain(true)).collect();
+            let brings: Vec<(Chain, f64)> = (0..turn % 2).map(|_| chain(false)).collect();
+            let (throughout, chance) = chain(true);
+            // As what an end needs throughout: from the start just before it on.
+            let lasting = |before: usize| match before.checked_sub(1) {
+                Some(sooner) => throughout.best_after(chance, sooner) * (1.0 - throughout.fails()),
+                None => chance,
+            };
+            let of = |chains: &[(Chain, f64)], steps: usize| {
+                let chances = chains.iter().map(|(chain, p)| chain.best_after(*p, steps));
+                chances.product::<f64>()
+            };
+            let share = |rank: usize| {
+                let at =
+                    |(before, after)| lasting(before) * of(&needs, before) * of(&brings, after);
+                let [early, late] = queue.neighbours(rank);
+                at(early).max(at(late))
+            };
+            let best = |ranks: Vec<usize>| ranks.into_iter().map(share).fold(0.0, f64::max);
+            let (found, expected) = (best(queue.ranks()), best((0..queue.ends).collect()));
+            assert!(
+                found >= expected * (1.0 - 1e-13),
+                "{queue:?}: {found} {expected}"
+            );
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! How much time the rests of an order have: [`Rests`].
+//!
+//! The same as [`Rooms`](super::Rooms), from the end backwards. To what is known when a rest begins only
+//! few of its time points matter: zero, its first happening, the ends of what is under way then, and what
+//! may come less than ε after the first happening. The network of each rest, projected on these, is
+//! made once, each from the one behind it. With what has been observed put in, it says when the first
+//! happening may be, which takes time in proportion to what is under way and not to what is left.
+
+use elbowroom_num::Rational;
+use elbowroom_plan::{InstanceId, Node, NodeId};
+
+use super::super::separations::Separations;
+use super::{Point, Room};
+use crate::circumstances::Circumstances;
+use crate::model::Model;
+use crate::total_order::Slot;
+
+/// With more points than this, a rest and those before it are not projected: a matrix for each place in
+/// an order would take more than what it saves.
+const MOST_POINTS: usize = 40;
+
+/// The rests of a sequence, by the position at which they begin.
+#[derive(Clone, Debug)]
+pub(crate) struct Rests {
+    /// Where the first of them begins.
+    from: usize,
+    /// By position, from `from` on.
+    by_position: Vec<Rest>,
+    /// How many timed initials have passed before each position, and at the end.
+    timed_before: Vec<usize>,
+}
+
+/// The network of a rest.
+#[derive(Clone, Debug)]
+enum Rest {
+    /// There is never time for it.
+    Never,
+    Projected(Room),
+    /// Too much is under way at once.
+    Wide,
+}
+
+/// What the rests say of a first happening.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum First {
+    /// It may be in this window.
+    In(Slot),
+    /// There is no time for it and what follows.
+    Never,
+    /// The rests were made for other timed initials to have passed, or are not projected.
+    Unknown,
+}
+
+impl Rests {
+    /// Those of `sequence` from position `from` on, before which so many of the timed initials that
+    /// matter have passed; `running` is under way after the sequence.
+    pub(crate) fn of(
+        model: &Model,
+        separations: &Separations,
+        (sequence, from): (&[NodeId], usize),
+        passed: usize,
+        running: &[InstanceId],
+    ) -> Self {
+        let mut timed_before = vec![passed];
+        for node in &sequence[from..] {
+            let is_timed = matches!(model.plan().nodes[node.index()], Node::Timed(_));
+            timed_before.push(timed_before[timed_before.len() - 1] + usize::from(is_timed));
+        }
+        let mut room = Room {
+            points: Vec::new(),
+            distances: Vec::new(),
+        };
+        room.add(Point::Zero);
+        for id in running {
+            room.add(Point::End(*id));
+        }
+        let mut rest = Rest::Projected(room);
+        let mut rests = Vec::with_capacity(sequence.len() - from);
+        for position in (from..sequence.len()).rev() {
+            let behind = sequence.get(position + 1).copied();
+            let next_timed = timed_before[position - from];
+            rest = match &rest {
+                Rest::Projected(room) => {
+                    match room.before(model, separations, (sequence[position], behind), next_timed)
+                    {
+                        None => Rest::Never,
+                        Some(room) if room.points.len() > MOST_POINTS => Rest::Wide,
+                        Some(room) => Rest::Projected(room),
+                    }
+                }
+                // What comes before adds constraints.
+                Rest::Never => Rest::Never,
+                Rest::Wide => Rest::Wide,
+            };
+            rests.push(rest.clone());
+        }
+        rests.reverse();
+        Self {
+            from,
+            by_position: rests,
+            timed_before,
+        }
+    }
+
+    /// Whether they were made for so many timed initials to have passed before this position.
+    pub(crate) fn are_for(&self, position: usize, passed: usize) -> bool {
+        position >= self.from && self.timed_before[position - self.from] == passed
+    }
+
+    /// Whether timed initials are part of the rest.
+    pub(crate) fn have_timed(&self, position: usize) -> bool {
+        let before = position.checked_sub(self.from);
+        before.is_none_or(|before| Some(&self.timed_before[before]) != self.timed_before.last())
+    }
+
+    /// The window of the happening at this position, if the rest begins now. What is under way must be
+    /// what the order has under way there.
+    pub(crate) fn first(
+        &self,
+        separations: &Separations,
+        (sequence, position): (&[NodeId], usize),
+        circumstances: &Circumstances,
+    ) -> First {
+        let Some(rest) = position.checked_sub(self.from) else {
+            return First::Unknown;
+        };
+        match &self.by_position[rest] {
+            Rest::Never => First::Never,
+            Rest::Wide => First::Unknown,
+            Rest::Projected(room) => {
+                let first = room
+                    .clone()
+                    .begun(separations, sequence[position], circumstances);
+                first.map_or(First::Never, First::In)
+            }
+        }
+    }
+}
+
+impl Room {
+    /// The room of a rest that has one more happening in front, `behind` being the one that was first;
+    /// `None` if there is no time for it.
+    fn before(
+        &self,
+        model: &Model,
+        separations: &Separations,
+        (node, behind): (NodeId, Option<NodeId>),
+        next_timed: usize,
+    ) -> Option<Self> {
+        let mut room = self.clone();
+        let what = model.plan().nodes[node.index()];
+        let zero = room.place(Point::Zero)?;
+        if let (Some(behind), Some(place)) = (behind, room.place(Point::Last)) {
+            room.points[place] = Point::Recent(behind);
+        }
+        let own = room.add(Point::Last);
+        for place in 0..own {
+            match room.points[place] {
+                Point::Recent(other) if separations.are_apart(node, other) => {
+                    room.at_least(own, place, &separations.epsilon)?;
+                }
+                Point::Recent(other) if Some(other) == behind => {
+                    room.at_least(own, place, &Rational::ZERO)?;
+                }
+                Point::End(_) => room.at_least(own, place, &Rational::ZERO)?,
+                _ => {}
+            }
+        }
+        if matches!(what, Node::Timed(_)) {
+            let time = separations.time_of_next(node, next_timed)?;
+            room.fix(zero, own, time)?;
+        } else if let Some(latest) = separations.latest_before_timed(node, next_timed) {
+            room.at_most(zero, own, &latest)?;
+        }
+        if let Node::Start(id) = what {
+            if let Some(end) = room.place(Point::End(id)) {
+                let (shortest, longest) = &separations.durations[id.index()];
+                room.at_least(own, end, shortest)?;
+                if let Some(longest) = longest {
+                    room.at_most(own, end, longest)?;
+                }
+            }
+            room.forget(Point::End(id));
+        }
+        room.keep_near(separations);
+        if let Node::End(id) = what {
+            room.repeat(Point::Last, Point::End(id));
+        }
+        Some(room)
+    }
+
+    /// Drops what is at least ε after the first happening, whatever happens, and what nothing has to
+    /// be ε apart from.
+    fn keep_near(&mut self, separations: &Separations) {
+        let Some(first) = self.place(Point::Last) else {
+            return;
+        };
+        let nearest = -&separations.epsilon;
+        let is_near: Vec<bool> = (0..self.points.len())
+            .map(|place| match self.points[place] {
+                Point::Recent(other) => {
+                    let back = self.distance(place, first);
+                    separations.keeps_distance(other) && back.is_none_or(|back| *back > nearest)
+                }
+                Point::Zero | Point::Last | Point::End(_) => true,
+            })
+            .collect();
+        self.retain(|place| is_near[place]);
+    }
+
+    /// The window of the first happening of a rest that begins in these circumstances.
+    fn begun(
+        mut self,
+        separations: &Separations,
+        node: NodeId,
+        circumstances: &Circumstances,
+    ) -> Option<Slot> {
+        let (zero, first) = (self.place(Point::Zero)?, self.place(Point::Last)?);
+        let now = &circumstances.now;
+        self.at_least(zero, first, now)?;
+        // What is not near comes ε after now or later.
+        for (recent, time) in &circumstances.recent {
+            let apart = time + &separations.epsilon;
+            for place in 0..self.points.len() {
+                let other = match self.points[place] {
+                    Point::Last => node,
+                    Point::Recent(other) => other,
+                    Point::Zero | Point::End(_) => continue,
+                };
+                if separations.are_apart(*recent, other) {
+                    self.at_least(zero, place, &apart)?;
+                }
+            }
+        }
+        for running in &circumstances.running {
+            let end = self.place(Point::End(running.instance))?;
+            let (earliest, latest) = separations.end_of(running, now);
+            self.at_least(zero, end, &earliest)?;
+            if let Some(latest) = latest {
+                self.at_most(zero, end, &latest)?;
+            }
+        }
+        Some(Slot {
+            node,
+            earliest: self
+                .distance(first, zero)
+                .map(|back| -back)
+                .unwrap_or_default(),
+            latest: self.distance(zero, first).cloned(),
+        })
+    }
+}
