@@ -103,7 +103,7 @@ fn random_search(dice: &mut Dice) -> OrderSearch {
         };
         write!(init, "(at {} {own})", 3 + 2 * dice.below(12) + index % 2).unwrap();
     }
-    let goal: String = (0..1 + dice.below(3)).map(|_| fact(dice)).collect();
+    let goal: String = (0..=dice.below(3)).map(|_| fact(dice)).collect();
     let domain = format!(
         "(define (domain d) (:requirements :fluents :timed-initial-literals :negative-preconditions)
            (:predicates {}) (:functions (n)) {actions})",
