@@ -2,6 +2,42 @@
 
 const OFTEN = 500;
 
+// Somebody who presses a button or drags something is not interrupted.
+let released = Promise.resolve();
+if ("live" in document.documentElement.dataset) {
+  addEventListener("pointerdown", () => {
+    released = new Promise((done) => {
+      // A click comes after its pointer has gone up.
+      for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => setTimeout(done), { once: true });
+    });
+  }, { capture: true });
+}
+
+// Notes what is open, and where the keyboard is; the function that comes back says so to what has taken its place.
+function place(main) {
+  const key = (section) => section.querySelector("h2")?.textContent;
+  const within = (section) => [...section.querySelectorAll("a, button, input, select, summary, [tabindex]")];
+  const open = new Map([...main.children].map((section) => [key(section), [...section.querySelectorAll("details")].map((it) => it.open)]));
+  const focused = document.activeElement;
+  const section = [...main.children].find((it) => it.contains(focused));
+  const index = section ? within(section).indexOf(focused) : -1;
+  const selected = focused?.type === "search" ? [focused.selectionStart, focused.selectionEnd] : null;
+  const [across, down] = [scrollX, scrollY];
+  return () => {
+    for (const part of main.children) {
+      const before = open.get(key(part)) ?? [];
+      for (const [at, details] of [...part.querySelectorAll("details")].entries()) {
+        if (at < before.length) details.open = before[at];
+      }
+      if (!section || key(part) !== key(section)) continue;
+      const node = within(part)[index];
+      node?.focus({ preventScroll: true });
+      if (selected) node?.setSelectionRange?.(...selected);
+    }
+    scrollTo(across, down);
+  };
+}
+
 // `follow` is called with each new document.
 function liveView(update) {
   const status = element("p", { class: "note", role: "status" }, "The run goes on.");
@@ -22,7 +58,9 @@ function liveView(update) {
     while (isStale && following.checked && !isOver) {
       isStale = false;
       const answer = await fetch("document").catch(() => null);
-      if (answer?.ok && !isOver) update(await answer.json());
+      const newer = answer?.ok && (await answer.json());
+      await released;
+      if (newer && !isOver) update(newer);
       await new Promise((done) => setTimeout(done, OFTEN));
     }
     isBusy = false;
@@ -33,9 +71,10 @@ function liveView(update) {
     isStale = true;
     refresh();
   });
-  events.addEventListener("over", (event) => {
+  events.addEventListener("over", async (event) => {
     isOver = true;
     events.close();
+    await released;
     update(JSON.parse(event.data));
     status.textContent = "The run is over.";
     following.disabled = true;

@@ -62,6 +62,11 @@ function show() {
 
 show();
 if ("live" in document.documentElement.dataset) {
-  facts.before(liveView((newer) => { data = newer; show(); }));
+  facts.before(liveView((newer) => {
+    const goBack = place(main);
+    data = newer;
+    show();
+    goBack();
+  }));
 }
 document.documentElement.dataset.ready = "true";
