@@ -40,14 +40,14 @@ function place(main) {
 
 // `follow` is called with each new document.
 function liveView(update) {
-  const status = element("p", { class: "note", role: "status" }, "The run goes on.");
+  const status = element("p", { class: "note", role: "status" }, "The page is not connected yet.");
   const following = element("input", { type: "checkbox", checked: true, onchange: () => { if (following.checked) refresh(); } });
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
   const stop = token && element("button", { type: "button", onclick: async () => {
     stop.disabled = true;
     const answer = await fetch("stop", { method: "POST", headers: { authorization: `Bearer ${token}` } }).catch(() => null);
     const text = answer ? await answer.text() : "the program does not answer";
-    status.textContent = text.trim();
+    if (!isOver) status.textContent = text.trim();
     stop.disabled = answer?.ok ?? false;
   } }, "stop the run");
   let isStale = false, isBusy = false, isOver = false;

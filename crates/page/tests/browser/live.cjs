@@ -34,6 +34,7 @@ const verdict = (tab) => tab.locator("#verdict").textContent();
 test("the page follows the run to its end, and then says what the report of its trace says", async () => {
   const { address, over } = served(8, "--trace", file("live.jsonl"));
   const tab = await watched(await address);
+  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run goes on.");
   assert.match(await verdict(tab), /^The run goes on; it is at /);
   const rows = rowsOf(tab, "Every decision");
   const early = await rows.count();
@@ -85,6 +86,7 @@ test("only who knows the token may stop the run", async () => {
   assert.equal(await looking.getByRole("button", { name: "stop the run" }).count(), 0);
   await close(looking);
   const tab = await watched(base, `#token=${TOKEN}`);
+  await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run goes on.");
   await tab.getByRole("button", { name: "stop the run" }).click();
   await tab.waitForFunction(() => document.querySelector("#live [role=status]").textContent === "The run is over.");
   assert.equal((await over).code, 130);
