@@ -78,21 +78,26 @@ impl Condition {
         }
     }
 
-    /// Calls `visit` for each expression on either side of a comparison.
-    pub fn visit_expressions(&self, visit: &mut impl FnMut(&Expression)) {
+    /// Calls `visit` for the left and the right side of each comparison.
+    pub fn visit_comparisons(&self, visit: &mut impl FnMut(&Expression, &Expression)) {
         match self {
             Self::Fact(_) => {}
-            Self::Compare(_, left, right) => {
-                visit(left);
-                visit(right);
-            }
-            Self::Not(part) => part.visit_expressions(visit),
+            Self::Compare(_, left, right) => visit(left, right),
+            Self::Not(part) => part.visit_comparisons(visit),
             Self::And(parts) | Self::Or(parts) => {
                 for part in parts {
-                    part.visit_expressions(visit);
+                    part.visit_comparisons(visit);
                 }
             }
         }
+    }
+
+    /// Calls `visit` for each expression on either side of a comparison.
+    pub fn visit_expressions(&self, visit: &mut impl FnMut(&Expression)) {
+        self.visit_comparisons(&mut |left, right| {
+            visit(left);
+            visit(right);
+        });
     }
 
     /// Calls `visit` for each fluent read.

@@ -100,6 +100,19 @@ pub struct Grounding {
     pub steps: u64,
 }
 
+impl Grounding {
+    /// The schema and the arguments of each action, schema by schema in the domain's order, and in
+    /// the order of the objects.
+    pub fn instances(&self) -> Vec<(SchemaId, Vec<ObjectId>)> {
+        let actions = self.actions.iter();
+        let mut instances: Vec<_> = actions
+            .map(|action| (action.schema, action.arguments.clone()))
+            .collect();
+        instances.sort();
+        instances
+    }
+}
+
 /// Finds all ground actions that can be reached, and enters the facts and fluents that they
 /// mention into the task's table.
 pub fn ground(task: &Task, settings: &Settings) -> Answer {

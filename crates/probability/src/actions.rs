@@ -34,14 +34,8 @@ pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
     if has_numbers(task.goal()) {
         return refuse("the goal is about numbers".to_owned());
     }
-    let mut names: Vec<_> = grounding
-        .actions
-        .into_iter()
-        .map(|action| (action.schema, action.arguments))
-        .collect();
-    names.sort();
     let mut actions = Vec::new();
-    for (schema, arguments) in names {
+    for (schema, arguments) in grounding.instances() {
         let name = task.action_name(schema, &arguments);
         let Ok(action) = task.instantiate(schema, &arguments) else {
             return refuse(format!("{name} cannot be instantiated"));

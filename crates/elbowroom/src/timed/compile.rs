@@ -59,14 +59,8 @@ pub(super) fn actions(
     if !grounding.rules.is_empty() {
         return Err(NotTabulated::new("the domain has derived predicates"));
     }
-    let mut names: Vec<_> = grounding
-        .actions
-        .into_iter()
-        .map(|action| (action.schema, action.arguments))
-        .collect();
-    names.sort();
     let mut actions = Vec::new();
-    for (schema, arguments) in names {
+    for (schema, arguments) in grounding.instances() {
         let name = task.action_name(schema, &arguments);
         let only = settings.only.as_ref();
         if only.is_some_and(|only| !only.iter().any(|it| it.eq_ignore_ascii_case(&name))) {

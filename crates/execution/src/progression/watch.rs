@@ -185,11 +185,11 @@ impl View<'_> {
                 found.push(difference.denominator);
             }
         };
-        visit_comparisons(condition, &mut note);
+        condition.visit_comparisons(&mut note);
         if let Some(derivation) = self.state.task.derivation()
             && derivation.is_read_by(condition)
         {
-            derivation.visit_bodies(&mut |body| visit_comparisons(body, &mut note));
+            derivation.visit_bodies(&mut |body| body.visit_comparisons(&mut note));
         }
         found
     }
@@ -228,18 +228,5 @@ impl Moment<Unreadable> for View<'_> {
         }
         let sign = difference.numerator.sign_in(&self.cell) * divisor;
         Ok(comparison.holds(&Rational::from(i64::from(sign)), &Rational::ZERO))
-    }
-}
-
-fn visit_comparisons(condition: &Condition, visit: &mut impl FnMut(&Expression, &Expression)) {
-    match condition {
-        Condition::Fact(_) => {}
-        Condition::Compare(_, left, right) => visit(left, right),
-        Condition::Not(part) => visit_comparisons(part, visit),
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                visit_comparisons(part, visit);
-            }
-        }
     }
 }

@@ -159,10 +159,10 @@ impl Piece<'_> {
                 }
             }
         };
-        visit_comparisons(condition, &mut |left, right| add(left, right, duration));
+        condition.visit_comparisons(&mut |left, right| add(left, right, duration));
         if reads_derived {
             self.derivation.visit_bodies(&mut |body| {
-                visit_comparisons(body, &mut |left, right| add(left, right, None));
+                body.visit_comparisons(&mut |left, right| add(left, right, None));
             });
         }
         Cuts {
@@ -183,19 +183,6 @@ fn product(polynomials: &[Polynomial]) -> Polynomial {
         .iter()
         .fold(one, |product, polynomial| product.times(polynomial))
         .square_free()
-}
-
-fn visit_comparisons(condition: &Condition, visit: &mut impl FnMut(&Expression, &Expression)) {
-    match condition {
-        Condition::Fact(_) => {}
-        Condition::Compare(_, left, right) => visit(left, right),
-        Condition::Not(part) => visit_comparisons(part, visit),
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                visit_comparisons(part, visit);
-            }
-        }
-    }
 }
 
 /// One cut, or the moments strictly between two neighbouring cuts.
