@@ -2,6 +2,11 @@
 
 use std::process::ExitCode;
 
+/// The allocator of musl asks the operating system so often that runs would take half as long again.
+#[cfg(target_env = "musl")]
+#[global_allocator]
+static ALLOCATOR: dlmalloc::GlobalDlmalloc = dlmalloc::GlobalDlmalloc;
+
 fn main() -> ExitCode {
     elbowroom_cli::run(std::env::args_os().collect()).into()
 }
