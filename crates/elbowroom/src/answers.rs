@@ -13,6 +13,7 @@
 //! | is a plan valid? | [`CheckRequest`] | [`CheckAnswer`] |
 //! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
+//! | with which values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
 //! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
 //! | what do logs say about the world? | [`LearnRequest`] | [`LearnAnswer`] |
 //! | how likely is a plan to succeed? | [`OddsRequest`] | [`OddsAnswer`] |
@@ -23,6 +24,7 @@ mod format;
 pub mod learn;
 pub mod odds;
 pub mod plan;
+pub mod region;
 pub mod run;
 pub mod stn;
 mod violation;
@@ -35,6 +37,7 @@ pub use format::Version;
 pub use learn::{LearnAnswer, LearnRequest};
 pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
+pub use region::{RegionAnswer, RegionOutcome};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;

@@ -275,7 +275,7 @@ impl<'a> Explainer<'a> {
         format!("an action whose start and end interfere takes at least {epsilon}")
     }
 
-    fn action_name(&self, id: InstanceId) -> &'a str {
+    pub(crate) fn action_name(&self, id: InstanceId) -> &'a str {
         &self.plan.plan.instance(id).action.name
     }
 }

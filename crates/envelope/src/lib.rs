@@ -9,6 +9,7 @@
 //! - [`Oracle`]: the exact box check (Algorithm 1's CHECKINENVELOPE), both together.
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
 //! - [`best()`]: the largest box by some objective, from outside, with a proof.
+//! - [`exact()`]: all values for which a plan works, as a union of polyhedra.
 //! - [`balance()`]: by how much everything may deviate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
@@ -61,6 +62,7 @@ mod control;
 mod cut;
 mod cycles;
 mod enforce;
+mod exact;
 mod feasibility;
 mod frontier;
 mod guarantee;
@@ -85,6 +87,7 @@ pub use best::{
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofWay};
 pub use enforce::enforced;
+pub use exact::{ExactError, Piece, Region, RegionRow, RegionSource, exact};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};

@@ -45,15 +45,15 @@ pub(crate) struct EnvelopeArgs {
     /// limit than twice this. By default a hundredth of each nominal value
     #[arg(long, value_name = "B", value_parser = positive, allow_negative_numbers = true)]
     pub(crate) precision: Option<Rational>,
-    /// Whether the step size doubles after a success or stays constant
-    #[arg(long, value_enum, default_value_t = Growth::Doubling)]
-    pub(crate) growth: Growth,
+    /// Whether the step size doubles after a success, as by default, or stays constant
+    #[arg(long, value_enum)]
+    pub(crate) growth: Option<Growth>,
     /// Finally move each bound exactly to its limit
     #[arg(long)]
     pub(crate) sharpen: bool,
-    /// The guarantee that holds inside the envelope
-    #[arg(long, value_enum, default_value_t = Guarantee::Dynamic)]
-    pub(crate) guarantee: Guarantee,
+    /// The guarantee that holds inside the envelope; by default dynamic
+    #[arg(long, value_enum)]
+    pub(crate) guarantee: Option<Guarantee>,
     /// Add the plan's conditions to the network where they bound the difference of two times: the
     /// dispatcher then enforces them, and the envelope may be wider
     #[arg(long)]
@@ -73,15 +73,48 @@ pub(crate) struct EnvelopeArgs {
     /// parameters that are not named keep their nominal value
     #[arg(long, value_name = "BOX")]
     pub(crate) contains: Option<String>,
-    /// The order of the rows: as in the plan, or the one with the least room first
-    #[arg(long, value_enum, default_value_t = Order::Plan)]
-    pub(crate) order: Order,
+    /// The order of the rows: as in the plan, as by default, or the one with the least room first
+    #[arg(long, value_enum)]
+    pub(crate) order: Option<Order>,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 impl EnvelopeArgs {
+    /// Whether the whole region is asked for, and not a box.
+    ///
+    /// # Errors
+    /// When something else is asked for that only boxes have.
+    pub(crate) fn is_exact(&self) -> Result<bool, Failure> {
+        if self.method != Some(Method::Exact) {
+            return Ok(false);
+        }
+        let only_boxes = [
+            ("--objective", self.objective.is_some()),
+            ("--symmetric", self.symmetric),
+            ("--cap", self.cap.is_some()),
+            ("--precision", self.precision.is_some()),
+            ("--growth", self.growth.is_some()),
+            ("--sharpen", self.sharpen),
+            ("--contains", self.contains.is_some()),
+            ("--order", self.order.is_some()),
+        ];
+        if let Some((flag, _)) = only_boxes.iter().find(|(_, given)| *given) {
+            return Err(Failure::new(
+                format!("{flag} is about boxes, and --method exact is about the whole region"),
+                format!("leave out --method exact, or {flag}"),
+            ));
+        }
+        match self.guarantee {
+            None | Some(Guarantee::Weak) => Ok(true),
+            Some(_) => Err(Failure::new(
+                "the region is that of the weak guarantee; the others are about boxes",
+                "leave out --method exact, or --guarantee",
+            )),
+        }
+    }
+
     /// The algorithm, and what it is asked for.
     ///
     /// # Errors
@@ -100,6 +133,12 @@ impl EnvelopeArgs {
                         "{flag} is about the largest box, which --method irr does not look for"
                     ),
                     format!("leave out --method irr, or {flag}"),
+                ));
+            }
+            (Some(Method::Exact), _) => {
+                return Err(Failure::new(
+                    "the region is no box",
+                    "leave out --method exact",
                 ));
             }
             (Some(Method::Irr) | None, None) => library::Method::Irr,
@@ -141,6 +180,8 @@ pub(crate) enum Method {
     Irr,
     /// The largest box by --objective, with a proof that none is larger
     Best,
+    /// No box, but all values for which the plan works, as inequalities
+    Exact,
 }
 
 /// The objective of the largest box.

@@ -1,5 +1,6 @@
 //! `elbowroom envelope`: how far may each quantity deviate?
 
+mod exact;
 mod text;
 mod watch;
 
@@ -19,6 +20,9 @@ use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
+    if arguments.is_exact()? {
+        return exact::run(arguments, output);
+    }
     let (method, best) = arguments.method()?;
     let watch = Watch::start(arguments);
     let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
@@ -31,7 +35,9 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
     let request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
-        guarantee: arguments.guarantee.into(),
+        guarantee: arguments
+            .guarantee
+            .map_or_else(Default::default, Into::into),
         enforce: arguments.enforce,
         contains: arguments.contains.clone(),
         search: Search {
@@ -41,8 +47,8 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
                 None => search.relative,
             },
             growth: match arguments.growth {
-                args::Growth::Doubling => library::Growth::Doubling,
-                args::Growth::Constant => library::Growth::Constant,
+                Some(args::Growth::Doubling) | None => library::Growth::Doubling,
+                Some(args::Growth::Constant) => library::Growth::Constant,
             },
             sharpen: arguments.sharpen,
             method,
@@ -60,7 +66,7 @@ pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         output::print(&text::text(
             &request,
             &outcome,
-            arguments.order,
+            arguments.order.unwrap_or(args::Order::Plan),
             Look::of_stdout(),
         ))?;
     }

@@ -37,6 +37,7 @@ pub use conditions::Conditions;
 pub use foresight::Foresight;
 pub use inequalities::{Inequalities, NetworkRow, RequirementRow};
 pub use timeline::Timeline;
+pub(crate) use told::quantities;
 pub use worth::{Relax, Worth};
 
 /// Asks for the envelope of a plan, or whether a box lies inside it.

@@ -1,7 +1,7 @@
 //! Why a plan has no schedule: what takes too long, and what it must fit into.
 
 use elbowroom_num::Rational;
-use elbowroom_plan::{Constraint, NodeId, Origin, Reason, Side, StnPlan, Valuation};
+use elbowroom_plan::{Bound, Constraint, NodeId, Origin, Reason, Side, StnPlan, Valuation};
 
 use super::Explainer;
 
@@ -86,6 +86,69 @@ impl Explainer<'_> {
                 Room::Action(words) | Room::Limit(words) => words,
             }),
         }
+    }
+}
+
+impl Explainer<'_> {
+    /// What a sum of bounds says: that actions which take as long as these parameters must fit into
+    /// others and into fixed bounds. Each bound is a constraint of the plan, by position, and which
+    /// of its sides; those that are parameters themselves do not count.
+    pub(crate) fn sum_words(
+        &self,
+        takes: Vec<String>,
+        gives: Vec<String>,
+        bounds: &[(usize, Side)],
+    ) -> Option<String> {
+        let plan = &self.plan.plan;
+        let constraints = |wanted: Side| {
+            let own = bounds.iter().filter(move |(_, side)| *side == wanted);
+            own.map(|(index, _)| &plan.constraints[*index])
+        };
+        let is_separation = |it| is_own_separation(self, Edge::AtLeast(it));
+        if takes.is_empty() && constraints(Side::Lower).any(is_separation) {
+            return Some(self.own_separation());
+        }
+        let nominal = self.plan.nominal();
+        let mut needs = takes;
+        for constraint in constraints(Side::Lower) {
+            if matches!(constraint.lower, Bound::Finite(_)) {
+                needs.extend(need(self, constraint, &nominal));
+            }
+        }
+        let mut rooms: Vec<Room> = gives.into_iter().map(Room::Action).collect();
+        for constraint in constraints(Side::Upper) {
+            if matches!(constraint.upper, Bound::Finite(_)) {
+                let comes_before =
+                    |it: &&Constraint| it.to == constraint.to && it.from != constraint.from;
+                let next = constraints(Side::Lower).find(comes_before);
+                let next = next.map_or(Edge::Beginning, Edge::AtLeast);
+                rooms.push(room(self, constraint, next, &nominal));
+            }
+        }
+        let into_actions = |room: &Room| match room {
+            Room::Action(name) => Some(name.clone()),
+            Room::Limit(_) => None,
+        };
+        if needs.is_empty()
+            && let Some(actions) = rooms.iter().map(into_actions).collect::<Option<Vec<_>>>()
+            && !actions.is_empty()
+        {
+            let keeps_apart = |it: &Constraint| {
+                let least = it.lower.at(&nominal);
+                least.is_some_and(|least| least.is_positive())
+            };
+            let is_apart = constraints(Side::Lower).any(keeps_apart);
+            return Some(if is_apart {
+                format!(
+                    "what must be apart has to fit into {}",
+                    actions.join(" and ")
+                )
+            } else {
+                "a duration is at least 0".to_owned()
+            });
+        }
+        let says_something = !rooms.is_empty() || needs.len() > 1;
+        says_something.then(|| sentence(&needs, &rooms))
     }
 }
 

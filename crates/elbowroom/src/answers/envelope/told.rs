@@ -13,7 +13,7 @@ use super::answer::{
     Stop, Widened,
 };
 use crate::answers::{Exact, Halt};
-use crate::explain::{Explanation, Shortfall};
+use crate::explain::{Explainer, Explanation, Shortfall};
 use crate::makespan::earliest_end;
 
 impl From<Halt> for Stop {
@@ -82,25 +82,30 @@ impl Makespans {
     }
 }
 
+/// The parameters of a plan.
+pub(crate) fn quantities(explainer: &Explainer<'_>) -> Vec<Quantity> {
+    let parameters = explainer.plan.parameters.iter().enumerate();
+    parameters
+        .map(|(index, parameter)| Quantity {
+            name: parameter.name.clone(),
+            quantity: explainer.quantity(ParameterId::from(index)),
+            kind: parameter.kind.into(),
+            action: match parameter.kind {
+                ParameterKind::Duration(of) | ParameterKind::Constant(of) => {
+                    Some(explainer.plan.plan.instance(of).action.name.clone())
+                }
+                _ => None,
+            },
+            nominal: parameter.nominal.clone(),
+            weight: parameter.weight.clone(),
+        })
+        .collect()
+}
+
 impl Subject<'_> {
     /// The parameters.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
-        let parameters = self.plan.parameters.iter().enumerate();
-        parameters
-            .map(|(index, parameter)| Quantity {
-                name: parameter.name.clone(),
-                quantity: self.explainer.quantity(ParameterId::from(index)),
-                kind: parameter.kind.into(),
-                action: match parameter.kind {
-                    ParameterKind::Duration(of) | ParameterKind::Constant(of) => {
-                        Some(self.plan.plan.instance(of).action.name.clone())
-                    }
-                    _ => None,
-                },
-                nominal: parameter.nominal.clone(),
-                weight: parameter.weight.clone(),
-            })
-            .collect()
+        quantities(&self.explainer)
     }
 
     /// The parameters, each with its interval in a box.

@@ -1,0 +1,269 @@
+//! With which values does a plan work? All of them, as inequalities.
+
+use std::fmt::Write as _;
+
+use elbowroom_envelope::obligations::{Refusal, Requirement};
+use elbowroom_envelope::{ExactError, RegionRow, RegionSource, exact as exact_region};
+use elbowroom_num::Rational;
+use elbowroom_plan::{DecoupledEnvelope, ParameterKind, ParametrizedPlan, Side};
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use super::envelope::{self, Quantity, quantities};
+use super::{EnvelopeRequest, Exact, RequestError, Version, ViolationAnswer, Watcher, exact};
+use crate::explain::Explainer;
+use crate::flow::FlowError;
+use crate::linear_form::LinearForm;
+
+/// How many places of a moment inside an action are told apart.
+const MOST_PLACES: usize = 256;
+
+/// The answer as a document (`docs/formats/region-json.md`), and what it is about.
+#[derive(Clone, Debug)]
+pub struct RegionOutcome {
+    /// The answer.
+    pub answer: RegionAnswer,
+    /// The plan with what is left open; `None` if the judge rejects it.
+    pub plan: Option<ParametrizedPlan>,
+    /// The region; `None` if there is no answer, or another one.
+    pub region: Option<elbowroom_envelope::Region>,
+}
+
+/// All values of its parameters for which a plan works: `docs/formats/region-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegionAnswer {
+    /// Always the same.
+    pub format: RegionFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// The name of the plan, as the request gives it.
+    pub plan: String,
+    /// The least separation of interfering happenings (ε).
+    #[serde(with = "exact")]
+    pub epsilon: Rational,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: RegionFinding,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RegionFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-region")]
+    Region,
+}
+
+/// The result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum RegionFinding {
+    /// The plan works with the values of each piece, and with no others in which happenings keep
+    /// their nominal order.
+    Region {
+        /// The parameters.
+        parameters: Vec<Quantity>,
+        /// The pieces; no two have values in common. Empty if the plan works with no values.
+        pieces: Vec<PieceAnswer>,
+    },
+    /// The judge rejects the plan as it stands.
+    Invalid {
+        /// The reason.
+        violation: ViolationAnswer,
+    },
+    /// The plan has no schedule at its nominal values, and the order of happenings is not known.
+    Unscheduled,
+    /// The region is not known.
+    None {
+        /// What stood against it: a limit, or the end of the time for it.
+        reason: String,
+    },
+}
+
+/// Values that satisfy some inequalities; none of these follows from the others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PieceAnswer {
+    /// The inequalities.
+    pub rows: Vec<RowAnswer>,
+}
+
+/// `Σ factor · parameter <= bound`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RowAnswer {
+    /// The inequality for people: `dur_0 + dur_3 <= 4893/100`.
+    pub text: String,
+    /// The factor of each parameter that counts, by its name.
+    pub factors: IndexMap<String, Exact>,
+    /// The upper bound of the sum.
+    #[serde(with = "exact")]
+    pub bound: Rational,
+    /// Whether the sum has to be below the bound.
+    pub strict: bool,
+    /// What it comes from, in words: bounds of the plan, and conditions. Empty for the range of a
+    /// parameter, and for mere orderings.
+    pub because: Vec<String>,
+}
+
+/// All values for which a plan works.
+///
+/// The request's guarantee, box and search do not matter: for single values there is a schedule or
+/// not.
+///
+/// # Errors
+/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+pub fn region(
+    request: &EnvelopeRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<RegionOutcome, RequestError> {
+    let task = &request.task;
+    let outcome = |finding, plan, region| RegionOutcome {
+        answer: RegionAnswer {
+            format: RegionFormat::Region,
+            version: Version,
+            domain: task.problem().domain.clone(),
+            problem: task.problem().name.clone(),
+            plan: request.name.clone(),
+            epsilon: task.epsilon().clone(),
+            finding,
+        },
+        plan,
+        region,
+    };
+    let plan = match envelope::opened(request, watcher) {
+        Ok((plan, _)) => plan,
+        Err(FlowError::Invalid(violation)) => {
+            let violation = (&*violation).into();
+            return Ok(outcome(RegionFinding::Invalid { violation }, None, None));
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let ranges = DecoupledEnvelope::ranges(&plan);
+    let form = match LinearForm::new(task, &plan, &ranges, &plan.nominal(), MOST_PLACES) {
+        Ok(form) => form,
+        Err(Refusal::NoNominalSchedule) => {
+            return Ok(outcome(RegionFinding::Unscheduled, Some(plan), None));
+        }
+        Err(refusal) => return Err(FlowError::Refused(refusal).into()),
+    };
+    let network = form.network.iter().map(|bound| bound.inequality.clone());
+    let network: Vec<_> = network.collect();
+    let found = exact_region(&plan, &network, &form.obligations, &mut || {
+        watcher.flow().map_break(|_| ())
+    });
+    let explainer = Explainer::new(task, &plan);
+    let finding = match &found {
+        Ok(found) => {
+            let row = |row: &RegionRow| answered(&explainer, &form, row);
+            let pieces = found.pieces.iter().map(|piece| PieceAnswer {
+                rows: piece.rows.iter().map(row).collect(),
+            });
+            RegionFinding::Region {
+                parameters: quantities(&explainer),
+                pieces: pieces.collect(),
+            }
+        }
+        Err(ExactError::NotLinear {
+            requirement: Some(requirement),
+        }) => RegionFinding::None {
+            reason: format!(
+                "\"{}\" multiplies quantities that are left open, so that the region has no flat \
+                 sides: leave less open (--vary)",
+                form.obligations[*requirement]
+                    .requirement
+                    .describe(task, &plan.plan)
+            ),
+        },
+        Err(limit) => RegionFinding::None {
+            reason: limit.to_string(),
+        },
+    };
+    Ok(outcome(finding, Some(plan), found.ok()))
+}
+
+fn answered(explainer: &Explainer<'_>, form: &LinearForm, row: &RegionRow) -> RowAnswer {
+    let (task, plan) = (explainer.task, explainer.plan);
+    let name = |id| plan.parameter(id).name.clone();
+    let mut because: Vec<String> = Vec::new();
+    let mut bounds = Vec::new();
+    for source in &row.sources {
+        match *source {
+            RegionSource::Range(_) => {}
+            RegionSource::Network(index) => bounds.extend(form.network[index].source),
+            RegionSource::Requirement(index) => match &form.obligations[index].requirement {
+                // What is between two happenings is what is said of the network.
+                Requirement::Separation { .. } => {}
+                other => because.push(other.describe(task, &plan.plan)),
+            },
+        }
+    }
+    if because.is_empty() {
+        because.extend(fitting(explainer, row, &bounds));
+    }
+    let factors = row.factors.iter();
+    RowAnswer {
+        text: text(plan, row),
+        factors: factors
+            .map(|(id, factor)| (name(*id), Exact(factor.clone())))
+            .collect(),
+        bound: row.bound.clone(),
+        strict: row.is_strict,
+        because,
+    }
+}
+
+/// What must fit into what, if the row is about durations.
+fn fitting(explainer: &Explainer<'_>, row: &RegionRow, bounds: &[(usize, Side)]) -> Option<String> {
+    let (mut takes, mut gives) = (Vec::new(), Vec::new());
+    for (id, factor) in &row.factors {
+        let ParameterKind::Duration(instance) = explainer.plan.parameter(*id).kind else {
+            return None;
+        };
+        let action = explainer.action_name(instance).to_owned();
+        if factor.is_negative() {
+            gives.push(action);
+        } else {
+            takes.push(action);
+        }
+    }
+    explainer.sum_words(takes, gives, bounds)
+}
+
+/// `dur_0 + dur_3 <= 4893/100`, with positive factors on both sides.
+fn text(plan: &ParametrizedPlan, row: &RegionRow) -> String {
+    let (mut left, mut right) = (String::new(), String::new());
+    for (id, factor) in &row.factors {
+        let side = if factor.is_negative() {
+            &mut right
+        } else {
+            &mut left
+        };
+        if !side.is_empty() {
+            side.push_str(" + ");
+        }
+        let factor = factor.abs();
+        if factor != Rational::ONE {
+            // Writing to a string cannot fail.
+            let _ = write!(side, "{factor} ");
+        }
+        side.push_str(&plan.parameter(*id).name);
+    }
+    let equal = if row.is_strict { "" } else { "=" };
+    if left.is_empty() {
+        return format!("{right} >{equal} {}", -&row.bound);
+    }
+    let bound = &row.bound;
+    if right.is_empty() {
+        format!("{left} <{equal} {bound}")
+    } else if bound.is_zero() {
+        format!("{left} <{equal} {right}")
+    } else if bound.is_negative() {
+        format!("{left} <{equal} {right} - {}", bound.abs())
+    } else {
+        format!("{left} <{equal} {right} + {bound}")
+    }
+}

@@ -1,0 +1,260 @@
+//! The whole region of values for which a plan works, as a union of polyhedra.
+//!
+//! Values have a schedule exactly if they satisfy what is left of the network's bounds when the
+//! times are eliminated (Fourier and Motzkin). They have one that breaks a requirement exactly if
+//! they satisfy what is left of these bounds together with one of the requirement's bad cases. The
+//! region is the first polyhedron without the others. What is strict stays so.
+//!
+//! The polyhedra of the union have no point in common.
+
+mod polyhedron;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
+
+use elbowroom_num::{End, Rational};
+use elbowroom_plan::{NodeId, ParameterId, ParametrizedPlan};
+
+use crate::linear::Linear;
+use crate::obligations::{Inequality, Obligation};
+use polyhedron::{Halfspace, Polyhedron};
+
+/// The limit on polyhedra of the union.
+const MOST_PIECES: usize = 256;
+
+/// All values for which a plan works: those that are in one of the pieces.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Region {
+    /// No two of them have a point in common. None if there are no such values.
+    pub pieces: Vec<Piece>,
+}
+
+/// A polyhedron of values, without rows that follow from others.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Piece {
+    /// What the values satisfy.
+    pub rows: Vec<RegionRow>,
+}
+
+/// `Σ factor · parameter <= bound`, or `<` when strict.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RegionRow {
+    /// The factor of each parameter; none is zero, and all are whole numbers without a common
+    /// divisor.
+    pub factors: BTreeMap<ParameterId, Rational>,
+    /// The upper bound of the sum.
+    pub bound: Rational,
+    /// Whether the bound itself is excluded.
+    pub is_strict: bool,
+    /// Where it comes from.
+    pub sources: BTreeSet<RegionSource>,
+}
+
+/// The origin of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RegionSource {
+    /// The natural range of a parameter.
+    Range(ParameterId),
+    /// The bound of the network at this position.
+    Network(usize),
+    /// The requirement at this position.
+    Requirement(usize),
+}
+
+/// The region cannot be written as a union of polyhedra, or is too large for that.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExactError {
+    /// A condition is not linear.
+    #[error(
+        "a condition multiplies quantities that are left open, so that the region has no flat \
+         sides; leave less open"
+    )]
+    NotLinear {
+        /// The position of the requirement; `None` if it is a bound of the network.
+        requirement: Option<usize>,
+    },
+    /// Too many inequalities on the way.
+    #[error("the region takes more than {limit} inequalities at once; leave less open")]
+    TooManyRows {
+        /// How many are kept.
+        limit: usize,
+    },
+    /// Too many polyhedra.
+    #[error("the region falls into more than {limit} pieces; leave less open")]
+    TooManyPieces {
+        /// How many are kept.
+        limit: usize,
+    },
+    /// The caller wanted no more.
+    #[error("the region was not done when there was no more time")]
+    Ended,
+}
+
+impl RegionRow {
+    /// Whether it holds for these values, by parameter.
+    pub fn holds(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
+        let terms = self.factors.iter();
+        let sum: Rational = terms.map(|(id, factor)| factor * &value(*id)).sum();
+        sum < self.bound || (sum == self.bound && !self.is_strict)
+    }
+}
+
+impl Region {
+    /// Whether a plan works with these values, by parameter.
+    pub fn contains(&self, value: &dyn Fn(ParameterId) -> Rational) -> bool {
+        let has = |piece: &Piece| piece.rows.iter().all(|row| row.holds(value));
+        self.pieces.iter().any(has)
+    }
+}
+
+/// The region of a plan, as far as happenings keep the order that the requirements assume: all
+/// values for which `network` has a schedule, and no bad case of `obligations` holds in any. Bad
+/// cases may use the node after the plan's last, a moment inside an action.
+///
+/// `flow` is asked often whether to go on.
+///
+/// # Errors
+/// When something is not linear, a limit is reached, or `flow` says no.
+pub fn exact(
+    plan: &ParametrizedPlan,
+    network: &[Inequality],
+    obligations: &[Obligation],
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Region, ExactError> {
+    let coordinates = Coordinates {
+        // One more for a moment inside an action.
+        times: plan.plan.nodes.len() + 1,
+    };
+    let mut bounds = Polyhedron::default();
+    for (index, inequality) in network.iter().enumerate() {
+        let source = RegionSource::Network(index);
+        let row = coordinates.row(inequality, source);
+        bounds.push(row.ok_or(ExactError::NotLinear { requirement: None })?);
+    }
+    for (index, parameter) in plan.parameters.iter().enumerate() {
+        for row in coordinates.range(ParameterId::from(index), parameter) {
+            bounds.push(row);
+        }
+    }
+    let mut scheduled = bounds.clone().without(coordinates.times, flow)?;
+    scheduled.reduce(flow)?;
+    if !scheduled.is_feasible() {
+        return Ok(Region::default());
+    }
+    // What breaks a requirement, with how many of its rows the schedules do not imply.
+    let mut bad: Vec<(usize, Polyhedron)> = Vec::new();
+    for (index, obligation) in obligations.iter().enumerate() {
+        let source = RegionSource::Requirement(index);
+        for case in &obligation.bad_cases {
+            let differences = case.differences.iter().map(difference);
+            let mut rows = bounds.clone();
+            for inequality in differences.chain(case.inequalities.iter().cloned()) {
+                let row = coordinates.row(&inequality, source);
+                let requirement = Some(index);
+                rows.push(row.ok_or(ExactError::NotLinear { requirement })?);
+            }
+            if flow().is_break() {
+                return Err(ExactError::Ended);
+            }
+            if !rows.is_feasible() {
+                continue;
+            }
+            let mut broken = rows.without(coordinates.times, flow)?;
+            broken.reduce(flow)?;
+            broken.retain(|row| scheduled.with(row.negated()).is_feasible());
+            bad.push((broken.rows().len(), broken));
+        }
+    }
+    // Those that cut off a half-space first, which makes no new pieces.
+    bad.sort_by_key(|(count, _)| *count);
+    let mut pieces = vec![scheduled];
+    for (_, broken) in bad {
+        let mut left = Vec::new();
+        for piece in pieces {
+            if flow().is_break() {
+                return Err(ExactError::Ended);
+            }
+            left.extend(piece.minus(&broken));
+            if left.len() > MOST_PIECES {
+                let limit = MOST_PIECES;
+                return Err(ExactError::TooManyPieces { limit });
+            }
+        }
+        for piece in &mut left {
+            piece.reduce(flow)?;
+        }
+        pieces = left;
+    }
+    Ok(Region {
+        pieces: pieces.iter().map(|own| coordinates.piece(own)).collect(),
+    })
+}
+
+/// `to - from <= bound` as an inequality.
+fn difference(difference: &crate::obligations::Difference) -> Inequality {
+    let mut expression = Linear::difference(difference.from, difference.to);
+    expression.constant = -&difference.bound;
+    Inequality {
+        expression,
+        is_strict: difference.is_strict,
+    }
+}
+
+/// How times and parameters are numbered: the times first, by node.
+struct Coordinates {
+    times: usize,
+}
+
+impl Coordinates {
+    /// `None` if it is not linear.
+    fn row(&self, inequality: &Inequality, source: RegionSource) -> Option<Halfspace> {
+        let expression = &inequality.expression;
+        if !expression.products.is_empty() {
+            return None;
+        }
+        let time = |(node, factor): (&NodeId, &Rational)| (node.index(), factor.clone());
+        let times = expression.times.iter().map(time);
+        let parameters = expression.parameters.iter();
+        let parameters = parameters.map(|(id, factor)| (self.times + id.index(), factor.clone()));
+        Some(Halfspace {
+            factors: times.chain(parameters).collect(),
+            bound: -&expression.constant,
+            is_strict: inequality.is_strict,
+            sources: [source].into(),
+        })
+    }
+
+    /// The natural range of a parameter.
+    fn range(&self, id: ParameterId, parameter: &elbowroom_plan::Parameter) -> Vec<Halfspace> {
+        let range = &parameter.range;
+        let sides = [(&range.lower, -1), (&range.upper, 1)];
+        let row = |(end, sign): (&End, i64)| {
+            let sign = Rational::from(sign);
+            Some(Halfspace {
+                bound: end.value()? * &sign,
+                factors: [(self.times + id.index(), sign)].into(),
+                is_strict: matches!(end, End::Open(_)),
+                sources: [RegionSource::Range(id)].into(),
+            })
+        };
+        sides.into_iter().filter_map(row).collect()
+    }
+
+    fn piece(&self, polyhedron: &Polyhedron) -> Piece {
+        let row = |row: &Halfspace| {
+            let parameter = |index: usize| ParameterId::from(index - self.times);
+            let factors = row.factors.iter();
+            RegionRow {
+                factors: factors
+                    .map(|(index, factor)| (parameter(*index), factor.clone()))
+                    .collect(),
+                bound: row.bound.clone(),
+                is_strict: row.is_strict,
+                sources: row.sources.clone(),
+            }
+        };
+        Piece {
+            rows: polyhedron.rows().iter().map(row).collect(),
+        }
+    }
+}
