@@ -273,8 +273,8 @@ fn a_run_whose_world_fails_leaves_its_document() {
 fn planning_takes_time_on_a_wall_clock() {
     let (script, world) = (temporary("planner"), temporary("slow.toml"));
     let own = env!("CARGO_BIN_EXE_elbowroom");
-    let planner = format!("sleep 0.2; exec {own} plan \"$1\" \"$2\"\n");
-    fs::write(&script, planner).expect("written");
+    let program = format!("sleep 0.2; exec {own} plan \"$1\" \"$2\"\n");
+    fs::write(&script, program).expect("written");
     let slow = "format = \"elbowroom-world\"\nversion = 1\n[[duration]]\naction = \"drive\"\n\
                 uniform = { from = 25, to = 26 }\n";
     fs::write(&world, slow).expect("written");
