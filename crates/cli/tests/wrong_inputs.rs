@@ -124,10 +124,16 @@ fn a_bound_that_nothing_satisfies_is_shown_where_it_stands() {
 }
 
 #[test]
-fn algorithms_that_do_not_exist_are_not_offered() {
-    let said = said(2, &envelope(&DELIVERY, &["--method", "exact"]));
-    let offered = said.split("possible values").nth(1).expect("a list");
-    assert!(!offered.contains("exact"), "{said}");
+fn algorithms_that_are_offered_work() {
+    let refused = said(2, &envelope(&DELIVERY, &["--method", "greedy"]));
+    let offered = refused.split("possible values: ").nth(1).expect("a list");
+    let offered = offered.split(']').next().expect("an end of the list");
+    let offered: Vec<&str> = offered.split(", ").collect();
+    assert_eq!(offered, ["irr", "best", "exact"]);
+    for method in offered {
+        let done = elbowroom(&envelope(&DELIVERY, &["--method", method]));
+        assert!(done.status.success(), "{method}: {done:?}");
+    }
 }
 
 #[test]
