@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-/// The allocator of musl asks the operating system so often that runs would take half as long again.
+/// The allocator of musl asks the operating system so often that runs would take a quarter longer.
 #[cfg(target_env = "musl")]
 #[global_allocator]
 static ALLOCATOR: dlmalloc::GlobalDlmalloc = dlmalloc::GlobalDlmalloc;
