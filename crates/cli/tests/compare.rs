@@ -140,6 +140,78 @@ fn each_trial_has_a_row_of_its_own_whatever_the_number_of_threads() {
 }
 
 #[test]
+fn the_first_trial_of_each_kind_of_failure_can_be_played_again_and_looked_at() {
+    let folder = temporary("failures");
+    let path = folder.display().to_string();
+    let output = ["--each-trial", "--trials", "12", "--output", &path];
+    let results = compare(&["experiments/clumsy.toml"], &output);
+    let results: serde_json::Value = serde_json::from_str(&results).expect("a document");
+    let trials = fs::read_to_string(folder.join("trials.csv")).expect("the table");
+    let (mut traces, mut actions) = (0, 0);
+    for (row, cells) in results["cells"]
+        .as_array()
+        .expect("rows")
+        .iter()
+        .enumerate()
+    {
+        for (column, cell) in cells.as_array().expect("columns").iter().enumerate() {
+            let failures = cell["failures"].as_array().cloned().unwrap_or_default();
+            let failed: u64 = failures
+                .iter()
+                .filter_map(|kind| kind["runs"].as_u64())
+                .sum();
+            let count = |name: &str| cell[name].as_u64().expect("a count");
+            assert_eq!(failed, count("runs") - count("successes"));
+            actions += failures
+                .iter()
+                .filter(|kind| kind["action"].is_string())
+                .count();
+            let mut kinds = failures.clone();
+            kinds.sort_by_key(|kind| std::cmp::Reverse(kind["runs"].as_u64()));
+            for kind in 0..kinds.len().min(3) {
+                let file = folder.join(format!("failures/{row}-{column}-{kind}.jsonl"));
+                let text = fs::read_to_string(&file).expect("a trace");
+                let last: serde_json::Value =
+                    serde_json::from_str(text.lines().last().expect("lines")).expect("the end");
+                let (executor, world) = (&results["rows"][row], &results["columns"][column]);
+                // The same end, at the same time, as in the experiment.
+                let is_it = |line: &&str| {
+                    let cells: Vec<&str> = line.split(',').collect();
+                    let time: f64 = cells[6].parse().unwrap_or(-1.0);
+                    cells[2] == world.as_str().expect("a name")
+                        && cells[4] == executor.as_str().expect("a name")
+                        && cells[5] == last["verdict"].as_str().expect("a verdict")
+                        && (time - last["time"]["decimal"].as_f64().expect("a time")).abs() < 1e-5
+                };
+                assert!(
+                    trials.lines().any(|line| is_it(&line)),
+                    "{}",
+                    file.display()
+                );
+                let replay = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+                    .args(["run", "--json", "--replay"])
+                    .arg(&file)
+                    .output()
+                    .expect("the command can be started");
+                let replay: serde_json::Value =
+                    serde_json::from_slice(&replay.stdout).expect("a document");
+                assert_eq!(replay["agrees"], true, "{}: {replay}", file.display());
+                traces += 1;
+            }
+        }
+    }
+    assert!(traces > 3 && actions > 0, "{traces} {actions}");
+    let page = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+        .args(["report", &path])
+        .output()
+        .expect("the command can be started");
+    let page = String::from_utf8(page.stdout).expect("text");
+    // Each trace has its page inside.
+    assert_eq!(page.matches("\"title\":\"Run of ").count(), traces);
+    fs::remove_dir_all(folder).expect("it is there");
+}
+
+#[test]
 fn so_has_each_trial_without_time() {
     let experiment = "experiments/olisipo_sf3.toml";
     let (lines, _) = each_trial(experiment, &["--trials", "2"], "each-3");

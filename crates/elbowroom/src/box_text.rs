@@ -220,7 +220,7 @@ impl Value {
 }
 
 /// The parameter of that name, or the duration of that action.
-fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
+pub(crate) fn find(name: &str, plan: &ParametrizedPlan) -> Result<ParameterId, BoxTextError> {
     if let Some(id) = plan.find(name) {
         return Ok(id);
     }

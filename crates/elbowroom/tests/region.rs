@@ -4,19 +4,22 @@
 
 mod shared;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use elbowroom::AnyPlan;
-use elbowroom::answers::region::{RegionFinding, region};
-use elbowroom::answers::{EnvelopeRequest, RegionOutcome, Unwatched};
+use elbowroom::answers::region::{
+    Others, PictureError, Plane, RegionFinding, RegionSettings, picture, region,
+};
+use elbowroom::answers::{EnvelopeRequest, Halt, RegionOutcome, Unwatched, Watcher};
 use elbowroom::envelope::{Guarantee, Oracle};
 use elbowroom::model::Task;
 use elbowroom::num::{Interval, Rational};
 use elbowroom::pddl::{Source, read_plan, read_problem};
 use elbowroom::plan::{DecoupledEnvelope, ParameterId, ParametrizedPlan, format};
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use shared::case::Case;
 use shared::draw;
@@ -38,7 +41,12 @@ fn case(name: &str) -> (Arc<Task>, AnyPlan) {
 }
 
 fn of(task: &Arc<Task>, plan: AnyPlan) -> RegionOutcome {
-    region(&EnvelopeRequest::new(task, plan), &mut Unwatched).expect("within exact reasoning")
+    region(
+        &EnvelopeRequest::new(task, plan),
+        &RegionSettings::default(),
+        &mut Unwatched,
+    )
+    .expect("within exact reasoning")
 }
 
 /// Values around the nominal ones, a share of each time on round numbers.
@@ -120,39 +128,7 @@ fn the_region_of_each_case_has_the_points_that_the_box_check_accepts() {
 /// takes less long than one of them.
 #[test]
 fn where_one_of_two_things_has_to_be_so_there_are_two_pieces() {
-    let domain = Source::new(
-        "gate.pddl",
-        "(define (domain gate)
-           (:requirements :durative-actions)
-           (:predicates (given) (opened))
-           (:durative-action signal :parameters () :duration (>= ?duration 0)
-             :condition (and) :effect (at end (given)))
-           (:durative-action work :parameters () :duration (>= ?duration 0)
-             :condition (and) :effect (and))
-           (:durative-action open :parameters () :duration (= ?duration 1)
-             :condition (at start (given)) :effect (at end (opened))))",
-    );
-    let problem = Source::new(
-        "problem.pddl",
-        "(define (problem morning) (:domain gate) (:init) (:goal (opened)))",
-    );
-    let task = Task::new(read_problem(&domain, &problem).expect("no mistakes").0);
-    let plan = "parameter s default 1; parameter c default 2; parameter d default 3;
-        durative-action instance n0 : (signal);
-        durative-action instance n1 : (work);
-        durative-action instance n2 : (work);
-        durative-action instance n3 : (open);
-        c: n0.end - n0.start in [s, s];
-        c: n1.end - n1.start in [c, c];
-        c: n2.end - n2.start in [d, d];
-        c: n3.end - n3.start in [1, 1];
-        c: n0.start - .zero in [0, 0];
-        c: n1.start - .zero in [0, 0];
-        c: n2.start - .zero in [0, 0];
-        c: n3.start - n1.end in [0, inf];
-        c: n3.start - n2.end in [0, inf];";
-    let plan = format::read(plan.as_bytes(), &task).expect("no mistakes");
-    let task = Arc::new(task);
+    let (task, plan) = gate();
     let outcome = of(&task, plan.into());
     let RegionFinding::Region { pieces, .. } = &outcome.answer.finding else {
         panic!("{:?}", outcome.answer.finding);
@@ -169,6 +145,220 @@ fn where_one_of_two_things_has_to_be_so_there_are_two_pieces() {
     );
     let inside = compare("gate", &task, &outcome, 1000);
     assert!(inside > 100 && inside < 1000, "{inside}");
+}
+
+const GATE: &str = "(define (domain gate)
+           (:requirements :durative-actions)
+           (:predicates (given) (opened))
+           (:durative-action signal :parameters () :duration (>= ?duration 0)
+             :condition (and) :effect (at end (given)))
+           (:durative-action work :parameters () :duration (>= ?duration 0)
+             :condition (and) :effect (and))
+           (:durative-action open :parameters () :duration (= ?duration 1)
+             :condition (at start (given)) :effect (at end (opened))))";
+
+const GATE_PLAN: &str = "parameter s default 1; parameter c default 2; parameter d default 3;
+        durative-action instance n0 : (signal);
+        durative-action instance n1 : (work);
+        durative-action instance n2 : (work);
+        durative-action instance n3 : (open);
+        c: n0.end - n0.start in [s, s];
+        c: n1.end - n1.start in [c, c];
+        c: n2.end - n2.start in [d, d];
+        c: n3.end - n3.start in [1, 1];
+        c: n0.start - .zero in [0, 0];
+        c: n1.start - .zero in [0, 0];
+        c: n2.start - .zero in [0, 0];
+        c: n3.start - n1.end in [0, inf];
+        c: n3.start - n2.end in [0, inf];";
+
+/// The plan of a gate, whose region has two pieces.
+fn gate() -> (Arc<Task>, ParametrizedPlan) {
+    let domain = Source::new("gate.pddl", GATE);
+    let problem = Source::new(
+        "problem.pddl",
+        "(define (problem morning) (:domain gate) (:init) (:goal (opened)))",
+    );
+    let task = Task::new(read_problem(&domain, &problem).expect("no mistakes").0);
+    let plan = format::read(GATE_PLAN.as_bytes(), &task).expect("no mistakes");
+    (Arc::new(task), plan)
+}
+
+#[test]
+fn volumes_and_shares_are_what_random_points_say() {
+    let mut exact = 0;
+    for name in [
+        "battery",
+        "delivery",
+        "hatchery",
+        "lamp",
+        "match",
+        "paintshop",
+    ] {
+        let (task, plan) = case(name);
+        exact += measured(name, &task, plan);
+    }
+    let (task, plan) = gate();
+    exact += measured("gate", &task, plan.into());
+    assert!(exact >= 5, "{exact}");
+}
+
+/// Whether the volume is exact.
+fn measured(name: &str, task: &Arc<Task>, plan: AnyPlan) -> usize {
+    let settings = RegionSettings {
+        with_boxes: true,
+        with_volume: true,
+        seed: 3,
+    };
+    let request = EnvelopeRequest::new(task, plan);
+    let outcome = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let RegionFinding::Region { boxes, measure, .. } = &outcome.answer.finding else {
+        panic!("{name}: {:?}", outcome.answer.finding);
+    };
+    let plan = outcome.plan.as_ref().expect("a plan");
+    let found = outcome.region.as_ref().expect("a region");
+    let measure = measure
+        .as_ref()
+        .unwrap_or_else(|| panic!("{name} has a volume"));
+    let mut frame = DecoupledEnvelope::ranges(plan);
+    let mut whole = 0.0;
+    for (index, [lower, upper]) in measure.frame.values().enumerate() {
+        let interval = Interval::closed(lower.0.clone(), upper.0.clone());
+        whole += interval.width().expect("bounded").to_f64().log10();
+        frame = frame.with_interval(ParameterId::from(index), interval);
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(15);
+    let drawn = 4000;
+    let mut inside = 0;
+    for _ in 0..drawn {
+        let uniform: Vec<Rational> = measure
+            .frame
+            .values()
+            .map(|[lower, upper]| {
+                let share = Rational::new(random.random_range(0..1_000_000), 1_000_000);
+                &lower.0 + (&upper.0 - &lower.0) * share
+            })
+            .collect();
+        inside += usize::from(found.contains(&|id| uniform[id.index()].clone()));
+    }
+    let share = 10_f64.powf(measure.log10 - whole);
+    let expected = share * f64::from(drawn);
+    let spread = 4.0 * (expected * (1.0 - share).max(0.0)).sqrt() + 2.0;
+    let counted = f64::from(u32::try_from(inside).expect("few"));
+    assert!(
+        (counted - expected).abs() < spread,
+        "{name}: {counted} of {drawn} points, and a share of {share}"
+    );
+    assert_eq!(boxes.len(), 3, "{name}");
+    for own in boxes {
+        let share = own.share.as_ref().expect("a share");
+        assert!(
+            share.decimal > 0.0 && share.decimal <= 1.0,
+            "{name}: {own:?}"
+        );
+        let mut small = frame.clone();
+        for (index, interval) in own.intervals.values().enumerate() {
+            let id = ParameterId::from(index);
+            let ends = Interval {
+                lower: interval.lower.clone(),
+                upper: interval.upper.clone(),
+            };
+            small = small.with_interval(id, ends.intersection(frame.interval(id)));
+        }
+        for _ in 0..100 {
+            let point = draw::valuation(&small, &mut random);
+            let value = |id: ParameterId| point[id].clone();
+            assert!(found.contains(&value), "{name}: {} has {point:?}", own.name);
+        }
+    }
+    println!("{name}: {measure:?}");
+    usize::from(measure.volume.is_some())
+}
+
+/// Says no after so many questions.
+struct Patience(usize);
+
+impl Watcher for Patience {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        match self.0.checked_sub(1) {
+            Some(left) => {
+                self.0 = left;
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Break(Halt::TimeLimit),
+        }
+    }
+}
+
+#[test]
+fn what_was_found_before_the_end_is_a_part_of_the_region() {
+    let (task, plan) = gate();
+    let request = EnvelopeRequest::new(&task, plan);
+    let settings = RegionSettings::default();
+    let whole = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let whole = whole.region.expect("a region");
+    let (mut nothing, mut parts) = (0, 0);
+    for patience in 0.. {
+        let outcome = region(&request, &settings, &mut Patience(patience));
+        let outcome = outcome.expect("within exact reasoning");
+        match &outcome.answer.finding {
+            RegionFinding::None { .. } => nothing += 1,
+            RegionFinding::Region {
+                pieces,
+                missing: Some(_),
+                ..
+            } => {
+                assert!(!pieces.is_empty());
+                let part = outcome.region.expect("a region");
+                assert!(part.pieces.iter().all(|piece| whole.pieces.contains(piece)));
+                assert!(part.pieces.len() < whole.pieces.len() || part.missing.is_some());
+                parts += 1;
+            }
+            RegionFinding::Region { missing: None, .. } => break,
+            finding => panic!("{finding:?}"),
+        }
+        assert!(patience < 10_000);
+    }
+    assert!(nothing > 0 && parts > 0, "{nothing} {parts}");
+}
+
+#[test]
+fn a_picture_has_the_region_the_boxes_and_the_nominal_point() {
+    let (task, plan) = case("match");
+    let settings = RegionSettings {
+        with_boxes: true,
+        ..RegionSettings::default()
+    };
+    let request = EnvelopeRequest::new(&task, plan);
+    let outcome = region(&request, &settings, &mut Unwatched).expect("within exact reasoning");
+    let mut flow = || ControlFlow::Continue(());
+    for others in [Others::Nominal, Others::Any] {
+        let plane = Plane {
+            axes: ["dur_1".to_owned(), "(inspect keel)".to_owned()],
+            others,
+        };
+        let picture = picture(&outcome, &plane, &mut flow).expect("two parameters");
+        assert_eq!(picture.boxes.len(), 3);
+        assert_eq!(picture.areas.len(), 1);
+        // The nominal point is inside both.
+        let point = picture.point.as_ref().expect("a point").1;
+        assert_eq!(point, [8.0, 10.0]);
+        let is_left = |corners: &Vec<[f64; 2]>| {
+            (0..corners.len()).all(|at| {
+                let ([ax, ay], [bx, by]) = (corners[at], corners[(at + 1) % corners.len()]);
+                (bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax) >= 0.0
+            })
+        };
+        assert!(is_left(&picture.areas[0]), "{:?}", picture.areas);
+    }
+    let same = Plane {
+        axes: ["dur_1".to_owned(), "dur_1".to_owned()],
+        others: Others::Nominal,
+    };
+    assert!(matches!(
+        picture(&outcome, &same, &mut flow),
+        Err(PictureError::Same(_))
+    ));
 }
 
 #[test]

@@ -8,6 +8,8 @@
 //! The polyhedra of the union have no point in common.
 
 mod polyhedron;
+mod shadow;
+mod volume;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
@@ -19,6 +21,9 @@ use crate::linear::Linear;
 use crate::obligations::{Inequality, Obligation};
 use polyhedron::{Halfspace, Polyhedron};
 
+pub use shadow::Flat;
+pub use volume::{Body, Component};
+
 /// The limit on polyhedra of the union.
 const MOST_PIECES: usize = 256;
 
@@ -27,6 +32,8 @@ const MOST_PIECES: usize = 256;
 pub struct Region {
     /// No two of them have a point in common. None if there are no such values.
     pub pieces: Vec<Piece>,
+    /// Why there may be more such values than those in the pieces; `None` if there are not.
+    pub missing: Option<ExactError>,
 }
 
 /// A polyhedron of values, without rows that follow from others.
@@ -111,10 +118,11 @@ impl Region {
 /// values for which `network` has a schedule, and no bad case of `obligations` holds in any. Bad
 /// cases may use the node after the plan's last, a moment inside an action.
 ///
-/// `flow` is asked often whether to go on.
+/// `flow` is asked often whether to go on. If it says no, or a limit is reached, the pieces found
+/// until then are the answer, with what is [missing](Region::missing): they are a part of the region.
 ///
 /// # Errors
-/// When something is not linear, a limit is reached, or `flow` says no.
+/// When something is not linear, or nothing was found before a limit or the end.
 pub fn exact(
     plan: &ParametrizedPlan,
     network: &[Inequality],
@@ -167,27 +175,48 @@ pub fn exact(
     }
     // Those that cut off a half-space first, which makes no new pieces.
     bad.sort_by_key(|(count, _)| *count);
-    let mut pieces = vec![scheduled];
-    for (_, broken) in bad {
-        let mut left = Vec::new();
-        for piece in pieces {
-            if flow().is_break() {
-                return Err(ExactError::Ended);
-            }
-            left.extend(piece.minus(&broken));
-            if left.len() > MOST_PIECES {
-                let limit = MOST_PIECES;
-                return Err(ExactError::TooManyPieces { limit });
-            }
-        }
-        for piece in &mut left {
-            piece.reduce(flow)?;
-        }
-        pieces = left;
+    let bad: Vec<Polyhedron> = bad.into_iter().map(|(_, broken)| broken).collect();
+    let (pieces, missing) = without_all(scheduled, &bad, flow);
+    match missing {
+        Some(limit) if pieces.is_empty() => Err(limit),
+        missing => Ok(Region {
+            pieces: pieces.iter().map(|own| coordinates.piece(own)).collect(),
+            missing,
+        }),
     }
-    Ok(Region {
-        pieces: pieces.iter().map(|own| coordinates.piece(own)).collect(),
-    })
+}
+
+/// What is left of a polyhedron without others, in parts without a common point: one part after
+/// the other to its end, so that those that are done when a limit is reached are right.
+fn without_all(
+    whole: Polyhedron,
+    bad: &[Polyhedron],
+    flow: &mut dyn FnMut() -> ControlFlow<()>,
+) -> (Vec<Polyhedron>, Option<ExactError>) {
+    let mut done = Vec::new();
+    let mut open = vec![(whole, 0)];
+    while let Some((piece, next)) = open.pop() {
+        if flow().is_break() {
+            return (done, Some(ExactError::Ended));
+        }
+        let Some(broken) = bad.get(next) else {
+            if done.len() == MOST_PIECES {
+                let limit = MOST_PIECES;
+                return (done, Some(ExactError::TooManyPieces { limit }));
+            }
+            done.push(piece);
+            continue;
+        };
+        let before = open.len();
+        for mut part in piece.minus(broken) {
+            if let Err(ended) = part.reduce(flow) {
+                return (done, Some(ended));
+            }
+            open.push((part, next + 1));
+        }
+        open[before..].reverse();
+    }
+    (done, None)
 }
 
 /// `to - from <= bound` as an inequality.

@@ -87,7 +87,7 @@ pub use best::{
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofWay};
 pub use enforce::enforced;
-pub use exact::{ExactError, Piece, Region, RegionRow, RegionSource, exact};
+pub use exact::{Body, Component, ExactError, Flat, Piece, Region, RegionRow, RegionSource, exact};
 pub use frontier::Growth;
 pub use guarantee::Guarantee;
 pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};

@@ -9,7 +9,7 @@ use elbowroom_report::table::Table;
 use elbowroom_text::{Diagnostics, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::compare::{self, Experiment, ExperimentError, Part, Results};
+use crate::compare::{self, Experiment, ExperimentError, Part, Results, TrialId};
 use crate::perturbed::{self, PerturbedError, PerturbedExperiment, PerturbedResults};
 use crate::record::TrialRecords;
 
@@ -39,6 +39,15 @@ pub enum CompareAnswer {
     Timed(Results),
     /// In worlds without time.
     Untimed(PerturbedResults),
+}
+
+/// A failed trial that stands for others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FailedTrial {
+    /// Row, column, and the position of its kind of failure in that cell's most frequent ones.
+    pub place: (usize, usize, usize),
+    /// The trial.
+    pub id: TrialId,
 }
 
 /// Why there is no answer.
@@ -89,6 +98,20 @@ impl AnyExperiment {
         match self {
             Self::Timed(experiment) => experiment.seed = seed,
             Self::Untimed(experiment) => experiment.seed = seed,
+        }
+    }
+
+    /// Makes a trial once more, for its trace (`docs/formats/trace.md`).
+    ///
+    /// # Errors
+    /// When there is no such trial.
+    pub fn trace(&self, failed: &FailedTrial) -> Result<String, CompareError> {
+        let (row, column, _) = failed.place;
+        match self {
+            Self::Timed(experiment) => Ok(compare::trace(experiment, (row, column), failed.id)?),
+            Self::Untimed(_) => Err(CompareError::Other(
+                "trials in worlds without time have no trace".to_owned(),
+            )),
         }
     }
 
@@ -196,6 +219,28 @@ impl CompareAnswer {
         let untimed: Option<Vec<PerturbedResults>> = untimed.collect();
         let untimed = untimed.ok_or(CompareError::OfAnother)?;
         Ok(Self::Untimed(PerturbedResults::merged(&untimed)?))
+    }
+
+    /// The first trial of the most frequent kinds of failure: so many of each cell at most, and so many
+    /// of all, the most frequent first; none of worlds without time, whose runs have no trace.
+    pub fn failed_trials(&self, of_a_cell: usize, most: usize) -> Vec<FailedTrial> {
+        let Self::Timed(results) = self else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        for (row, cells) in results.cells.iter().enumerate() {
+            for (column, cell) in cells.iter().enumerate() {
+                let kinds = cell.failures.kinds().into_iter().take(of_a_cell);
+                for (kind, failure) in kinds.enumerate() {
+                    let place = (row, column, kind);
+                    let id = failure.first;
+                    found.push((std::cmp::Reverse(failure.runs), FailedTrial { place, id }));
+                }
+            }
+        }
+        found.sort();
+        let trials = found.into_iter().map(|(_, trial)| trial);
+        trials.take(most).collect()
     }
 
     /// As JSON.

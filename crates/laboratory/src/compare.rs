@@ -8,6 +8,7 @@
 
 mod clairvoyant;
 mod experiment;
+mod failures;
 mod optimum;
 pub(crate) mod parts;
 mod plots;
@@ -19,6 +20,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 pub use experiment::{Column, Experiment, ExperimentError, Planning, Published, Together};
+pub use failures::{Failure, Failures, TrialId};
 pub use optimum::ColumnOptimum;
 pub use results::{Cell, Pair, Results, ResultsError};
 
@@ -64,6 +66,36 @@ pub fn run(
     observe: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Results, ExperimentError> {
     run_recorded(experiment, part, None, observe)
+}
+
+/// Makes one trial of an executor in a column once more: its trace (`docs/formats/trace.md`), which
+/// `elbowroom run --replay` plays and `elbowroom report` shows.
+///
+/// # Errors
+/// When there is no such trial, or as for [`run`].
+pub fn trace(
+    experiment: &Experiment,
+    (row, column): (usize, usize),
+    id: TrialId,
+) -> Result<String, ExperimentError> {
+    let wrong = || ExperimentError::other("there is no such trial".to_owned());
+    let executor = experiment.executors.get(row).ok_or_else(wrong)?;
+    let column = experiment.columns.get(column).ok_or_else(wrong)?;
+    // No other plans are made ready.
+    let alone = Experiment {
+        executors: vec![executor.clone()],
+        columns: vec![column.clone()],
+        ..experiment.clone()
+    };
+    let fillings = alone.fillings();
+    let setting = Setting {
+        experiment: &alone,
+        problem: id.problem,
+        filling: fillings.get(id.problem).ok_or_else(wrong)?,
+        piece: 0,
+        pieces: 1,
+    };
+    setting.trace(id.trial)
 }
 
 /// The same, with a record of each trial.

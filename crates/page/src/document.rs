@@ -20,6 +20,9 @@ pub struct Document {
     pub sections: Vec<Section>,
     /// Texts that occur often; see [`Text`].
     pub texts: Vec<String>,
+    /// Pages that rows of tables lead to ([`Table::opens`]).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub more: Vec<Document>,
 }
 
 /// The answer in one line.
@@ -103,6 +106,8 @@ pub enum Section {
     Series(Series),
     /// Quantities to change, and what comes of it.
     Sliders(Sliders),
+    /// Where a plan works, by two quantities at a time.
+    Plane(Plane),
     /// Sentences.
     Prose(Prose),
 }
@@ -231,6 +236,9 @@ pub struct Table {
     pub times: Vec<f64>,
     /// The bar of the first chart that each row is about, if rows are about actions.
     pub bars: Vec<usize>,
+    /// For each row, the page that it leads to, by its position in [`Document::more`], if rows lead
+    /// to pages.
+    pub opens: Vec<Option<usize>>,
 }
 
 /// Shares with their intervals.
@@ -325,6 +333,54 @@ pub struct Slider {
     pub to: String,
     /// The least change.
     pub step: String,
+}
+
+/// A region, to look at by two quantities at a time. Numbers are for drawing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Plane {
+    /// The heading.
+    pub heading: String,
+    /// A note on it.
+    pub note: String,
+    /// The quantities.
+    pub quantities: Vec<PlaneQuantity>,
+    /// The plan works with the values that satisfy all rows of one of these.
+    pub pieces: Vec<Vec<PlaneRow>>,
+    /// Boxes to draw.
+    pub boxes: Vec<PlaneBox>,
+}
+
+/// A quantity of a region.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlaneQuantity {
+    /// The parameter's name.
+    pub name: String,
+    /// What it is.
+    pub quantity: String,
+    /// The value as planned.
+    pub nominal: f64,
+    /// Where its axis begins.
+    pub from: f64,
+    /// Where its axis ends.
+    pub to: f64,
+}
+
+/// `Σ factor · quantity <= bound`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlaneRow {
+    /// Positions of quantities with their factors.
+    pub factors: Vec<(usize, f64)>,
+    /// The upper bound of the sum.
+    pub bound: f64,
+}
+
+/// A box to draw.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PlaneBox {
+    /// The name.
+    pub name: String,
+    /// Both ends for each quantity; `None` where there is none.
+    pub intervals: Vec<(Option<f64>, Option<f64>)>,
 }
 
 /// Sentences.

@@ -12,8 +12,11 @@ use crate::plan::word;
 /// The meaning of the intervals.
 const INTERVALS: &str = "The share of runs that reached the goal, with Wilson's 95 % interval.";
 
+/// The pages of some failed trials, by row, column and kind of failure.
+pub(crate) type Trials = BTreeMap<(usize, usize, usize), Document>;
+
 /// The page about an experiment on a clock.
-pub(crate) fn timed(results: &Results) -> Document {
+pub(crate) fn timed(results: &Results, trials: Trials) -> Document {
     let mut sections = vec![Section::Rates(Rates {
         heading: "Runs that reached the goal".to_owned(),
         note: if results.optimum.is_empty() {
@@ -34,6 +37,8 @@ pub(crate) fn timed(results: &Results) -> Document {
     let mut causes = counts(results, "Why plans were given up", &causes);
     "The number of plans, by cause. One run may give up several.".clone_into(&mut causes.note);
     sections.push(Section::Table(causes));
+    let (failures, more) = failures(results, trials);
+    sections.extend(failures);
     let runs = results
         .cells
         .iter()
@@ -47,7 +52,69 @@ pub(crate) fn timed(results: &Results) -> Document {
         &results.fingerprint,
     );
     let made = made(runs, "runs", results.is_interrupted);
-    document(&results.title, made, facts, sections)
+    Document {
+        more,
+        ..document(&results.title, made, facts, sections)
+    }
+}
+
+/// The kinds of failure, each with a trial to look at if there is one; and the pages of these.
+fn failures(results: &Results, mut trials: Trials) -> (Option<Section>, Vec<Document>) {
+    let columns = [
+        ("world", false),
+        ("executor", false),
+        ("ended with", false),
+        ("because", false),
+        ("action", false),
+        ("runs", true),
+        ("first trial", false),
+    ];
+    let (mut rows, mut opens, mut more) = (Vec::new(), Vec::new(), Vec::new());
+    for (column, world) in results.columns.iter().enumerate() {
+        for (row, cells) in results.rows.iter().zip(&results.cells).enumerate() {
+            let (name, cells) = cells;
+            for (kind, failure) in cells[column].failures.kinds().into_iter().enumerate() {
+                let words = |text: &Option<String>| text.clone().unwrap_or_default();
+                let first = failure.first;
+                let trial = match first.problem {
+                    0 => first.trial.to_string(),
+                    problem => format!("{} of problem {problem}", first.trial),
+                };
+                rows.push(vec![
+                    world.as_str().into(),
+                    name.as_str().into(),
+                    failure.verdict.replace('-', " ").into(),
+                    words(&failure.cause).replace('-', " ").into(),
+                    words(&failure.action).into(),
+                    failure.runs.to_string().into(),
+                    trial.into(),
+                ]);
+                opens.push(trials.remove(&(row, column, kind)).map(|page| {
+                    more.push(page);
+                    more.len() - 1
+                }));
+            }
+        }
+    }
+    let note = if more.is_empty() {
+        "Failed runs, by what the last plan was given up for, and the action that this was about."
+    } else {
+        "Failed runs, by what the last plan was given up for, and the action that this was about. The \
+         button of a row shows the first such trial."
+    };
+    let section = (!rows.is_empty()).then(|| {
+        Section::Table(Table {
+            heading: "Where runs fail".to_owned(),
+            note: note.to_owned(),
+            columns: columns
+                .map(|(name, is_number)| (name.to_owned(), is_number))
+                .to_vec(),
+            rows,
+            opens: if more.is_empty() { Vec::new() } else { opens },
+            ..Table::default()
+        })
+    });
+    (section, more)
 }
 
 /// The page about an experiment in worlds without time.
@@ -136,6 +203,7 @@ fn document(
         facts,
         sections,
         texts: Vec::new(),
+        more: Vec::new(),
     }
 }
 

@@ -16,6 +16,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("script/plots.js"),
     include_str!("script/points.js"),
     include_str!("script/sliders.js"),
+    include_str!("script/plane.js"),
     include_str!("script/live.js"),
     include_str!("script/page.js"),
 ];
@@ -137,6 +138,7 @@ mod tests {
             facts: Vec::new(),
             sections: Vec::new(),
             texts: Vec::new(),
+            more: Vec::new(),
         };
         let page = html(&document);
         assert_eq!(page.matches("alert(1)</script>").count(), 0);

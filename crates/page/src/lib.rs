@@ -11,7 +11,7 @@
 //! shows them as text.
 //!
 //! - [`document`](mod@document): what a page shows, as data.
-//! - `plan`, `run`, `experiment`: from answers, traces and results to documents.
+//! - `plan`, `region`, `run`, `experiment`: from answers, traces and results to documents.
 //! - `lanes`: on which lane of a chart an action belongs.
 //! - `html`: the document as a file.
 //! - `perfetto`, `mcap`: a run for other viewers.
@@ -40,9 +40,10 @@ mod lanes;
 mod mcap;
 mod perfetto;
 mod plan;
+mod region;
 mod run;
 
-use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RunAnswer};
+use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RegionAnswer, RunAnswer};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::Stored;
 use elbowroom_laboratory::compare::Results;
@@ -94,6 +95,26 @@ pub enum PageError {
 /// When the text is none of these, or damaged.
 pub fn page(name: &str, text: &str) -> Result<String, PageError> {
     Ok(html::html(&document(name, text)?))
+}
+
+/// The page about the results of an experiment, with the traces of some of its failed trials inside:
+/// the row, the column and the position of the kind of failure in the most frequent ones
+/// ([`Failures::kinds`](elbowroom_laboratory::compare::Failures::kinds)), with the trace's name and
+/// text.
+///
+/// # Errors
+/// As [`page`], and when one of the traces is damaged.
+pub fn experiment_page(
+    name: &str,
+    text: &str,
+    traces: &[((usize, usize, usize), String, String)],
+) -> Result<String, PageError> {
+    let results = Results::read(text).map_err(|error| damaged(name, &error))?;
+    let mut trials = experiment::Trials::new();
+    for (place, name, text) in traces {
+        trials.insert(*place, document(name, text)?);
+    }
+    Ok(html::html(&experiment::timed(&results, trials)))
 }
 
 /// The page about a run that goes on, from its trace so far. It follows the run by what its server
@@ -161,11 +182,12 @@ pub fn document(name: &str, text: &str) -> Result<Document, PageError> {
         Some("elbowroom-envelope") => {
             read::<EnvelopeAnswer>(name, text).map(|it| plan::envelope(&it))
         }
+        Some("elbowroom-region") => read::<RegionAnswer>(name, text).map(|it| region::region(&it)),
         Some("elbowroom-plan") => read::<PlanAnswer>(name, text).map(|it| plan::found(&it)),
         Some("elbowroom-run") => read::<RunAnswer>(name, text).map(|it| run::outcome(&it)),
         Some("elbowroom-results") => {
             let results = Results::read(text).map_err(|error| damaged(name, &error))?;
-            Ok(experiment::timed(&results))
+            Ok(experiment::timed(&results, experiment::Trials::new()))
         }
         Some("elbowroom-perturbed-results") => {
             let results = PerturbedResults::read(text);

@@ -18,7 +18,9 @@ use crate::document::{
 };
 use crate::lanes::{Lanes, Occupant, lanes};
 use sliders::sliders;
-use tables::{ends, quantities, ranges, rooms, times};
+use tables::{ends, ranges, rooms, times};
+
+pub(crate) use tables::quantities;
 
 /// The page about an envelope.
 pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
@@ -97,6 +99,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         facts,
         sections,
         texts: texts.into_texts(),
+        more: Vec::new(),
     }
 }
 
@@ -148,6 +151,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
         facts,
         sections,
         texts: texts.into_texts(),
+        more: Vec::new(),
     }
 }
 
@@ -373,7 +377,7 @@ pub(crate) fn bad(words: &str) -> Verdict {
 }
 
 /// The last part of a path, or something else where there is none.
-fn name_of(path: &str, otherwise: &str) -> String {
+pub(crate) fn name_of(path: &str, otherwise: &str) -> String {
     let name = path.rsplit(['/', '\\']).next().unwrap_or_default();
     let name = if name.is_empty() { otherwise } else { name };
     name.to_owned()

@@ -121,6 +121,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         facts,
         sections,
         texts: texts.into_texts(),
+        more: Vec::new(),
     }
 }
 
@@ -142,6 +143,7 @@ pub(crate) fn outcome(answer: &RunAnswer) -> Document {
         ],
         sections,
         texts: Vec::new(),
+        more: Vec::new(),
     }
 }
 

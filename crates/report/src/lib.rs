@@ -10,6 +10,7 @@
 //! - [`plot`]: what plots show, and, with the feature `plots`, plots as SVG.
 //! - [`short`]: exact numbers as short decimals.
 //! - [`lattice`]: a picture of the orders of a plan, as SVG.
+//! - [`plane`]: a picture of areas and boxes over two quantities, as SVG.
 //!
 //! ```
 //! use elbowroom_report::table::Table;
@@ -27,6 +28,7 @@
 pub mod exact;
 pub mod lattice;
 pub mod line;
+pub mod plane;
 pub mod plot;
 pub mod short;
 pub mod statistics;

@@ -7,7 +7,7 @@ use elbowroom::envelope as library;
 use elbowroom::num::Rational;
 
 use super::ProblemArgs;
-use super::number::positive;
+use super::number::{positive, whole};
 use crate::exit::Failure;
 
 #[derive(Args, Debug)]
@@ -76,6 +76,25 @@ pub(crate) struct EnvelopeArgs {
     /// The order of the rows: as in the plan, as by default, or the one with the least room first
     #[arg(long, value_enum)]
     pub(crate) order: Option<Order>,
+    /// With --method exact: the volume of the region, and which share of it IRR's and the best boxes
+    /// have; exactly for up to 6 connected parameters, sampled for more
+    #[arg(long)]
+    pub(crate) volume: bool,
+    /// The seed of what --volume samples
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole)]
+    #[arg(allow_negative_numbers = true, requires = "volume")]
+    pub(crate) seed: u64,
+    /// With --method exact: draw two parameters, all others having their nominal values, with IRR's
+    /// and the best boxes; named as in --contains
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "picture")]
+    pub(crate) slice: Option<Vec<String>>,
+    /// With --method exact: draw two parameters, for some values of all others
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "picture")]
+    #[arg(conflicts_with = "slice")]
+    pub(crate) projection: Option<Vec<String>>,
+    /// Where to write the picture of --slice or --projection
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) picture: Option<PathBuf>,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
@@ -88,12 +107,36 @@ impl EnvelopeArgs {
     /// When something else is asked for that only boxes have.
     pub(crate) fn is_exact(&self) -> Result<bool, Failure> {
         if self.method != Some(Method::Exact) {
-            return Ok(false);
+            let only_regions = [
+                ("--volume", self.volume),
+                ("--slice", self.slice.is_some()),
+                ("--projection", self.projection.is_some()),
+                ("--picture", self.picture.is_some()),
+            ];
+            return match only_regions.iter().find(|(_, given)| *given) {
+                None => Ok(false),
+                Some((flag, _)) => Err(Failure::new(
+                    format!("{flag} is about the whole region"),
+                    format!("add --method exact, or leave out {flag}"),
+                )),
+            };
+        }
+        if self.picture.as_deref() == Some("-".as_ref()) {
+            return Err(Failure::new(
+                "the picture and the answer cannot both go to standard output",
+                "give --picture a file",
+            ));
+        }
+        if self.picture.is_some() && self.slice.is_none() && self.projection.is_none() {
+            return Err(Failure::new(
+                "--picture needs to know which two parameters to draw",
+                "add `--slice X Y` or `--projection X Y`",
+            ));
         }
         let only_boxes = [
             ("--objective", self.objective.is_some()),
             ("--symmetric", self.symmetric),
-            ("--cap", self.cap.is_some()),
+            ("--cap", self.cap.is_some() && !self.volume),
             ("--precision", self.precision.is_some()),
             ("--growth", self.growth.is_some()),
             ("--sharpen", self.sharpen),
@@ -113,6 +156,12 @@ impl EnvelopeArgs {
                 "leave out --method exact, or --guarantee",
             )),
         }
+    }
+
+    /// Up to which multiple of the nominal value ends count that nothing bounds.
+    pub(crate) fn most(&self) -> Rational {
+        let default = library::BestSettings::default().most;
+        self.cap.clone().unwrap_or(default)
     }
 
     /// The algorithm, and what it is asked for.
@@ -148,7 +197,7 @@ impl EnvelopeArgs {
         let best = library::BestSettings {
             objective: self.objective.map_or(default.objective, Into::into),
             symmetric: self.symmetric,
-            most: self.cap.clone().unwrap_or(default.most),
+            most: self.most(),
         };
         Ok((method, best))
     }

@@ -1,8 +1,8 @@
 //! `elbowroom compare`: executors in many runs, side by side.
 
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::report::table::Table;
@@ -21,6 +21,13 @@ use crate::output::Output;
 use crate::stopwatch::Stopwatch;
 use crate::words::plain;
 use crate::{input, output};
+
+/// Where traces of failed trials go, beside the results.
+pub(crate) const FAILURES: &str = "failures";
+/// So many kinds of failure of one executor in one world have a trace.
+const MOST_OF_A_CELL: usize = 3;
+/// So many traces are written at most.
+const MOST_FAILURES: usize = 60;
 
 /// Makes an experiment, or a part of it, or puts parts together.
 pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
@@ -52,7 +59,8 @@ pub(crate) fn run(arguments: &CompareArgs, output: &mut Output) -> Answer {
     let table = answer.table(&experiment)?;
     // What was computed is shown, whatever becomes of the files.
     let written = match &arguments.output {
-        Some(folder) => write(folder, &answer, &table, records),
+        Some(folder) => write(folder, &answer, &table, records)
+            .and_then(|()| write_failures(folder, &experiment, &answer)),
         None => Ok(()),
     };
     if arguments.json {
@@ -147,6 +155,59 @@ fn write(
         write(&format!("{name}.svg"), &svg)?;
     }
     Ok(())
+}
+
+/// Writes traces of failed trials to a folder of its own: the first of each frequent kind, named by
+/// row, column and kind. What an earlier experiment left there goes.
+fn write_failures(
+    folder: &Path,
+    experiment: &AnyExperiment,
+    answer: &CompareAnswer,
+) -> Result<(), Failure> {
+    let folder = folder.join(FAILURES);
+    if folder.is_dir() {
+        for old in traces(&folder)? {
+            fs::remove_file(&old.1).map_err(|error| {
+                let words = plain(&error);
+                Failure::new(format!("cannot replace {}: {words}", old.1.display()), "")
+            })?;
+        }
+    }
+    let failed = answer.failed_trials(MOST_OF_A_CELL, MOST_FAILURES);
+    if !failed.is_empty() {
+        make_folder(&folder)?;
+    }
+    for failed in failed {
+        let (row, column, kind) = failed.place;
+        let trace = experiment.trace(&failed)?;
+        let name = format!("{row}-{column}-{kind}.jsonl");
+        output::write_file(&folder.join(name), &trace)?;
+    }
+    Ok(())
+}
+
+/// The traces of failed trials in a folder that an experiment was written to: row, column and kind of
+/// each, and its file.
+pub(crate) fn traces(folder: &Path) -> Result<Vec<((usize, usize, usize), PathBuf)>, Failure> {
+    let wrong = |error: &io::Error| {
+        let words = plain(error);
+        Failure::new(format!("cannot read {}: {words}", folder.display()), "")
+    };
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|error| wrong(&error))? {
+        let path = entry.map_err(|error| wrong(&error))?.path();
+        if path.extension().is_none_or(|it| it != "jsonl") {
+            continue;
+        }
+        let stem = path.file_stem().and_then(|stem| stem.to_str());
+        let numbers = stem.into_iter().flat_map(|stem| stem.split('-'));
+        let numbers: Option<Vec<usize>> = numbers.map(|number| number.parse().ok()).collect();
+        if let Some([row, column, kind]) = numbers.as_deref() {
+            found.push(((*row, *column, *kind), path.clone()));
+        }
+    }
+    found.sort();
+    Ok(found)
 }
 
 fn make_folder(folder: &Path) -> Result<(), Failure> {

@@ -4,6 +4,7 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use crate::args::ReportArgs;
+use crate::commands::compare::{FAILURES, traces};
 use crate::exit::{Answer, Exit, Failure};
 use crate::{input, output};
 
@@ -40,7 +41,21 @@ pub(crate) fn run(arguments: &ReportArgs) -> Answer {
         output::write_bytes(target, &file)?;
     }
     if let Some(target) = target {
-        let page = elbowroom_page::page(source.name(), source.text()).map_err(failure)?;
+        let folder = path.with_file_name(FAILURES);
+        let is_experiment = path.file_name().is_some_and(|name| name == RESULTS);
+        let mut failed = Vec::new();
+        if is_experiment && folder.is_dir() {
+            for (place, file) in traces(&folder)? {
+                let trace = input::record(&file, "trace")?;
+                failed.push((place, trace.name().to_owned(), trace.text().to_owned()));
+            }
+        }
+        let page = if failed.is_empty() {
+            elbowroom_page::page(source.name(), source.text())
+        } else {
+            elbowroom_page::experiment_page(source.name(), source.text(), &failed)
+        };
+        let page = page.map_err(failure)?;
         output::write_file(&target, &page)?;
     }
     Ok(Exit::Yes)

@@ -1,5 +1,10 @@
 //! With which values does a plan work? All of them, as inequalities.
 
+mod boxes;
+mod measure;
+mod picture;
+mod sampling;
+
 use std::fmt::Write as _;
 
 use elbowroom_envelope::obligations::{Refusal, Requirement};
@@ -14,6 +19,10 @@ use super::{EnvelopeRequest, Exact, RequestError, Version, ViolationAnswer, Watc
 use crate::explain::Explainer;
 use crate::flow::FlowError;
 use crate::linear_form::LinearForm;
+
+pub use boxes::{BoxAnswer, IntervalAnswer};
+pub use measure::{Measure, Share};
+pub use picture::{Others, PictureError, Plane, picture};
 
 /// How many places of a moment inside an action are told apart.
 const MOST_PLACES: usize = 256;
@@ -70,6 +79,16 @@ pub enum RegionFinding {
         parameters: Vec<Quantity>,
         /// The pieces; no two have values in common. Empty if the plan works with no values.
         pieces: Vec<PieceAnswer>,
+        /// Why this is only a part of the region: a limit, or the end of the time for it. `None` if
+        /// it is all of it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        missing: Option<String>,
+        /// Boxes inside the region, if they were asked for.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        boxes: Vec<BoxAnswer>,
+        /// The volume, if it was asked for and there is one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        measure: Option<Measure>,
     },
     /// The judge rejects the plan as it stands.
     Invalid {
@@ -109,6 +128,17 @@ pub struct RowAnswer {
     pub because: Vec<String>,
 }
 
+/// What a region is to be compared with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RegionSettings {
+    /// Whether the answer has boxes: IRR's and the best ones.
+    pub with_boxes: bool,
+    /// Whether the answer has the volume, and each box's share of it.
+    pub with_volume: bool,
+    /// The seed of what is sampled: volumes of more than a few connected parameters.
+    pub seed: u64,
+}
+
 /// All values for which a plan works.
 ///
 /// The request's guarantee, box and search do not matter: for single values there is a schedule or
@@ -118,6 +148,7 @@ pub struct RowAnswer {
 /// When the request names what the plan does not have, or the plan is beyond exact analysis.
 pub fn region(
     request: &EnvelopeRequest,
+    settings: &RegionSettings,
     watcher: &mut dyn Watcher,
 ) -> Result<RegionOutcome, RequestError> {
     let task = &request.task;
@@ -162,9 +193,24 @@ pub fn region(
             let pieces = found.pieces.iter().map(|piece| PieceAnswer {
                 rows: piece.rows.iter().map(row).collect(),
             });
+            let mut boxes = if settings.with_boxes {
+                boxes::boxes(request, watcher)?
+            } else {
+                Vec::new()
+            };
+            let measure = if settings.with_volume {
+                let most = &request.search.best.most;
+                let flow = &mut || watcher.flow().map_break(|_| ());
+                measure::measure(&plan, found, &mut boxes, most, settings.seed, flow)
+            } else {
+                None
+            };
             RegionFinding::Region {
                 parameters: quantities(&explainer),
                 pieces: pieces.collect(),
+                missing: found.missing.as_ref().map(ToString::to_string),
+                boxes,
+                measure,
             }
         }
         Err(ExactError::NotLinear {

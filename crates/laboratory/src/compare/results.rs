@@ -12,7 +12,7 @@ use super::clairvoyant;
 use super::experiment::CLAIRVOYANT;
 use super::optimum::{self, ColumnOptimum};
 use super::parts::{self, Partial, fingerprint};
-use super::{Experiment, Part};
+use super::{Experiment, Failures, Part, TrialId};
 
 /// Counts by row and column. Everything is a sum, so parts add up exactly, in any order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +60,9 @@ pub struct Cell {
     pub verdicts: BTreeMap<String, u64>,
     /// Why plans were given up.
     pub causes: BTreeMap<String, u64>,
+    /// How the runs failed that did not reach the goal.
+    #[serde(default, skip_serializing_if = "Failures::is_empty")]
+    pub failures: Failures,
 }
 
 /// Trials in which one of two executors reached the goal and the other did not.
@@ -309,6 +312,7 @@ impl Partial for Results {
             mine.replans += theirs.replans;
             merge(&mut mine.verdicts, &theirs.verdicts);
             merge(&mut mine.causes, &theirs.causes);
+            mine.failures.merge(&theirs.failures);
         }
         for (mine, theirs) in self
             .pairs
@@ -324,8 +328,9 @@ impl Partial for Results {
 
 impl Cell {
     /// One more run.
-    pub(super) fn count(&mut self, report: &Report) {
+    pub(super) fn count(&mut self, report: &Report, id: TrialId) {
         self.runs += 1;
+        self.failures.count(report, id);
         *self
             .verdicts
             .entry(report.verdict.name().to_owned())

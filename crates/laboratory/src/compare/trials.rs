@@ -12,12 +12,13 @@ use elbowroom_num::Rational;
 use elbowroom_pddl::Source;
 use elbowroom_planner::embedded;
 use elbowroom_probability::{Likelihoods, likelihoods};
+use elbowroom_report::trace::TraceWriter;
 use elbowroom_sim::WorldModel;
 
-use super::{Column, Experiment, ExperimentError, Part, Planning, Results, clairvoyant};
+use super::{Column, Experiment, ExperimentError, Part, Planning, Results, TrialId, clairvoyant};
 use elbowroom::execute::{
-    Analyst, Embedded, Execution, Likeliest, RememberingPlanner, RememberingPreparer,
-    SharedLikeliest,
+    Analyst, Embedded, Execution, Likeliest, NamedText, RememberingPlanner, RememberingPreparer,
+    RunSpec, SharedLikeliest,
 };
 use elbowroom::flow;
 use elbowroom::timed::{Policy, Settings};
@@ -180,20 +181,17 @@ impl Setting<'_> {
         common: &mut Common<'_>,
         results: &mut Results,
     ) {
-        // The same seed in all columns: their worlds differ only where the columns do.
-        let seed = self
-            .experiment
-            .seed
-            .wrapping_mul(1_000_003)
-            .wrapping_add(self.problem as u64)
-            .wrapping_mul(1_000_003)
-            .wrapping_add(trial);
+        let seed = self.seed(trial);
         let executors = &self.experiment.executors;
         let mut reached = Vec::with_capacity(executors.len() + 1);
         for (row, spec) in executors.iter().enumerate() {
-            let report = self.execute(seed, spec, column, common);
+            let report = self.execute(seed, spec, column, common, None);
             reached.push(report.verdict == Verdict::GoalReached);
-            results.cells[row][column].count(&report);
+            let id = TrialId {
+                problem: self.problem,
+                trial,
+            };
+            results.cells[row][column].count(&report, id);
             if let Some(records) = records {
                 records.add(self.record((trial, seed), column, row, &report));
             }
@@ -213,6 +211,74 @@ impl Setting<'_> {
             pair.only_first += u64::from(reached[0] && !this);
             pair.only_this += u64::from(*this && !reached[0]);
         }
+    }
+
+    /// The same in all columns: their worlds differ only where the columns do.
+    fn seed(&self, trial: u64) -> u64 {
+        self.experiment
+            .seed
+            .wrapping_mul(1_000_003)
+            .wrapping_add(self.problem as u64)
+            .wrapping_mul(1_000_003)
+            .wrapping_add(trial)
+    }
+
+    /// The trace of one trial of the first executor in the first column.
+    pub(super) fn trace(&self, trial: u64) -> Result<String, ExperimentError> {
+        let (row, column) = (0, 0);
+        let mut common = self.common(&|| true)?;
+        let seed = self.seed(trial);
+        let executor = &self.experiment.executors[row];
+        let mut lines = String::new();
+        let mut sink = |line: &str| lines.push_str(line);
+        let mut writer = TraceWriter::new(Arc::clone(&common.task), &mut sink);
+        let written = writer.header(&self.spec(column, executor, seed)?);
+        written.map_err(|error| self.wrong(&error.to_string()))?;
+        self.execute(seed, executor, column, &mut common, Some(writer));
+        Ok(lines)
+    }
+
+    /// The specification of a trial, for its trace.
+    fn spec(
+        &self,
+        column: usize,
+        executor: &ExecutorSpec,
+        seed: u64,
+    ) -> Result<RunSpec, ExperimentError> {
+        let experiment = self.experiment;
+        let column = &experiment.columns[column];
+        let (domain, problem) = self.texts()?;
+        let (planner, planner_time) = match &experiment.planner {
+            Planning::Embedded => None,
+            Planning::Another { name, seconds } => Some((name.clone(), seconds.clone())),
+        }
+        .unzip();
+        let mut spec = RunSpec::new((&domain).into(), (&problem).into());
+        if let Some(planner) = planner {
+            spec.planner = planner;
+        }
+        let likelihoods = column.likelihoods.as_ref().map(|text| NamedText {
+            name: format!("likelihoods of {}", column.name),
+            text: text.clone(),
+        });
+        let settings = &experiment.settings;
+        Ok(RunSpec {
+            world: Some(column.world.clone()),
+            planner_time: planner_time.flatten(),
+            likelihoods,
+            has_plan: true,
+            executor: executor.clone(),
+            seed,
+            planner_states: experiment.planner_states,
+            improve_states: experiment.improve_states,
+            vary: column.vary.clone(),
+            precision: Some(experiment.precision.clone()),
+            running: settings.running,
+            planning_time: settings.planning_time.clone(),
+            max_replans: settings.most_replans,
+            time_limit: settings.time_limit.clone(),
+            ..spec
+        })
     }
 
     fn record(
@@ -251,6 +317,7 @@ impl Setting<'_> {
         spec: &ExecutorSpec,
         column: usize,
         common: &mut Common<'_>,
+        writer: Option<TraceWriter<'_>>,
     ) -> Report {
         let settings = &self.experiment.settings;
         // Trials are shared out among threads, and each is the same whichever came before.
@@ -272,7 +339,7 @@ impl Setting<'_> {
         } else {
             &mut common.planner
         };
-        Execution::of(&task)
+        let execution = Execution::of(&task)
             .beginning_with(if spec.asks_outlook() {
                 likely.clone()
             } else {
@@ -285,8 +352,13 @@ impl Setting<'_> {
             .with_odds(odds)
             .with_outlook(outlook.clone().filter(|_| spec.asks_outlook()))
             .planned_by(planner)
-            .prepared_by(preparer)
-            .run_in(&mut *world.world(&task, seed))
+            .prepared_by(preparer);
+        // Nobody reads why there is no way on but those who look at a single run.
+        let execution = match writer {
+            Some(writer) => execution.recorded_by(writer).explaining(),
+            None => execution,
+        };
+        execution.run_in(&mut *world.world(&task, seed))
     }
 
     fn planner<'a>(

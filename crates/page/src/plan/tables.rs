@@ -90,7 +90,7 @@ pub(super) fn ranges(ranges: &[Range]) -> Table {
     }
 }
 
-pub(super) fn quantities(quantities: &[Quantity]) -> Table {
+pub(crate) fn quantities(quantities: &[Quantity]) -> Table {
     let row = |quantity: &Quantity| {
         vec![
             quantity.name.as_str().into(),

@@ -1,11 +1,31 @@
 // Puts the page together, and again whenever there is more to show of a run that goes on.
 
 let data = JSON.parse(document.getElementById("data").textContent);
+// The pages that led to this one, with how far they were scrolled.
+const before = [];
 const textOf = (text) => (typeof text === "number" ? data.texts[text] : text);
 const main = document.getElementById("main");
 const facts = element("dl", { class: "facts" });
 document.querySelector("header").append(facts);
 let views = [], life = null;
+
+function open(page) {
+  before.push([data, scrollY]);
+  data = data.more[page];
+  views = [];
+  show();
+  const back = element("button", { type: "button", id: "back", onclick: () => {
+    back.remove();
+    const [document, scrolled] = before.pop();
+    data = document;
+    views = [];
+    show();
+    scrollTo(0, scrolled);
+  } }, "Back to the experiment");
+  document.getElementById("title").before(back);
+  scrollTo(0, 0);
+  back.focus();
+}
 
 function show() {
   // What the reader has chosen stays.
@@ -40,7 +60,7 @@ function show() {
         firstChart.scrub = scrub;
       }
     } else if (section.type === "table") {
-      const view = add(section.heading, tableView(section, textOf, (bar) => firstChart?.view.pick(bar)));
+      const view = add(section.heading, tableView(section, textOf, (bar) => firstChart?.view.pick(bar), open));
       tables.push(view);
       if (view.at) moving.push(view.at);
     } else if (section.type === "rates") {
@@ -50,6 +70,8 @@ function show() {
       moving.push(view.at);
     } else if (section.type === "sliders") {
       parts.push(slidersView(section, textOf, (spans) => firstChart?.view.move(spans)).node);
+    } else if (section.type === "plane") {
+      parts.push(planeView(section).node);
     } else {
       parts.push(proseView(section));
     }

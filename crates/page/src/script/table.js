@@ -2,7 +2,7 @@
 
 const ROWS = 200;
 
-function tableView(table, textOf, onBar) {
+function tableView(table, textOf, onBar, onOpen) {
   const body = element("tbody");
   const count = element("span", { class: "note", role: "status" });
   const more = element("button", { type: "button" }, "show all");
@@ -47,6 +47,10 @@ function tableView(table, textOf, onBar) {
       const bar = table.bars[row];
       const cells = plain[row].map((text, column) =>
         element("td", { class: kinds[column] }, words(text)));
+      if (table.opens.length) {
+        const page = table.opens[row];
+        cells.push(element("td", {}, page === null ? null : element("button", { type: "button", onclick: () => onOpen(page) }, "show")));
+      }
       return element("tr", {
         "data-row": row, "data-bar": bar, class: row === current ? "current" : null,
         onclick: bar === undefined ? null : () => onBar(bar),
@@ -70,7 +74,7 @@ function tableView(table, textOf, onBar) {
   } });
   fill();
   const box = element("div", { class: "wide", tabindex: "0", role: "region", "aria-label": table.heading },
-    element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body));
+    element("table", {}, element("thead", {}, element("tr", {}, ...heads, table.opens.length ? element("th", { scope: "col" }, "trial") : null)), body));
   const node = element("section", {},
     element("h2", {}, table.heading),
     table.note ? element("p", { class: "note" }, table.note) : null,

@@ -179,6 +179,72 @@ world = "world.toml"
   const pairs = await cellsOf(rowsOf(tab, "Compared with guarded"));
   assert.deepEqual(pairs.map((row) => row.slice(2, 4).map(Number)),
     results.pairs.slice(1).map(([pair]) => [pair.only_first, pair.only_this]));
+  // Failed runs by kind; the first of each can be looked at.
+  const kinds = results.cells.flatMap(([cell]) => cell.failures ?? []);
+  const rows = rowsOf(tab, "Where runs fail");
+  const failures = await cellsOf(rows);
+  assert.equal(failures.length, kinds.length);
+  assert.ok(kinds.length > 0);
+  const sum = (numbers) => numbers.reduce((a, b) => a + b, 0);
+  assert.equal(sum(failures.map((row) => Number(row[5]))), sum(results.cells.map(([cell]) => cell.runs - cell.successes)));
+  const [, executor, verdict] = failures[0];
+  await rows.first().getByRole("button", { name: "show" }).click();
+  assert.match(await tab.locator("h1").textContent(), /^Run of /);
+  assert.ok((await tab.locator("#verdict").textContent()).includes(verdict));
+  assert.ok((await tab.locator(".facts").textContent()).includes(executor));
+  await tab.locator("#time").press("ArrowLeft");
+  assert.equal(await tab.evaluate(() => document.activeElement.id), "time");
+  await accessible(tab, "a run in an experiment");
+  await tab.getByRole("button", { name: "Back to the experiment" }).click();
+  assert.equal(await tab.locator("h1").textContent(), "Busy <b>corridors</b>");
+  assert.equal(await rows.count(), kinds.length);
+  await close(tab);
+});
+
+test("the page of a region says how far two quantities may go, whatever the others are", async () => {
+  const text = run("envelope", ...delivery, plan, "--method", "exact", "--volume", "--json");
+  fs.writeFileSync(file("region.json"), text);
+  const { parameters, pieces, boxes } = JSON.parse(text);
+  const tab = await open(page("region.html", file("region.json")));
+  const values = Object.fromEntries(parameters.map((it) => [it.name, it.nominal.decimal]));
+  // From where to where one quantity satisfies all rows, the others being what they are.
+  const alone = (name) => {
+    let [low, high] = [-Infinity, Infinity];
+    for (const { factors, bound } of pieces[0].rows) {
+      const rest = Object.entries(factors).reduce((left, [own, factor]) => (own === name ? left : left - factor.decimal * values[own]), bound.decimal);
+      const factor = factors[name]?.decimal ?? 0;
+      if (factor > 0) high = Math.min(high, rest / factor);
+      if (factor < 0) low = Math.max(low, rest / factor);
+    }
+    return [low, high];
+  };
+  const compare = async (...names) => {
+    const told = await tab.locator("[data-told]").textContent();
+    for (const name of names) {
+      const [low, high] = alone(name);
+      const [, from, to] = told.match(new RegExp(`${name} may be (-?[0-9]+(?:[.][0-9]+)?) to (-?[0-9]+(?:[.][0-9]+)?)`));
+      assert.ok(Math.abs(from - low) < 0.002 && Math.abs(to - high) < 0.002, `${name}: ${told}, not ${low} to ${high}`);
+    }
+  };
+  assert.equal(pieces.length, 1);
+  await compare("dur_0", "dur_1");
+  await tab.locator("[data-axis='0']").selectOption("3");
+  await compare("dur_3", "dur_1");
+  await tab.getByText("Choose the values of all quantities").click();
+  const slider = tab.locator("[data-plane='dur_4']");
+  await slider.focus();
+  for (let step = 0; step < 5; step++) await tab.keyboard.press("ArrowRight");
+  values.dur_4 = Number(await slider.inputValue());
+  assert.ok(values.dur_4 > 3);
+  await compare("dur_3", "dur_1");
+  assert.equal(await tab.locator("polygon.works").count(), 1);
+  const shares = await cellsOf(rowsOf(tab, "How much of it is in a box"));
+  assert.deepEqual(shares.map(([, share]) => share), boxes.map((it) => `${(100 * it.share.decimal).toFixed(2)} %`));
+  const rows = await cellsOf(rowsOf(tab, "What the values satisfy"));
+  assert.deepEqual(rows.map((row) => row[0]), pieces[0].rows.map((row) => row.text));
+  await tab.getByRole("button", { name: "as planned" }).click();
+  values.dur_4 = parameters[4].nominal.decimal;
+  await compare("dur_3", "dur_1");
   await close(tab);
 });
 
@@ -207,7 +273,7 @@ test("hostile names and texts are shown as text", async () => {
 });
 
 test("no page is wider than a telephone, and none has what axe objects to", async () => {
-  for (const name of ["envelope", "run", "experiment", "hostile"]) {
+  for (const name of ["envelope", "region", "run", "experiment", "hostile"]) {
     for (const width of [1280, 400]) {
       for (const colorScheme of ["light", "dark"]) {
         const tab = await open(file(`${name}.html`), { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });

@@ -33,6 +33,11 @@ test("an envelope", async () => {
   await close(tab);
 });
 
+test("a slice of a region", async () => {
+  process.chdir(root);
+  run("envelope", ...plan, "--method", "exact", "--slice", "dur_0", "dur_3", "--picture", path.join(pictures, "region.svg"));
+});
+
 test("a run", async () => {
   process.chdir(path.dirname(file("run.jsonl")));
   run("run", ...pddl("delivery"), "--world", path.join(cases, "delivery", "world.toml"), "--seed", "10", "--trace", "run.jsonl");

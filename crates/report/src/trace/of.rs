@@ -325,15 +325,20 @@ fn steps(plan: &TimeTriggeredPlan) -> Vec<StepLine> {
 }
 
 fn situation_line(task: &Task, situation: &Situation) -> SituationLine {
+    // By name: numbers of facts depend on what the task was used for before.
     let facts = situation.state.facts.iter();
+    let mut facts: Vec<String> = facts.map(|&fact| task.fact_name(fact)).collect();
+    facts.sort_unstable();
     let values = situation.state.values.iter();
+    let mut values: IndexMap<_, _> = values
+        .map(|(&fluent, value)| (task.fluent_name(fluent), exact(value)))
+        .collect();
+    values.sort_unstable_keys();
     let running = situation.running.iter();
     SituationLine {
         time: exact(&situation.time),
-        facts: facts.map(|&fact| task.fact_name(fact)).collect(),
-        values: values
-            .map(|(&fluent, value)| (task.fluent_name(fluent), exact(value)))
-            .collect(),
+        facts,
+        values,
         running: running
             .map(|running| RunningLine {
                 action: running.action.name.clone(),

@@ -6,12 +6,15 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use elbowroom::answers::region::{PieceAnswer, RegionFinding, RegionOutcome, region};
+use elbowroom::answers::region::{
+    BoxAnswer, Measure, Others, PictureError, PieceAnswer, Plane, RegionFinding, RegionOutcome,
+    RegionSettings, picture, region,
+};
 use elbowroom::answers::{EnvelopeRequest, Event, Halt, Watcher};
 
 use super::{failure, specifications};
 use crate::args::{self, EnvelopeArgs};
-use crate::exit::{Answer, Exit};
+use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;
 use crate::limits::push_wrapped;
@@ -22,6 +25,8 @@ use crate::words::counted;
 
 /// So many of the reasons for an inequality are printed; `--json` has all.
 const REASONS_SHOWN: usize = 2;
+/// Exact volumes with more digits than this are printed as powers of ten.
+const MOST_DIGITS: usize = 24;
 
 /// Prints the region.
 pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
@@ -33,27 +38,76 @@ pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
         &arguments.controllable,
     ))?);
     let plan = input::any_plan(&task, &arguments.plan, output)?;
-    let request = EnvelopeRequest {
+    let mut request = EnvelopeRequest {
         name: arguments.plan.display().to_string(),
         vary,
         enforce: arguments.enforce,
         ..EnvelopeRequest::new(&Arc::new(task), plan)
     };
+    request.search.best.most = arguments.most();
+    let plane = plane(arguments);
+    let settings = RegionSettings {
+        with_boxes: arguments.volume || plane.is_some(),
+        with_volume: arguments.volume,
+        seed: arguments.seed,
+    };
     let mut watch = Watch {
         stopwatch,
         plan: &arguments.plan,
     };
-    let outcome = region(&request, &mut watch).map_err(failure)?;
+    let outcome = region(&request, &settings, &mut watch).map_err(failure)?;
+    let drawn = draw(arguments, plane.as_ref(), &outcome, &mut watch);
+    // What was computed is shown, whatever becomes of the picture.
     if arguments.json {
         output.document(&outcome.answer)?;
     } else {
         output::print(&text(&outcome, Look::of_stdout()))?;
     }
+    drawn?;
     Ok(match &outcome.answer.finding {
         RegionFinding::Region { pieces, .. } if !pieces.is_empty() => Exit::Yes,
         RegionFinding::None { .. } => Exit::Limit,
         _ => Exit::No,
     })
+}
+
+fn plane(arguments: &EnvelopeArgs) -> Option<Plane> {
+    let both = [
+        (&arguments.slice, Others::Nominal),
+        (&arguments.projection, Others::Any),
+    ];
+    both.into_iter().find_map(|(axes, others)| {
+        let [x, y] = axes.as_deref()? else {
+            return None;
+        };
+        Some(Plane {
+            axes: [x.clone(), y.clone()],
+            others,
+        })
+    })
+}
+
+/// Writes the picture, if there is one to write.
+fn draw(
+    arguments: &EnvelopeArgs,
+    plane: Option<&Plane>,
+    outcome: &RegionOutcome,
+    watch: &mut Watch<'_>,
+) -> Result<(), Failure> {
+    let (Some(path), Some(plane)) = (&arguments.picture, plane) else {
+        return Ok(());
+    };
+    let flow = &mut || watch.flow().map_break(|_| ());
+    match picture(outcome, plane, flow) {
+        Ok(drawn) => output::write_file(path, &drawn.svg()),
+        // The answer says why.
+        Err(PictureError::NoRegion) => Ok(()),
+        Err(error @ PictureError::Limit(_)) => Err(Failure::new(
+            error,
+            "use --slice, or leave less open (--vary)",
+        )),
+        Err(error) => Err(Failure::new(error, "")),
+    }
 }
 
 /// Obeys the clock and Ctrl-C, and tells of plans whose times are taken otherwise than they stand
@@ -103,7 +157,13 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
             say(&format!("{}: {file}", styled(HINT, "not known")), 0);
             say(&format!("{reason}."), 2);
         }
-        RegionFinding::Region { parameters, pieces } => {
+        RegionFinding::Region {
+            parameters,
+            pieces,
+            missing,
+            boxes,
+            measure,
+        } => {
             if parameters.is_empty() {
                 say(&format!("{file}: there is nothing that may vary."), 0);
                 return text;
@@ -136,7 +196,14 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
                 }
                 rows(piece, look, &mut text);
             }
+            if let Some(missing) = missing {
+                let words = format!("part: there may be more, for {missing}");
+                push_wrapped(&mut text, &words, 0, look.width);
+            }
             text.push('\n');
+            if let Some(measure) = measure {
+                volume(measure, boxes, look, &mut text);
+            }
             for parameter in parameters {
                 let words = format!(
                     "{}: {}, {} as planned",
@@ -147,6 +214,69 @@ fn text(outcome: &RegionOutcome, look: Look) -> String {
         }
     }
     text
+}
+
+/// The volume, and the shares of the boxes.
+fn volume(measure: &Measure, boxes: &[BoxAnswer], look: Look, text: &mut String) {
+    let mut say = |words: &str| push_wrapped(text, words, 0, look.width);
+    match (&measure.volume, measure.log10_interval) {
+        (Some(volume), _) => {
+            let exact = volume.0.to_string();
+            let words = if exact.len() > MOST_DIGITS {
+                format!(
+                    "volume: 10^{:.2}, exactly (--json has all digits)",
+                    measure.log10
+                )
+            } else {
+                format!("volume: {exact}")
+            };
+            say(&words);
+        }
+        (None, Some([lower, upper])) => say(&format!(
+            "volume: 10^{:.2}, sampled: with 95 % between 10^{lower:.2} and 10^{upper:.2}",
+            measure.log10
+        )),
+        (None, None) => say(&format!("volume: 10^{:.2}", measure.log10)),
+    }
+    if !measure.unbounded.is_empty() {
+        say(&format!(
+            "Nothing bounds {}: what is beyond --cap times the nominal value does not count.",
+            measure.unbounded.join(", ")
+        ));
+    }
+    for own in boxes {
+        let name = match own.name.as_str() {
+            "irr" => "IRR's box",
+            "least-slack" => "the box with the best least slack",
+            _ => "the box with the best sum of widths",
+        };
+        let Some(share) = &own.share else {
+            continue;
+        };
+        let words = match share.interval {
+            None => format!("{name} has {} of it", percent(share.decimal)),
+            Some([lower, upper]) => format!(
+                "{name} has {} of it, with 95 % between {} and {}",
+                percent(share.decimal),
+                percent(lower),
+                percent(upper)
+            ),
+        };
+        say(&words);
+    }
+    text.push('\n');
+}
+
+/// Two digits that say something.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent >= 10.0 {
+        format!("{percent:.0} %")
+    } else if percent >= 0.01 {
+        format!("{percent:.2} %")
+    } else {
+        format!("{percent:.1e} %")
+    }
 }
 
 fn rows(piece: &PieceAnswer, look: Look, text: &mut String) {

@@ -1,0 +1,234 @@
+//! All values for which a plan works.
+
+use elbowroom::answers::region::{
+    BoxAnswer, Measure, PieceAnswer, RegionAnswer, RegionFinding, Share,
+};
+use elbowroom::num::{End, Rational};
+use elbowroom::report::short::nearest;
+use std::collections::BTreeMap;
+
+use crate::document::{
+    Document, Plane, PlaneBox, PlaneQuantity, PlaneRow, Section, Table, Texts, Tone, Verdict,
+};
+use crate::plan::{bad, good, name_of, prose, quantities};
+
+/// More quantities than anybody would look through.
+const MOST: usize = 100;
+
+/// The page about a region.
+pub(crate) fn region(answer: &RegionAnswer) -> Document {
+    let mut texts = Texts::default();
+    let mut facts = vec![
+        ("domain".to_owned(), answer.domain.clone()),
+        ("problem".to_owned(), answer.problem.clone()),
+        ("plan".to_owned(), answer.plan.clone()),
+        ("epsilon".to_owned(), nearest(&answer.epsilon)),
+    ];
+    let mut sections = Vec::new();
+    let verdict = match &answer.finding {
+        RegionFinding::Region {
+            parameters,
+            pieces,
+            missing,
+            boxes,
+            measure,
+        } => {
+            if let Some(measure) = measure {
+                facts.push(("volume".to_owned(), volume(measure)));
+                sections.extend(shares(boxes));
+            }
+            if !parameters.is_empty() && parameters.len() <= MOST && !pieces.is_empty() {
+                sections.insert(0, Section::Plane(plane(parameters, pieces, boxes)));
+            }
+            sections.push(Section::Table(inequalities(pieces, &mut texts)));
+            sections.push(Section::Table(quantities(parameters)));
+            match (&pieces[..], missing) {
+                ([], _) => bad("The plan works with no values."),
+                (_, Some(missing)) => good(&format!(
+                    "The plan works with all values below. There may be more, for {missing}."
+                )),
+                ([_], None) => {
+                    good("The plan works with all values that satisfy the inequalities below.")
+                }
+                (several, None) => good(&format!(
+                    "The plan works with all values that satisfy one of {} lists of inequalities.",
+                    several.len()
+                )),
+            }
+        }
+        RegionFinding::Invalid { violation } => {
+            sections.push(prose("What is wrong", vec![violation.message.clone()]));
+            bad("The plan is not valid as it stands.")
+        }
+        RegionFinding::Unscheduled => bad("The plan has no schedule at its nominal values."),
+        RegionFinding::None { reason } => Verdict {
+            tone: Tone::Plain,
+            words: format!("The region is not known: {reason}."),
+        },
+    };
+    Document {
+        title: format!("Where {} works", name_of(&answer.plan, &answer.problem)),
+        verdict,
+        facts,
+        sections,
+        texts: texts.into_texts(),
+        more: Vec::new(),
+    }
+}
+
+fn plane(
+    parameters: &[elbowroom::answers::envelope::Quantity],
+    pieces: &[PieceAnswer],
+    boxes: &[BoxAnswer],
+) -> Plane {
+    let places: BTreeMap<&str, usize> = parameters
+        .iter()
+        .enumerate()
+        .map(|(place, it)| (it.name.as_str(), place))
+        .collect();
+    let piece = |piece: &PieceAnswer| {
+        let row = |row: &elbowroom::answers::region::RowAnswer| PlaneRow {
+            factors: row
+                .factors
+                .iter()
+                .filter_map(|(name, factor)| Some((*places.get(name.as_str())?, factor.0.to_f64())))
+                .collect(),
+            bound: row.bound.to_f64(),
+        };
+        piece.rows.iter().map(row).collect()
+    };
+    let drawn = |own: &BoxAnswer| PlaneBox {
+        name: box_name(&own.name).to_owned(),
+        intervals: parameters
+            .iter()
+            .map(|parameter| {
+                let interval = own.intervals.get(&parameter.name);
+                let end = |end: &End| end.value().map(Rational::to_f64);
+                interval.map_or((None, None), |it| (end(&it.lower), end(&it.upper)))
+            })
+            .collect(),
+    };
+    let boxes: Vec<PlaneBox> = boxes.iter().map(drawn).collect();
+    let quantity = |(place, parameter): (usize, &elbowroom::answers::envelope::Quantity)| {
+        let nominal = parameter.nominal.to_f64();
+        let size = nominal.abs().max(1.0);
+        // As far as the boxes reach, if that is not too far to see anything else.
+        let far = 4.0 * size;
+        let ends = |end: fn(&(Option<f64>, Option<f64>)) -> Option<f64>| {
+            let near = move |value: &f64| (value - nominal).abs() <= far;
+            boxes
+                .iter()
+                .filter_map(move |own| end(&own.intervals[place]))
+                .filter(near)
+        };
+        let from = ends(|it| it.0).fold(nominal - size, f64::min);
+        let to = ends(|it| it.1).fold(nominal + 1.5 * size, f64::max);
+        // Durations begin at zero.
+        let from = if nominal >= 0.0 { from.max(0.0) } else { from };
+        PlaneQuantity {
+            name: parameter.name.clone(),
+            quantity: parameter.quantity.clone(),
+            nominal,
+            from,
+            to: to + (to - from) / 20.0,
+        }
+    };
+    Plane {
+        heading: "Two quantities at a time".to_owned(),
+        note: "Where the plan works, by two quantities; the others have their nominal values or those \
+               chosen below."
+            .to_owned(),
+        quantities: parameters.iter().enumerate().map(quantity).collect(),
+        pieces: pieces.iter().map(piece).collect(),
+        boxes,
+    }
+}
+
+fn box_name(name: &str) -> &str {
+    match name {
+        "irr" => "IRR's box",
+        "least-slack" => "the box with the best least slack",
+        "widths" => "the box with the best sum of widths",
+        other => other,
+    }
+}
+
+fn inequalities(pieces: &[PieceAnswer], texts: &mut Texts) -> Table {
+    let several = pieces.len() > 1;
+    let mut rows = Vec::new();
+    for (index, piece) in pieces.iter().enumerate() {
+        for row in &piece.rows {
+            let mut cells = Vec::new();
+            if several {
+                cells.push((index + 1).to_string().into());
+            }
+            cells.push(row.text.as_str().into());
+            cells.push(texts.share(&row.because.join("; ")));
+            rows.push(cells);
+        }
+    }
+    let mut columns = Vec::new();
+    if several {
+        columns.push(("list".to_owned(), true));
+    }
+    columns.push(("inequality".to_owned(), false));
+    columns.push(("what it comes from".to_owned(), false));
+    Table {
+        heading: "What the values satisfy".to_owned(),
+        columns,
+        rows,
+        ..Table::default()
+    }
+}
+
+fn volume(measure: &Measure) -> String {
+    match (&measure.volume, measure.log10_interval) {
+        (Some(volume), _) if volume.0.to_string().len() <= 24 => volume.0.to_string(),
+        (None, Some([lower, upper])) => {
+            format!(
+                "10^{:.2}, with 95 % between 10^{lower:.2} and 10^{upper:.2}",
+                measure.log10
+            )
+        }
+        _ => format!("10^{:.2}", measure.log10),
+    }
+}
+
+/// The share of the region's volume that each box has.
+fn shares(boxes: &[BoxAnswer]) -> Option<Section> {
+    let percent = |share: f64| {
+        let percent = 100.0 * share;
+        if percent >= 0.01 {
+            format!("{percent:.2} %")
+        } else {
+            format!("{percent:.1e} %")
+        }
+    };
+    let words = |share: &Share| match share.interval {
+        None => percent(share.decimal),
+        Some([lower, upper]) => format!(
+            "{}, with 95 % between {} and {}",
+            percent(share.decimal),
+            percent(lower),
+            percent(upper)
+        ),
+    };
+    let rows: Vec<_> = boxes
+        .iter()
+        .filter_map(|own| {
+            let share = own.share.as_ref()?;
+            Some(vec![box_name(&own.name).into(), words(share).into()])
+        })
+        .collect();
+    (!rows.is_empty()).then(|| {
+        Section::Table(Table {
+            heading: "How much of it is in a box".to_owned(),
+            columns: vec![
+                ("box".to_owned(), false),
+                ("share of the volume".to_owned(), false),
+            ],
+            rows,
+            ..Table::default()
+        })
+    })
+}
