@@ -60,7 +60,7 @@ pub enum RequestError {
     /// The judge cannot tell whether the plan is valid: why.
     #[error("cannot tell whether the plan is valid: {0}")]
     Undecided(String),
-    /// The embedded planner does not support something in the problem, which this names.
+    /// Something in the problem, which this names, is not supported.
     #[error("{0}")]
     Unsupported(String),
 }

@@ -27,8 +27,8 @@ const KNOWN: &[(&str, &[&str], &str)] = &[
     ),
     (
         "model",
-        &["expression", "ground", "problem"],
-        "lifted and ground expressions are one type with different leaves",
+        &["constraint", "expression", "ground", "problem"],
+        "lifted and ground expressions are one type with different leaves, and so are constraints",
     ),
 ];
 

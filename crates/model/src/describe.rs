@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use elbowroom_num::Rational;
 
+use crate::constraint::Modal;
 use crate::ground::{Condition, Expression};
 use crate::problem::Unknown;
 use crate::task::Task;
@@ -20,6 +21,20 @@ impl Task {
     pub fn describe_expression(&self, expression: &Expression) -> String {
         let mut text = String::new();
         self.write_expression(expression, &mut text);
+        text
+    }
+
+    /// The constraint as PDDL writes it: `(within 10 (at r a))`.
+    pub fn describe_modal(&self, modal: &Modal<Condition>) -> String {
+        let mut text = format!("({}", modal.name());
+        for time in modal.times() {
+            let _ = write!(text, " {}", decimal(time));
+        }
+        for condition in modal.conditions() {
+            text.push(' ');
+            self.write_condition(condition, &mut text);
+        }
+        text.push(')');
         text
     }
 
@@ -58,6 +73,10 @@ impl Task {
             Expression::Fluent(fluent) => text.push_str(&self.fluent_name(*fluent)),
             Expression::Duration => text.push_str("?duration"),
             Expression::TotalTime => text.push_str("total-time"),
+            Expression::Violations(preference) => {
+                let name = &self.problem().preferences[preference.index()];
+                let _ = write!(text, "(is-violated {name})");
+            }
             Expression::Unknown(unknown) => text.push_str(&self.describe_unknown(*unknown)),
             Expression::Add(parts) => self.write_operation("+", parts.iter(), text),
             Expression::Multiply(parts) => self.write_operation("*", parts.iter(), text),

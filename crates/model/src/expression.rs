@@ -3,7 +3,7 @@
 use elbowroom_num::Rational;
 
 use crate::ground::FluentId;
-use crate::problem::Fluent;
+use crate::problem::{Fluent, PreferenceId};
 
 /// A comparison operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -56,6 +56,8 @@ pub enum Expression<F> {
     Duration,
     /// `total-time`; metrics only.
     TotalTime,
+    /// `(is-violated name)`: how many instances of a preference the plan violates; metrics only.
+    Violations(PreferenceId),
     /// A `:synth-parameters` name: an unknown number.
     Unknown(Unknown),
     /// Sum of the operands.
@@ -75,7 +77,11 @@ impl<F> Expression<F> {
     pub fn evaluate(&self, leaf: &mut impl FnMut(&Self) -> Option<Rational>) -> Option<Rational> {
         Some(match self {
             Self::Constant(value) => value.clone(),
-            Self::Fluent(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => leaf(self)?,
+            Self::Fluent(_)
+            | Self::Duration
+            | Self::TotalTime
+            | Self::Violations(_)
+            | Self::Unknown(_) => leaf(self)?,
             Self::Add(parts) => {
                 let mut total = Rational::ZERO;
                 for part in parts {
@@ -105,6 +111,7 @@ impl<F> Expression<F> {
             | Self::Fluent(_)
             | Self::Duration
             | Self::TotalTime
+            | Self::Violations(_)
             | Self::Unknown(_) => visit(self),
             Self::Add(parts) | Self::Multiply(parts) => {
                 for part in parts {
@@ -127,6 +134,7 @@ impl<F> Expression<F> {
             Self::Fluent(fluent) => Expression::Fluent(other(fluent)),
             Self::Duration => Expression::Duration,
             Self::TotalTime => Expression::TotalTime,
+            Self::Violations(preference) => Expression::Violations(*preference),
             Self::Unknown(unknown) => Expression::Unknown(*unknown),
             Self::Add(parts) => {
                 Expression::Add(parts.iter().map(|part| part.map_fluents(other)).collect())
@@ -150,6 +158,7 @@ impl<F: Clone> Expression<F> {
             | Self::Fluent(_)
             | Self::Duration
             | Self::TotalTime
+            | Self::Violations(_)
             | Self::Unknown(_) => replace(self).unwrap_or_else(|| self.clone()),
             Self::Add(parts) => Self::Add(parts.iter().map(|p| p.map_leaves(replace)).collect()),
             Self::Multiply(parts) => {

@@ -1,11 +1,15 @@
 //! From lifted to ground: variables replaced by objects, quantifiers expanded.
 
+mod constraints;
+
 use std::collections::BTreeMap;
 
 use elbowroom_num::Rational;
 
 use crate::domains::Domains;
 use crate::ground::{self, FactId, FluentId};
+pub(crate) use constraints::SoftCondition;
+
 use crate::problem::{
     self, Atom, Body, Condition, Expression, Fluent, FunctionId, ObjectId, PredicateId, Problem,
     SchemaId, TimedChange, UpdateOperator, Variable,

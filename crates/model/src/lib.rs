@@ -51,6 +51,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod constraint;
 pub mod derivation;
 mod describe;
 mod domains;
@@ -73,6 +74,7 @@ mod task;
 mod terms;
 pub mod validate;
 
+pub use constraint::{Constraints, Modal};
 pub use derivation::GroundRule;
 pub use instantiate::InstantiateError;
 pub use interference::Footprint;

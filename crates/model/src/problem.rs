@@ -5,6 +5,7 @@
 
 use elbowroom_num::Rational;
 
+pub use crate::constraint::{ActionPreference, Constraint, Modal};
 pub use crate::expression::{Comparison, Unknown};
 
 /// Declares an index into one of [`Problem`]'s lists.
@@ -49,6 +50,10 @@ id! {
     /// An entry of [`Problem::schemas`].
     SchemaId
 }
+id! {
+    /// An entry of [`Problem::preferences`].
+    PreferenceId
+}
 
 impl TypeId {
     /// The type of everything, `object`: always the first of [`Problem::types`].
@@ -86,6 +91,15 @@ pub struct Problem {
     pub timed: Vec<TimedInitial>,
     /// The goal condition.
     pub goal: Condition,
+    /// The names of all preferences; what has no name is called `anonymous`.
+    pub preferences: Vec<String>,
+    /// Constraints on the course of the plan: the domain's, then the goal's preferences, then the
+    /// problem's.
+    pub constraints: Vec<Constraint>,
+    /// How many of the constraints are the domain's.
+    pub domain_constraints: usize,
+    /// The preferences among the conditions of actions.
+    pub action_preferences: Vec<ActionPreference>,
     /// The metric to optimize. It has no bearing on validity.
     pub metric: Option<Metric>,
 }
@@ -382,8 +396,8 @@ pub enum TimedChange {
 pub struct Metric {
     /// Whether more is better.
     pub maximize: bool,
-    /// The expression to optimize; `None` if it depends on preferences, which are not measured.
-    pub expression: Option<Expression>,
+    /// The expression to optimize.
+    pub expression: Expression,
 }
 
 impl Problem {

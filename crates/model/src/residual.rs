@@ -1,5 +1,7 @@
 //! What is left of a task in mid-execution, as a task of its own.
 
+use std::sync::Arc;
+
 use elbowroom_num::{End, Interval, Rational};
 
 use crate::ground::{
@@ -17,7 +19,8 @@ impl Situation {
     /// It begins in the situation's state, and its timed initials are those to come, moved. Facts
     /// and fluents keep their numbers. What is running is no part of it; a plan takes that along,
     /// see [`Situation::rest_of_plan`]. [`Task::problem`] still is the whole problem: its initial
-    /// facts and times are those of the beginning.
+    /// facts and times are those of the beginning. Constraints on the course of the whole plan
+    /// cannot be judged from here: the judge says so.
     #[must_use]
     pub fn rest_of_task(&self, task: &Task) -> Task {
         let to_come = |timed: &&TimedHappening| timed.time > self.time;
@@ -28,6 +31,9 @@ impl Situation {
         let mut rest = task.clone();
         rest.timed = task.timed.iter().filter(to_come).map(moved).collect();
         rest.initial = self.state.clone();
+        if !rest.constraints.is_empty() {
+            Arc::make_mut(&mut rest.constraints).is_past_lost = true;
+        }
         rest
     }
 

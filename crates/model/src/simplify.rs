@@ -93,7 +93,11 @@ impl Expression {
                 Some(value) => Self::Constant(value),
                 None => Self::Fluent(fluent),
             },
-            Self::Constant(_) | Self::Duration | Self::TotalTime | Self::Unknown(_) => return self,
+            Self::Constant(_)
+            | Self::Duration
+            | Self::TotalTime
+            | Self::Violations(_)
+            | Self::Unknown(_) => return self,
             Self::Add(parts) => Self::Add(each(parts)),
             Self::Multiply(parts) => Self::Multiply(each(parts)),
             Self::Subtract(left, right) => Self::Subtract(

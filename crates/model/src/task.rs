@@ -4,6 +4,7 @@ use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use elbowroom_num::Rational;
 
+use crate::constraint::Constraints;
 use crate::derivation::{Derivation, Rules};
 use crate::domains::Domains;
 use crate::ground::{Condition, FactId, FluentId};
@@ -29,6 +30,7 @@ pub struct Task {
     pub(crate) initial: State,
     pub(crate) timed: Vec<TimedHappening>,
     pub(crate) goal: Condition,
+    pub(crate) constraints: Arc<Constraints>,
     /// For each predicate, the positions of its rules in the problem.
     rules_of_predicate: Arc<Vec<Vec<usize>>>,
 }
@@ -46,10 +48,11 @@ impl Task {
             initial: State::default(),
             timed: Vec::new(),
             goal: Condition::TRUE,
+            constraints: Arc::default(),
             rules_of_predicate: Arc::new(rules_of_predicate(&problem)),
         };
         let mut initial = State::default();
-        let (timed, goal) = task.grounding(|grounder| {
+        let (timed, goal, constraints) = task.grounding(|grounder| {
             for (predicate, arguments) in &problem.initial_facts {
                 initial.facts.insert(grounder.fact(*predicate, arguments));
             }
@@ -59,8 +62,9 @@ impl Task {
             }
             let timed = grounder.ground_timed();
             let goal = grounder.ground_condition(&problem.goal, &mut Vec::new());
-            (timed, goal)
+            (timed, goal, grounder.constraints())
         });
+        task.constraints = Arc::new(constraints);
         (task.initial, task.timed, task.goal) = (initial, timed, goal);
         task
     }
@@ -102,6 +106,19 @@ impl Task {
     /// The goal condition.
     pub fn goal(&self) -> &Condition {
         &self.goal
+    }
+
+    /// The constraints on the course of a plan, and the preferences about it, those of the goal
+    /// among them.
+    pub fn constraints(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    /// The part of the problem, if there is one, that decides whether a plan is valid and that
+    /// only the judge heeds. All who find, change or carry out plans in other ways must heed it
+    /// themselves, or refuse.
+    pub fn only_judged(&self) -> Option<&'static str> {
+        (!self.constraints.hard.is_empty()).then_some("trajectory constraints (`:constraints`)")
     }
 
     /// The same task with a table of its own, in which what is mentioned from now on gets numbers

@@ -12,6 +12,9 @@
 //!   happening group in between, the state after the group counts.
 //! - Happenings that interfere ([`Footprint`](crate::Footprint)) are at least
 //!   [`Task::epsilon`] apart. Timed initials take part, but not against each other.
+//! - Constraints on the course ([`Modal`](crate::Modal)) are judged when the plan is over, against
+//!   the state at each moment: the one after all that happens then, and the initial state before.
+//! - Preferences never make a plan invalid; [`Report::preferences`] lists those it violates.
 //! - The goal holds in the end: after the last happening of the plan's actions, and after all timed
 //!   initials, unless [`Settings::counts_later_timed`] says otherwise.
 //!
@@ -39,10 +42,13 @@ mod margin;
 mod metric;
 mod piece;
 mod polynomial;
+mod preferences;
 mod reading;
 mod state;
 mod stop;
 mod timeline;
+mod track;
+mod trajectory;
 mod violation;
 
 use std::cell::OnceCell;
@@ -51,6 +57,7 @@ use std::collections::BTreeMap;
 use elbowroom_num::Rational;
 
 pub use margin::Margin;
+pub use preferences::{Preferences, ViolatedPreference};
 pub use violation::{
     ActionInstance, Difficulty, Mistake, Occurrence, Point, Reason, Undecided, Violation, When,
 };
@@ -173,6 +180,8 @@ pub struct Report {
     /// For each comparison that some action, or the goal, needs by itself (not as part of a
     /// disjunction), how close it came to failing: by step, the goal's last.
     pub margins: Vec<Margin>,
+    /// What the plan violates of the preferences.
+    pub preferences: Preferences,
 }
 
 /// Judges a plan. The plan's actions must have been instantiated from this task.
@@ -197,6 +206,9 @@ fn judge(
     plan: &TimeTriggeredPlan,
     settings: &Settings,
 ) -> Verdict {
+    let running = situation.map_or(0, |situation| situation.running.len());
+    // What it mentions must be in the table before derived facts are looked at.
+    let preferences = preferences::OfActions::of(task, plan, running);
     let Some(derivation) = task.derivation() else {
         return Verdict::Undecided(Undecided {
             time: None,
@@ -208,6 +220,11 @@ fn judge(
     }
     let groups = timeline::timeline(task, situation, plan, settings);
     let state = situation.map_or(task.initial(), |situation| &situation.state);
+    let is_begun = situation.is_some_and(|situation| *situation != Situation::initial(task));
+    let mut constraints = std::sync::Arc::clone(&task.constraints);
+    if is_begun && !constraints.is_empty() {
+        std::sync::Arc::make_mut(&mut constraints).is_past_lost = true;
+    }
     let mut judge = judge::Judge {
         task,
         plan,
@@ -218,12 +235,15 @@ fn judge(
         running: situation.map_or_else(BTreeMap::new, judge::running),
         since: BTreeMap::new(),
         margins: margin::Margins::default(),
+        course: (!constraints.is_empty()).then(|| trajectory::Course::new(&constraints)),
+        preferences,
     };
     let from = situation.map(|situation| &situation.time);
     match judge.run(from, &groups) {
         Ok(()) => Verdict::Valid(Report {
             makespan: plan.makespan(),
             state: judge.now.to_state(),
+            preferences: judge.preferences_of(&groups),
             margins: margins(task, plan, judge.margins),
         }),
         Err(stop::Stop::Violation(violation)) => Verdict::Invalid(*violation),

@@ -15,10 +15,6 @@ pub enum Feature {
     ObjectFluents,
     /// `:control` parameters
     ControlParameters,
-    /// `:constraints` on the trajectory (PDDL 3)
-    TrajectoryConstraints,
-    /// `preference`, `is-violated` (PDDL 3)
-    Preferences,
     /// Continuous change that is not linear in `#t`
     NonlinearTime,
     /// `<` and `>` on `?duration`
@@ -41,8 +37,6 @@ impl Feature {
         Self::GlobalConstraints,
         Self::ObjectFluents,
         Self::ControlParameters,
-        Self::TrajectoryConstraints,
-        Self::Preferences,
         Self::NonlinearTime,
         Self::StrictDurations,
         Self::MixedTimes,
@@ -59,8 +53,6 @@ impl Feature {
             Self::GlobalConstraints => "global constraints",
             Self::ObjectFluents => "object fluents",
             Self::ControlParameters => "control parameters",
-            Self::TrajectoryConstraints => "trajectory constraints",
-            Self::Preferences => "preferences",
             Self::NonlinearTime => "change not linear in #t",
             Self::StrictDurations => "strict duration bounds",
             Self::MixedTimes => "disjunction over several times",
@@ -78,8 +70,6 @@ impl Feature {
             Self::GlobalConstraints => "global-constraints",
             Self::ObjectFluents => "object-fluents",
             Self::ControlParameters => "control-parameters",
-            Self::TrajectoryConstraints => "trajectory-constraints",
-            Self::Preferences => "preferences",
             Self::NonlinearTime => "nonlinear-time",
             Self::StrictDurations => "strict-durations",
             Self::MixedTimes => "mixed-times",
@@ -106,13 +96,6 @@ impl Feature {
             Self::ControlParameters => {
                 "`:control` parameters, numbers the planner chooses: refused; \
                  see `:synth-parameters` for numbers that stay open"
-            }
-            Self::TrajectoryConstraints => {
-                "`:constraints` (PDDL 3): refused, unless all of them are preferences"
-            }
-            Self::Preferences => {
-                "`preference`, `is-violated` (PDDL 3): ignored with a warning, \
-                 because a preference never makes a plan invalid"
             }
             Self::NonlinearTime => "a product of two `#t`, a division by `#t`: refused",
             Self::StrictDurations => "`(< ?duration …)`, `(> ?duration …)`: refused",

@@ -77,6 +77,8 @@ struct Reader {
     schema_spans: Vec<Span>,
     /// Where each rule's head stands.
     rule_spans: Vec<Span>,
+    /// Where the section of each constraint stands.
+    constraint_spans: Vec<Span>,
 }
 
 impl Reader {
@@ -89,6 +91,7 @@ impl Reader {
             resolved_types: None,
             schema_spans: Vec::new(),
             rule_spans: Vec::new(),
+            constraint_spans: Vec::new(),
         }
     }
 

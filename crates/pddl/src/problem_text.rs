@@ -11,7 +11,7 @@ mod term;
 use std::fmt::Write;
 
 use elbowroom_model::ground::{Change, Expression};
-use elbowroom_model::problem::{Object, TypeId};
+use elbowroom_model::problem::{self, Constraint, Modal, Object, TypeId};
 use elbowroom_model::{Situation, State, Task, TimedHappening};
 use elbowroom_num::Rational;
 
@@ -57,6 +57,12 @@ pub enum WriteProblemError {
         /// The durations that are possible.
         possible: String,
     },
+    /// The course of the plan is constrained, and has begun.
+    #[error(
+        "a problem file cannot say what has been so far, which the problem's constraints on the \
+         course of the plan depend on"
+    )]
+    Begun,
     /// The effects at the end of the action, or until then, are not known in advance.
     #[error(
         "a problem file cannot say that {action} is under way: {why}; \
@@ -73,12 +79,14 @@ pub enum WriteProblemError {
 /// The text of a problem file for `task`'s domain that begins in `situation`. Read back
 /// ([`read_problem`](crate::read_problem)), it gives the same problem, up to the order of facts.
 ///
-/// Facts that follow from rules are not written. Preferences and a metric on them, which are
-/// ignored when read, are gone.
+/// Facts that follow from rules are not written. The goal's preferences stand among the
+/// constraints. In mid-execution, preferences about the course of the plan are left out, and so is
+/// a metric that counts violations: what has been violated cannot be said.
 ///
 /// # Errors
 /// When an action under way cannot be expressed: it changes numbers while it runs, it has
-/// conditional effects that are still open, or it ends at no time later than now.
+/// conditional effects that are still open, or it ends at no time later than now. And when
+/// constraints must be kept on a course that has begun.
 ///
 /// ```
 /// use elbowroom_model::{Situation, Task};
@@ -128,19 +136,49 @@ pub fn write_problem(
     // Writing to a string cannot fail.
     let goal = writer.condition(&problem.goal, &mut names);
     let _ = writeln!(text, "(:goal {goal})");
+    let is_begun = *situation != Situation::initial(task);
+    writer.constraints(is_begun, &mut text)?;
     if let Some(metric) = &problem.metric
-        && let Some(expression) = &metric.expression
+        && !(is_begun && counts_violations(&metric.expression))
     {
         let direction = if metric.maximize {
             "maximize"
         } else {
             "minimize"
         };
-        let expression = writer.expression(expression, &names);
+        let expression = writer.expression(&metric.expression, &names);
         let _ = writeln!(text, "(:metric {direction} {expression})");
     }
     text.push_str(")\n");
     Ok(text)
+}
+
+/// Whether a metric depends on preferences.
+fn counts_violations(metric: &problem::Expression) -> bool {
+    let mut counts = false;
+    metric.visit_leaves(&mut |leaf| {
+        counts |= matches!(leaf, problem::Expression::Violations(_));
+    });
+    counts
+}
+
+/// Whether what is left of a constraint does not depend on what has been.
+fn looks_ahead(constraint: &Constraint) -> bool {
+    match constraint {
+        Constraint::Modal(modal) => matches!(modal, Modal::AtEnd(_)),
+        Constraint::And(parts) => parts.iter().all(looks_ahead),
+        Constraint::Forall(_, part) | Constraint::Preference(_, part) => looks_ahead(part),
+    }
+}
+
+/// Whether nothing in it must be kept.
+fn is_soft(constraint: &Constraint) -> bool {
+    match constraint {
+        Constraint::Modal(_) => false,
+        Constraint::And(parts) => parts.iter().all(is_soft),
+        Constraint::Forall(_, part) => is_soft(part),
+        Constraint::Preference(..) => true,
+    }
 }
 
 /// Writes the parts of a problem file.
@@ -180,6 +218,29 @@ impl Writer<'_> {
             let name = self.task.fluent_name(fluent);
             let _ = writeln!(text, "  (= {name} {})", self.number(value));
         }
+    }
+
+    /// `:constraints`, without the domain's.
+    fn constraints(&self, is_begun: bool, text: &mut String) -> Result<(), WriteProblemError> {
+        let problem = self.task.problem();
+        let (of_domain, own) = problem
+            .constraints
+            .split_at(problem.domain_constraints.min(problem.constraints.len()));
+        let is_lost = |part: &&Constraint| is_begun && !looks_ahead(part);
+        let mut all = of_domain.iter().chain(own);
+        if all.any(|part| is_lost(&part) && !is_soft(part)) {
+            return Err(WriteProblemError::Begun);
+        }
+        let mut kept = own.iter().filter(|part| !is_lost(part)).peekable();
+        if kept.peek().is_some() {
+            text.push_str("(:constraints (and\n");
+            for constraint in kept {
+                let constraint = self.constraint(constraint, &mut Vec::new());
+                let _ = writeln!(text, "  {constraint}");
+            }
+            text.push_str("))\n");
+        }
+        Ok(())
     }
 
     fn timed(&self, happening: &TimedHappening, now: &Rational, text: &mut String) {

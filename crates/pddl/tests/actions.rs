@@ -230,16 +230,43 @@ fn either_ranges_over_all_its_types() {
 }
 
 #[test]
-fn preferences_are_left_out_with_a_warning() {
-    let (problem, warnings) =
-        read_actions("(:action a :precondition (and (lit) (preference p (open hall))))").unwrap();
+fn preferences_of_actions_are_kept_beside_their_conditions() {
+    let (problem, warnings) = read_actions(
+        "(:action a :precondition (and (lit) (preference p (open hall))))
+         (:durative-action b :parameters (?r - room) :duration (= ?duration 1)
+           :condition (and (at start (lit)) (forall (?b - ball)
+             (preference q (and (at start (in ?b ?r)) (over all (open ?r)))))))",
+    )
+    .unwrap();
+    assert!(warnings.is_empty());
     let printer = reading::Printer(&problem);
     assert_snapshot!(printer.schema(&problem.schemas[0]), @"condition (and (lit))");
-    assert_eq!(warnings.len(), 1);
-    assert!(
-        mistakes(read_actions(
-            "(:action a :precondition (not (preference (lit))))"
-        ))
-        .contains("a preference cannot stand here")
+    let said: Vec<_> = problem
+        .action_preferences
+        .iter()
+        .map(|own| {
+            let parts = [&own.at_start, &own.over_all, &own.at_end];
+            let parts = parts.map(|part| printer.condition(part)).join(" ");
+            format!(
+                "{} {} {}: {parts}",
+                problem.schemas[own.schema.index()].name,
+                problem.preferences[own.preference.index()],
+                own.variables.len()
+            )
+        })
+        .collect();
+    assert_eq!(
+        said,
+        [
+            "a p 0: (open hall) (and) (and)",
+            "b q 1: (in ?1 ?0) (open ?0) (and)"
+        ]
     );
+    for wrong in [
+        "(not (preference (lit)))",
+        "(preference p (preference q (lit)))",
+    ] {
+        let read = read_actions(&format!("(:action a :precondition {wrong})"));
+        assert!(mistakes(read).contains("a preference cannot stand here"));
+    }
 }

@@ -91,19 +91,30 @@ fn goals_may_be_any_condition() {
 }
 
 #[test]
-fn metrics_are_read_but_not_those_of_preferences() {
+fn metrics_count_time_numbers_and_violations() {
     let metric = |text: &str| {
+        let goal = "(and (preference p (lit)) (forall (?b - ball) (preference q (in ?b hall))))";
         let (problem, warnings) =
-            read_sections(&format!("(:init) (:goal (and)) (:metric {text})")).unwrap();
+            read_sections(&format!("(:init) (:goal {goal}) (:metric {text})")).unwrap();
+        assert!(warnings.is_empty());
         let metric = problem.metric.clone().unwrap();
-        let expression = metric.expression.map(|e| Printer(&problem).expression(&e));
-        (metric.maximize, expression, warnings.len())
+        let expression = Printer(&problem).expression(&metric.expression);
+        (metric.maximize, expression)
     };
     assert_eq!(
         metric("minimize (+ (total-time) (* 2 (level)))"),
-        (false, Some("(+ (total-time) (* 2 (level)))".to_owned()), 0)
+        (false, "(+ (total-time) (* 2 (level)))".to_owned())
     );
-    assert_eq!(metric("maximize (is-violated p)"), (true, None, 1));
+    assert_eq!(
+        metric("maximize (- 3 (is-violated Q))"),
+        (true, "(- 3 (is-violated q))".to_owned())
+    );
+    let wrong = |metric: &str| {
+        let text = format!("(:init) (:goal (preference p1 (lit))) (:metric minimize {metric})");
+        reading::mistakes(read_sections(&text))
+    };
+    assert!(wrong("(is-violated p2)").contains("did you mean `p1`?"));
+    assert!(wrong("(is-violated)").contains("takes the name of a preference"));
 }
 
 #[test]

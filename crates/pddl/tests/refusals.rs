@@ -3,7 +3,7 @@
 mod reading;
 
 use elbowroom_pddl::{Diagnostics, Feature, is_unsupported};
-use reading::{read_actions, read_sections};
+use reading::read_actions;
 
 /// The refused features with their lines; panics if there is a mistake among them.
 fn refused<T: std::fmt::Debug>(read: Result<T, Diagnostics>) -> Vec<(Feature, usize)> {
@@ -69,27 +69,6 @@ fn control_parameters_are_refused() {
            :condition (at start (>= ?n 2)))",
     ));
     assert_eq!(found, [(Feature::ControlParameters, 6)]);
-}
-
-#[test]
-fn trajectory_constraints_are_refused_unless_they_are_preferences() {
-    let sections = |constraints: &str| {
-        read_sections(&format!(
-            "(:init) (:goal (and)) (:constraints {constraints})"
-        ))
-    };
-    assert_eq!(
-        refused(sections(
-            "(and (preference (always (lit))) (sometime (lit)))"
-        )),
-        [(Feature::TrajectoryConstraints, 2)]
-    );
-    let (_, warnings) = sections(
-        "(and (preference (always (lit))) (forall (?b - ball) (preference p (sometime (lit)))))",
-    )
-    .unwrap();
-    assert_eq!(Feature::of(&warnings[0]), Some(Feature::Preferences));
-    assert!(sections("(and)").unwrap().1.is_empty());
 }
 
 #[test]

@@ -56,9 +56,15 @@ pub struct Deordered {
     pub nominal: Schedule,
 }
 
-/// A plan cannot be deordered, because it is not valid.
+/// A plan cannot be deordered, because it is not valid, or because what makes it so is not heeded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeorderError {
+    /// Orders and bounds do not respect this part of the problem.
+    #[error("no network can be made of the plan: networks do not respect {feature} yet")]
+    Unsupported {
+        /// The feature.
+        feature: &'static str,
+    },
     /// Two interfering happenings have no order.
     #[error("{first} and {second} interfere, but both happen at {time}")]
     Simultaneous {
@@ -86,8 +92,12 @@ pub enum DeorderError {
 /// Finds out which of a valid plan's happenings need to keep their order.
 ///
 /// # Errors
-/// When the plan is not valid, as far as that shows here; ask the judge first.
+/// When the plan is not valid, as far as that shows here; ask the judge first. When the problem
+/// has constraints that orders and bounds do not respect ([`Task::only_judged`]).
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
+    if let Some(feature) = task.only_judged() {
+        return Err(DeorderError::Unsupported { feature });
+    }
     let Labelled {
         plan: mut stn_plan,
         instances,

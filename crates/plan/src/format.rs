@@ -45,10 +45,15 @@ use crate::parameter::ParametrizedPlan;
 /// Reads an STN plan file: a text, or any bytes, which must be UTF-8 outside of comments.
 ///
 /// # Errors
-/// All mistakes found, those of syntax and those of names that the task does not know.
+/// All mistakes found, those of syntax and those of names that the task does not know. And when the
+/// problem has what networks do not respect ([`Task::only_judged`]).
 pub fn read(source: impl Into<Source>, task: &Task) -> Result<ParametrizedPlan, Diagnostics> {
     let source = source.into();
     let (file, mut mistakes) = syntax::parse(&source);
+    if let Some(feature) = task.only_judged() {
+        let message = format!("networks do not respect {feature} yet, which the problem has");
+        mistakes.error(0..0, message);
+    }
     let plan = resolve::resolve(&file, task, &mut mistakes);
     // A reader that gives up has noted why.
     mistakes.finish(plan).map(|(plan, _warnings)| plan)

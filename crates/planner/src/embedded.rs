@@ -68,6 +68,12 @@ pub fn plan(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
     let mut progress = Progress::default();
+    if let Some(feature) = task.only_judged() {
+        return Answer::Unsupported(Unsupported {
+            feature: feature.to_owned(),
+            place: format!("problem {}", task.problem().name),
+        });
+    }
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }

@@ -20,6 +20,9 @@ pub struct Unsupported {
 /// actions.
 pub fn all_actions(task: &Task) -> Result<Vec<Action>, Unsupported> {
     let refuse = |what: String| Err(Unsupported { what });
+    if let Some(feature) = task.only_judged() {
+        return refuse(format!("the problem has {feature}"));
+    }
     if !task.timed().is_empty() {
         return refuse("the problem has timed initials".to_owned());
     }

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use elbowroom::answers::RequestError;
 use elbowroom::answers::check::{
-    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PlanChecked, ProblemRead,
-    check,
+    CheckAnswer, CheckFinding, CheckRequest, FluentValue, MarginAnswer, PlanChecked,
+    PreferenceAnswer, ProblemRead, check,
 };
 use elbowroom::model::Task;
 use elbowroom::model::validate::Settings;
@@ -103,6 +103,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
                 metric,
                 values,
                 margins,
+                preferences,
             } => {
                 let mut text = format!(
                     "{}: {} reaches the goal at {}\n",
@@ -114,6 +115,7 @@ fn text(task: &Task, answer: &CheckAnswer, look: Look) -> String {
                     let _ = writeln!(text, "  metric: {}", number::nearest(metric));
                 }
                 push_values(&mut text, values);
+                push_preferences(&mut text, preferences, look);
                 push_margins(&mut text, margins, look);
                 text
             }
@@ -154,6 +156,30 @@ fn push_values(text: &mut String, values: &[FluentValue]) {
     }
     for FluentValue { fluent, value, .. } in changed {
         let _ = writeln!(text, "  {fluent} = {}", number::nearest(&value.0));
+    }
+}
+
+/// What the plan violates of the preferences.
+fn push_preferences(text: &mut String, preferences: &[PreferenceAnswer], look: Look) {
+    if !preferences.is_empty() {
+        let _ = write!(text, "\n{}\n", styled(STRONG, "Violated preferences"));
+    }
+    for PreferenceAnswer {
+        name,
+        violations,
+        why,
+    } in preferences
+    {
+        let times = match violations {
+            Some(1) | None => String::new(),
+            Some(several) => format!(", {several} times"),
+        };
+        push_wrapped(
+            text,
+            &format!("{name}{times}: {}", why.join("; ")),
+            2,
+            look.width,
+        );
     }
 }
 

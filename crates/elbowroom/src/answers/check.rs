@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use elbowroom_model::ground::FluentId;
-use elbowroom_model::validate::{self, Margin, Report, Settings, Verdict};
+use elbowroom_model::problem::PreferenceId;
+use elbowroom_model::validate::{self, Margin, Preferences, Report, Settings, Verdict};
 use elbowroom_model::{Footprint, Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use serde::{Deserialize, Serialize};
@@ -80,12 +81,26 @@ pub enum CheckFinding {
         values: Vec<FluentValue>,
         /// How close each comparison came to failing.
         margins: Vec<MarginAnswer>,
+        /// The preferences that are violated, or may be.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        preferences: Vec<PreferenceAnswer>,
     },
     /// It is not.
     Invalid {
         /// The violation.
         violation: ViolationAnswer,
     },
+}
+
+/// A preference that a plan violates, or may violate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PreferenceAnswer {
+    /// Its name.
+    pub name: String,
+    /// How many instances of it are violated; `None` if that cannot be decided.
+    pub violations: Option<usize>,
+    /// The violations, or why they cannot be told.
+    pub why: Vec<String>,
 }
 
 /// A numeric fluent at the end of a plan.
@@ -191,7 +206,35 @@ fn valid(task: &Task, plan: &TimeTriggeredPlan, report: &Report) -> CheckFinding
             })
             .collect(),
         margins: report.margins.iter().map(margin).collect(),
+        preferences: preferences(task, &report.preferences),
     }
+}
+
+fn preferences(task: &Task, found: &Preferences) -> Vec<PreferenceAnswer> {
+    let names = task.problem().preferences.iter().enumerate();
+    let answers = names.map(|(position, name)| {
+        let id = PreferenceId::from(position);
+        let violated = found.violated.iter().filter(|one| one.preference == id);
+        let violated = violated.map(|one| match &one.action {
+            Some(action) => format!("{action} at {}: {}", nearest(&one.time), one.why),
+            None => format!("at {}: {}", nearest(&one.time), one.why),
+        });
+        let undecided = found.undecided.iter().filter(|(other, _)| *other == id);
+        let undecided = undecided.map(|(_, why)| format!("cannot tell: {why}"));
+        PreferenceAnswer {
+            name: name.clone(),
+            violations: found.violations(id),
+            why: violated.chain(undecided).collect(),
+        }
+    });
+    answers
+        .filter(|answer| answer.violations != Some(0))
+        .collect()
+}
+
+/// A time in words.
+fn nearest(time: &Rational) -> String {
+    time.to_decimal(3)
 }
 
 fn margin(margin: &Margin) -> MarginAnswer {

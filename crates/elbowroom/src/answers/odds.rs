@@ -207,6 +207,10 @@ fn finding(
     request: &OddsRequest<'_>,
     watcher: &mut dyn Watcher,
 ) -> Result<OddsFinding, RequestError> {
+    if let Some(feature) = request.task.only_judged() {
+        let message = format!("odds do not respect {feature} yet, which the problem has");
+        return Err(RequestError::Unsupported(message));
+    }
     let made;
     let plan = if let Some(plan) = &request.plan {
         match validate::validate(request.task, plan, &validate::Settings::default()) {

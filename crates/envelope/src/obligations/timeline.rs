@@ -214,7 +214,9 @@ impl Reading<'_> {
             Expression::Duration => self
                 .action
                 .map(|(start, end)| Linear::difference(start, end)),
-            Expression::TotalTime => return Err(self.not_linear(expression)),
+            Expression::TotalTime | Expression::Violations(_) => {
+                return Err(self.not_linear(expression));
+            }
             Expression::Unknown(Unknown::Parameter(id)) => {
                 Some(parameter_value(ParameterId(*id), self.substitution))
             }

@@ -81,7 +81,10 @@ fn in_condition(condition: &mut Condition, visit: &mut dyn FnMut(&mut Expression
 fn in_expression(expression: &mut Expression, visit: &mut dyn FnMut(&mut Expression)) {
     match expression {
         Expression::Constant(_) | Expression::Unknown(_) => visit(expression),
-        Expression::Fluent(_) | Expression::Duration | Expression::TotalTime => {}
+        Expression::Fluent(_)
+        | Expression::Duration
+        | Expression::TotalTime
+        | Expression::Violations(_) => {}
         Expression::Add(parts) | Expression::Multiply(parts) => {
             for part in parts {
                 in_expression(part, visit);

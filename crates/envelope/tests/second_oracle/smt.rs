@@ -393,7 +393,10 @@ impl<'a> Encoder<'a> {
                 self.expression(left, at, action)?,
                 self.expression(right, at, action)?
             ),
-            Expression::Unknown(_) | Expression::TotalTime | Expression::Divide(..) => {
+            Expression::Unknown(_)
+            | Expression::TotalTime
+            | Expression::Violations(_)
+            | Expression::Divide(..) => {
                 return Err(NotEncoded);
             }
             Expression::Negate(part) => format!("(- {})", self.expression(part, at, action)?),

@@ -101,7 +101,9 @@ impl Fraction {
             Expression::Duration => {
                 Polynomial::constant(duration.ok_or(Unreadable::Open)?.clone()).into()
             }
-            Expression::TotalTime | Expression::Unknown(_) => return Err(Unreadable::Open),
+            Expression::TotalTime | Expression::Violations(_) | Expression::Unknown(_) => {
+                return Err(Unreadable::Open);
+            }
             Expression::Add(parts) => {
                 let mut sum = Self::from(Polynomial::constant(Rational::ZERO));
                 for part in parts {

@@ -21,7 +21,10 @@ impl Value {
         match expression {
             Expression::Constant(value) => Self::Number(value.clone()),
             Expression::Fluent(leaf) => fluent(leaf),
-            Expression::Duration | Expression::TotalTime | Expression::Unknown(_) => Self::Varies,
+            Expression::Duration
+            | Expression::TotalTime
+            | Expression::Violations(_)
+            | Expression::Unknown(_) => Self::Varies,
             Expression::Add(parts) => {
                 let zero = Self::Number(Rational::ZERO);
                 parts.iter().fold(zero, |total, part| {

@@ -48,6 +48,7 @@ impl fmt::Display for When {
             Self::OverAll => "over all",
             Self::End => "at end",
             Self::Goal => "goal",
+            Self::Course => "constraint",
         })
     }
 }
@@ -55,6 +56,9 @@ impl fmt::Display for When {
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Mistake::Condition {
+            is_after, is_exact, ..
+        }
+        | Mistake::Constraint {
             is_after, is_exact, ..
         } = &self.mistake
         {
@@ -123,9 +127,22 @@ impl fmt::Display for Mistake {
             } => {
                 match when {
                     When::Goal => write!(f, "the goal {condition} does not hold")?,
+                    When::Course => write!(f, "{condition} does not hold")?,
                     When::Now => write!(f, "needs {condition}")?,
                     _ => write!(f, "needs {condition} {when}")?,
                 }
+                for (position, reason) in reasons.iter().enumerate() {
+                    write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
+                }
+                Ok(())
+            }
+            Self::Constraint {
+                constraint,
+                why,
+                reasons,
+                ..
+            } => {
+                write!(f, "the constraint {constraint} is violated: {why}")?;
                 for (position, reason) in reasons.iter().enumerate() {
                     write!(f, "{} {reason}", if position == 0 { ":" } else { ";" })?;
                 }
@@ -236,6 +253,14 @@ impl fmt::Display for Difficulty {
                 f,
                 "a continuous effect on {fluent} depends on an over-all condition, whose truth \
                  lies in the future"
+            ),
+            Self::Past => write!(
+                f,
+                "a constraint on the course of the whole plan depends on the states before"
+            ),
+            Self::CloseTimes { constraint } => write!(
+                f,
+                "whether {constraint} is kept depends on two times less than a millionth apart"
             ),
             Self::Unstratified => write!(f, "a derived fact depends on its own negation"),
         }

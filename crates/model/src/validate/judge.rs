@@ -8,10 +8,12 @@ use elbowroom_num::Rational;
 use super::explain::Witness;
 use super::margin::{Demand, Margins};
 use super::piece::{Break, Piece};
+use super::preferences::{OfActions, Part};
 use super::reading::Fault;
 use super::state::{Motion, Now, Reading};
 use super::stop::{Place, Stop};
 use super::timeline::{Group, What};
+use super::trajectory::Course;
 use super::violation::{Mistake, Reason, When};
 use super::{Settings, effects, interference};
 use crate::derivation::{Derivation, Derived, Moment, holds};
@@ -34,6 +36,10 @@ pub(super) struct Judge<'a> {
     /// The last change of each fact: time and happening.
     pub(super) since: BTreeMap<FactId, (Rational, What<'a>)>,
     pub(super) margins: Margins,
+    /// What the constraints on the course say; `None` if there are none.
+    pub(super) course: Option<Course<'a>>,
+    /// The preferences among the conditions of actions.
+    pub(super) preferences: OfActions,
 }
 
 /// A durative action under way.
@@ -72,6 +78,7 @@ impl<'a> Judge<'a> {
         groups: &[Group<'a>],
     ) -> Result<(), Stop> {
         let mut before = from;
+        self.note_state(from.unwrap_or(&Rational::ZERO))?;
         for (position, group) in groups.iter().enumerate() {
             if let Some(before) = before.filter(|before| **before < group.time) {
                 self.pass(before, &group.time)?;
@@ -80,9 +87,23 @@ impl<'a> Judge<'a> {
             self.arrive(group)?;
             interference::check(self, &groups[..=position])?;
             self.apply(group)?;
+            self.note_state(&group.time)?;
         }
         let end = before.cloned().unwrap_or_default();
+        if let Some(course) = &self.course {
+            course.violation(self, &end)?;
+        }
         self.require(self.task.goal(), When::Goal, None, &end)
+    }
+
+    /// Notes the state from `time` on for the constraints on the course.
+    fn note_state(&mut self, time: &Rational) -> Result<(), Stop> {
+        let Some(mut course) = self.course.take() else {
+            return Ok(());
+        };
+        course.note(self, time)?;
+        self.course = Some(course);
+        Ok(())
     }
 
     /// From just after the group at `from` to the arrival at the next one.
@@ -92,11 +113,37 @@ impl<'a> Judge<'a> {
             .map_err(|(step, fault)| self.stop(fault, &Place::rate(from, step)))?;
         let length = to - from;
         self.watch_over_all(from, &motion, &length)?;
+        self.watch_course(from, &motion, &length)?;
         motion.carry(&mut self.now, &length);
         self.derived.take();
         for running in self.running.values_mut() {
             running.is_new = false;
         }
+        Ok(())
+    }
+
+    /// Notes for the constraints on the course what changes until `length` later.
+    fn watch_course(
+        &mut self,
+        from: &Rational,
+        motion: &Motion,
+        length: &Rational,
+    ) -> Result<(), Stop> {
+        if motion.is_still() {
+            return Ok(());
+        }
+        let Some(mut course) = self.course.take() else {
+            return Ok(());
+        };
+        let piece = Piece {
+            now: &self.now,
+            motion,
+            length,
+            derivation: &self.derivation,
+            slack: &self.settings.slack,
+        };
+        course.note_motion(self, &piece, from)?;
+        self.course = Some(course);
         Ok(())
     }
 
@@ -110,6 +157,7 @@ impl<'a> Judge<'a> {
     ) -> Result<(), Stop> {
         let mut running = std::mem::take(&mut self.running);
         let mut margins = std::mem::take(&mut self.margins);
+        let mut preferences = std::mem::take(&mut self.preferences);
         let piece = Piece {
             now: &self.now,
             motion,
@@ -121,6 +169,8 @@ impl<'a> Judge<'a> {
         for (&position, state) in &mut running {
             let (step, body) = self.durative(position);
             let duration = step.duration.as_ref();
+            let when = (position, duration, state.is_new);
+            preferences.watch(&piece, when, (self.task, from));
             for (index, conjunct) in body.over_all.conjuncts().into_iter().enumerate() {
                 let place = Place::condition(from, Some(position), When::OverAll, conjunct);
                 let broken = piece
@@ -156,6 +206,7 @@ impl<'a> Judge<'a> {
         }
         self.running = running;
         self.margins = margins;
+        self.preferences = preferences;
         Ok(())
     }
 
@@ -168,12 +219,14 @@ impl<'a> Judge<'a> {
                 What::Instant(position) => {
                     if let Body::Instantaneous(snap) = &self.plan.steps[position].action.body {
                         self.require(&snap.condition, When::Now, Some(position), time)?;
+                        self.prefer(position, Part::Start, time);
                     }
                 }
                 What::Start(position) => {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, false, time)?;
                     self.require(&body.start.condition, When::Start, Some(position), time)?;
+                    self.prefer(position, Part::Start, time);
                     let running = self.begin(position, time)?;
                     self.running.insert(position, running);
                 }
@@ -181,10 +234,18 @@ impl<'a> Judge<'a> {
                     let (_, body) = self.durative(position);
                     self.check_duration(position, true, time)?;
                     self.require(&body.end.condition, When::End, Some(position), time)?;
+                    self.prefer(position, Part::End, time);
                 }
             }
         }
         Ok(())
+    }
+
+    /// Reads the preferences of a step that belong to its start or end.
+    fn prefer(&mut self, position: usize, part: Part, time: &Rational) {
+        let mut preferences = std::mem::take(&mut self.preferences);
+        preferences.read(self, position, part, time);
+        self.preferences = preferences;
     }
 
     /// Reads, at its start, which effects an action may have.

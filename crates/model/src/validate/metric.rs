@@ -10,12 +10,16 @@ impl Report {
     /// The value of the problem's `:metric`, as the problem writes it: with `maximize`, more is
     /// better. `total-time` is the makespan.
     ///
-    /// `None` if the problem has no metric, or one that counts violated preferences, or reads a
-    /// fluent that has no value when the plan is over.
+    /// `None` if the problem has no metric, or one that reads a fluent that has no value when the
+    /// plan is over, or counts violations that cannot be decided.
     pub fn metric(&self, task: &Task) -> Option<Rational> {
-        let expression = task.problem().metric.as_ref()?.expression.as_ref()?;
+        let expression = &task.problem().metric.as_ref()?.expression;
         expression.evaluate(&mut |leaf| match leaf {
             Expression::TotalTime => Some(self.makespan.clone()),
+            Expression::Violations(preference) => {
+                let violations = self.preferences.violations(*preference)?;
+                Some(Rational::from(i64::try_from(violations).ok()?))
+            }
             Expression::Fluent(fluent) => {
                 let objects = fluent.arguments.iter().map(|term| match term {
                     Term::Object(object) => Some(*object),

@@ -44,6 +44,18 @@ impl Break {
     }
 }
 
+/// What is known about some conditions from a moment of a piece on.
+pub(super) struct Known {
+    /// The moment, since the beginning of the piece; if it is irrational, up to a millionth less.
+    pub(super) at: Rational,
+    /// Whether `at` is that moment itself.
+    pub(super) is_exact: bool,
+    /// Whether it is so only right after that moment.
+    pub(super) is_open: bool,
+    /// The truth of each condition.
+    pub(super) holds: Vec<bool>,
+}
+
 impl Piece<'_> {
     /// Where `condition`, of an action with this duration, first fails. The very beginning counts
     /// only if `includes_start`.
@@ -87,6 +99,33 @@ impl Piece<'_> {
             }));
         }
         Ok(None)
+    }
+
+    /// The truth of several conditions, read by nobody in particular, in each cell between their
+    /// common cuts; in order, from the very beginning of the piece on.
+    pub(super) fn course(&self, conditions: &[&Condition]) -> Result<Vec<Known>, Fault> {
+        let all = Condition::And(conditions.iter().copied().cloned().collect());
+        let reads_derived = self.derivation.is_read_by(&all);
+        if !self.concerns(&all, reads_derived) {
+            return Ok(Vec::new());
+        }
+        let cuts = self.cuts(&all, None, reads_derived);
+        let polynomial = product(&cuts.polynomials);
+        let mut known = Vec::new();
+        for cell in cells(&cuts, self.length, true) {
+            let view = self.view(None, cell.place);
+            let looks = conditions
+                .iter()
+                .map(|condition| self.look(condition, &view, reads_derived));
+            let narrow = polynomial.narrowed(&cell.from, &Rational::new(1, 1_000_000));
+            known.push(Known {
+                at: narrow.lower().clone(),
+                is_exact: matches!(narrow, Root::Exact(_)),
+                is_open: cell.is_open,
+                holds: looks.collect::<Result<_, _>>()?,
+            });
+        }
+        Ok(known)
     }
 
     /// `left - right` as a function of the time since the piece began.

@@ -90,7 +90,9 @@ pub(super) fn evaluate<Q: Quantity>(
             Some(duration) => Ok(Q::constant(duration)),
             None => Err(Fault::Misplaced(expression.clone())),
         },
-        Expression::TotalTime => Err(Fault::Misplaced(expression.clone())),
+        Expression::TotalTime | Expression::Violations(_) => {
+            Err(Fault::Misplaced(expression.clone()))
+        }
         Expression::Unknown(unknown) => Err(Fault::Open(*unknown)),
         Expression::Add(parts) => {
             let mut total = Q::constant(&Rational::ZERO);

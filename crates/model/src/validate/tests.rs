@@ -1,6 +1,7 @@
 //! Each sentence of the definition of a valid plan, as a small plan.
 
 mod conditions;
+mod constraints;
 mod continuous;
 mod durations;
 mod effects;

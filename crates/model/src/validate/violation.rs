@@ -83,6 +83,20 @@ pub enum Mistake {
         /// The reasons why it is false.
         reasons: Vec<Reason>,
     },
+    /// A constraint on the course of the plan is not kept.
+    Constraint {
+        /// As PDDL writes it.
+        constraint: String,
+        /// Why, in words.
+        why: String,
+        /// Whether it is still kept at the time given, and broken right after it.
+        is_after: bool,
+        /// Whether the time given is exact; else it is within a millionth below the true one,
+        /// which is irrational.
+        is_exact: bool,
+        /// The reasons why a condition that should hold is false.
+        reasons: Vec<Reason>,
+    },
     /// Two happenings that interfere are too close to each other.
     Interference {
         /// The earlier one.
@@ -128,6 +142,8 @@ pub enum When {
     End,
     /// The goal.
     Goal,
+    /// Of a constraint on the course of the plan.
+    Course,
 }
 
 /// Why a condition is false: one of its parts.
@@ -227,6 +243,14 @@ pub enum Difficulty {
     ContinuousGuard {
         /// The fluent that the effect changes.
         fluent: String,
+    },
+    /// Whether a constraint on the whole course is kept depends on states before the plan begins.
+    Past,
+    /// Whether a constraint is kept depends on two times that are less than a millionth apart, one
+    /// of them irrational.
+    CloseTimes {
+        /// The constraint.
+        constraint: String,
     },
     /// A derived fact depends on its own negation.
     Unstratified,

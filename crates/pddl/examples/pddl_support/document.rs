@@ -48,12 +48,50 @@ const SUPPORTED: &[(&str, &str)] = &[
          one time are a mistake in the problem; the goal counts after all of them",
     ),
     ("Derived predicates", "stratified rules"),
-    ("Metrics", "read; they have no bearing on validity"),
+    (
+        "Constraints on the course",
+        "`:constraints` of domain and problem (PDDL 3): `at end`, `always`, `sometime`, `within`, \
+         `at-most-once`, `sometime-after`, `sometime-before`, `always-within`, `hold-during`, \
+         `hold-after`, under `and`, `forall` and `preference`; the judge alone heeds them so far",
+    ),
+    (
+        "Preferences",
+        "in goals, conditions of actions (one violation each time) and `:constraints`, under `and` \
+         and `forall` (one instance for each object); they never make a plan invalid",
+    ),
+    (
+        "Metrics",
+        "read; they have no bearing on validity; `(is-violated name)` counts the violated \
+         instances of a preference",
+    ),
     (
         "Open numbers",
         "`:synth-parameters`, of a domain or of an action",
     ),
 ];
+
+/// What constraints mean where papers and programs leave it open.
+const CONSTRAINTS: &str = "\n## Constraints and preferences\n
+The meaning is that of Gerevini, Haslum, Long, Saetti & Dimopoulos (*Deterministic planning in the \
+fifth international planning competition*, AIJ 173, 2009): a constraint looks at the sequence of \
+states that a plan goes through.
+
+- The state at a moment is the one after all that happens then. Before anything happens, the \
+  initial state counts as a state of its own.
+- What holds in the end, after the last happening and all timed initials, holds for ever: \
+  `hold-during` and `hold-after` may reach beyond the end of the plan.
+- `hold-during t u` and `hold-after t` also ask about the state that holds at `t`, which may have \
+  begun earlier. (VAL looks only at states that begin in the window.)
+- Where numbers change continuously, every moment counts, not only those of happenings. Moments \
+  are compared exactly; two of them less than a millionth apart, one of them irrational, leave the \
+  constraint undecided.
+- Constraints do not nest. In `(preference p (and c d))`, `p` is violated once if `c` or `d` is; in \
+  `(forall (?x) (preference p …))` there is an instance for each object. A preference that reads a \
+  number without a value is violated.
+- A plan that breaks a constraint is invalid, and the judge says since when and why. In \
+  mid-execution, what has been so far is not known: the judge says that it cannot tell.
+
+";
 
 /// The document. Without a survey it has no tables.
 pub(crate) fn document(survey: Option<&Survey>) -> String {
@@ -73,6 +111,7 @@ pub(crate) fn document(survey: Option<&Survey>) -> String {
             format_args!("- **{}**: {}", feature.name(), feature.summary()),
         );
     }
+    text.push_str(CONSTRAINTS);
     if let Some(survey) = survey {
         benchmarks(survey, &mut text);
     }

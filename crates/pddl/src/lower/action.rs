@@ -53,6 +53,7 @@ impl Reader {
         let fields = self.fields(&name, rest, allowed);
         let mut scope = self.action_scope(&fields);
         scope.has_duration = is_durative;
+        scope.parameters = scope.variables.len();
         let body = if is_durative {
             self.durative_body(&fields, section, &mut scope)
         } else {
@@ -66,6 +67,7 @@ impl Reader {
                 .advise("give each action its own name");
         }
         self.schema_spans.push(span);
+        self.action_preferences(std::mem::take(&mut scope.soft), id);
         self.problem.schemas.push(Schema {
             name: name.into_owned(),
             parameters: scope.variables,

@@ -2,11 +2,10 @@
 
 use elbowroom_model::problem::{Comparison, Condition, Variable};
 
-use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::expression::number;
 use crate::lower::scope::Scope;
-use crate::lower::timed::time_specifier;
+use crate::lower::timed::{Timed, time_specifier};
 use crate::syntax::Node;
 
 impl Reader {
@@ -64,7 +63,10 @@ impl Reader {
                 Condition::TRUE
             }
             ("preference", _) => {
-                self.preference(node, scope);
+                self.preference(node, scope, |reader, part, scope| Timed {
+                    start: reader.condition(part, scope),
+                    ..Timed::default()
+                });
                 Condition::TRUE
             }
             _ if time_specifier(node).is_some() => {
@@ -160,21 +162,6 @@ impl Reader {
             None => node
                 .form()
                 .is_some_and(|(head, _)| !self.names.object_functions.contains(head.as_ref())),
-        }
-    }
-
-    /// `(preference name condition)`: need not hold.
-    pub(super) fn preference(&mut self, node: &Node, scope: &Scope) {
-        if scope.without_preferences > 0 {
-            self.report
-                .error(node.span, "a preference cannot stand here")
-                .advise("preferences stand under `and` and `forall` only");
-        } else {
-            self.report.ignored(
-                Feature::Preferences,
-                node.span,
-                "preferences do not make plans invalid, and are ignored",
-            );
         }
     }
 

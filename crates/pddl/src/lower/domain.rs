@@ -91,6 +91,7 @@ impl Reader {
                 _ => {}
             }
         }
+        self.problem.domain_constraints = self.problem.constraints.len();
         self.rules(heads);
     }
 

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use elbowroom_model::Problem;
-use elbowroom_model::problem::{Body, Condition, Effect, Guard, TypeId, Variable};
+use elbowroom_model::problem::{Body, Condition, Constraint, Effect, Guard, TypeId, Variable};
 
 use crate::lower::Reader;
 use crate::source::Span;
@@ -50,6 +50,30 @@ impl Reader {
         for (schema, span) in problem.schemas.iter().zip(&self.schema_spans) {
             let size = sizes.of_body(&schema.body);
             check(size, *span, format!("action `{}`", schema.name));
+        }
+        for (constraint, span) in problem.constraints.iter().zip(&self.constraint_spans) {
+            check(
+                sizes.of_constraint(constraint),
+                *span,
+                "a constraint".to_owned(),
+            );
+        }
+        for preference in &problem.action_preferences {
+            let position = preference.schema.index();
+            let Some(span) = self.schema_spans.get(position) else {
+                continue;
+            };
+            let parts = [
+                &preference.at_start,
+                &preference.over_all,
+                &preference.at_end,
+            ];
+            let size = parts.into_iter().fold(0_u64, |size, part| {
+                size.saturating_add(sizes.of_condition(part))
+            });
+            let size = size.saturating_mul(sizes.combinations(&preference.variables));
+            let name = &problem.schemas[position].name;
+            check(size, *span, format!("a preference of action `{name}`"));
         }
         for (span, what) in too_large {
             self.report
@@ -102,6 +126,22 @@ impl<'a> Sizes<'a> {
             size = size.saturating_add(self.of_condition(part));
         }
         size.saturating_mul(self.combinations(variables))
+    }
+
+    fn of_constraint(&mut self, constraint: &'a Constraint) -> u64 {
+        match constraint {
+            Constraint::Modal(modal) => modal
+                .conditions()
+                .into_iter()
+                .fold(1, |size, part| size.saturating_add(self.of_condition(part))),
+            Constraint::And(parts) => parts.iter().fold(0, |size, part| {
+                size.saturating_add(self.of_constraint(part))
+            }),
+            Constraint::Forall(variables, part) => self
+                .of_constraint(part)
+                .saturating_mul(self.combinations(variables)),
+            Constraint::Preference(_, part) => self.of_constraint(part),
+        }
     }
 
     fn of_condition(&mut self, condition: &'a Condition) -> u64 {

@@ -68,6 +68,9 @@ impl Reader {
                     .advise("expected `(/ a b)`");
                 WRONG
             }
+            ("is-violated", _) if scope.has_total_time => self
+                .violations(node, operands)
+                .map_or(WRONG, Expression::Violations),
             ("total-time", []) => self.number_or_name("total-time", node, scope),
             _ if number(&node.list().unwrap_or_default()[0]).is_some() => {
                 self.report

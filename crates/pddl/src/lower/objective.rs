@@ -4,11 +4,9 @@ use elbowroom_model::problem::{
     Body, Change, Condition, Fluent, Metric, ObjectId, Term, TimedChange, UpdateOperator,
 };
 
-use crate::feature::Feature;
 use crate::lower::Reader;
 use crate::lower::scope::Scope;
 use crate::lower::sections::{Section, Sections};
-use crate::syntax::Node;
 
 /// The keywords of a problem.
 const SECTIONS: &[&str] = &[
@@ -50,10 +48,10 @@ impl Reader {
                     .advise("every plan reaches it; expected `(:goal condition)`");
             }
         }
-        self.check_expansion(goal.map(|section| section.span));
         for section in sections.all(":constraints") {
             self.constraints(section);
         }
+        self.check_expansion(goal.map(|section| section.span));
         if let Some(section) = sections.only(":metric", &mut self.report) {
             self.metric(section);
         }
@@ -93,7 +91,12 @@ impl Reader {
 
     fn goal(&mut self, section: &Section) {
         self.problem.goal = match section.content {
-            [goal] => self.condition(goal, &mut Scope::default()),
+            [goal] => {
+                let mut scope = Scope::default();
+                let condition = self.condition(goal, &mut scope);
+                self.goal_preferences(scope.soft, section.span);
+                condition
+            }
             [] => {
                 self.report
                     .error(section.span, "an empty goal")
@@ -184,20 +187,11 @@ impl Reader {
             self.wrong_metric(section);
             return;
         }
-        let expression = if let Some(violated) = mention_of_violation(measure) {
-            self.report.ignored(
-                Feature::Preferences,
-                violated.span,
-                "preferences are not measured: the metric is ignored",
-            );
-            None
-        } else {
-            let scope = Scope {
-                has_total_time: true,
-                ..Scope::default()
-            };
-            Some(self.expression(measure, &scope))
+        let scope = Scope {
+            has_total_time: true,
+            ..Scope::default()
         };
+        let expression = self.expression(measure, &scope);
         self.problem.metric = Some(Metric {
             maximize,
             expression,
@@ -209,12 +203,4 @@ impl Reader {
             .error(section.span, "this metric cannot be understood")
             .advise("expected `(:metric minimize expression)` or `(:metric maximize expression)`");
     }
-}
-
-/// The first `(is-violated …)` in an expression.
-fn mention_of_violation<'t, 's>(node: &'t Node<'s>) -> Option<&'t Node<'s>> {
-    if node.is("is-violated") {
-        return Some(node);
-    }
-    node.list()?.iter().find_map(mention_of_violation)
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use elbowroom_model::problem::{Term, Unknown, Variable};
 
+use crate::lower::constraints::Soft;
+
 /// The names that mean something inside an action, a rule, a goal.
 #[derive(Debug, Default)]
 pub(super) struct Scope {
@@ -21,6 +23,10 @@ pub(super) struct Scope {
     /// How many enclosing forms are such that leaving out a preference would change what must
     /// hold.
     pub(super) without_preferences: usize,
+    /// How many of the variables are parameters of the action.
+    pub(super) parameters: usize,
+    /// The preferences found.
+    pub(super) soft: Vec<Soft>,
 }
 
 impl Scope {

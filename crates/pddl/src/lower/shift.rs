@@ -62,6 +62,7 @@ fn shift_expression(expression: Expression, first: usize, by: usize) -> Expressi
         leaf @ (Expression::Constant(_)
         | Expression::Duration
         | Expression::TotalTime
+        | Expression::Violations(_)
         | Expression::Unknown(_)) => leaf,
     }
 }

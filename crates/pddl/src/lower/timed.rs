@@ -139,7 +139,7 @@ impl Reader {
                 })
             }
             ("preference", _) => {
-                self.preference(node, scope);
+                self.preference(node, scope, Self::timed_condition);
                 Timed::default()
             }
             ("or", _) | ("not", [_]) | ("imply", [_, _]) => {

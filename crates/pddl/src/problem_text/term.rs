@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use elbowroom_model::problem::{Condition, Expression, Term, TypeId, Unknown, Variable};
+use elbowroom_model::problem::{
+    Condition, Constraint, Expression, Term, TypeId, Unknown, Variable,
+};
 
 use super::Writer;
 
@@ -46,6 +48,54 @@ impl Writer<'_> {
         }
     }
 
+    /// The constraint, its variables numbered as in `names`.
+    pub(super) fn constraint<'a>(
+        &self,
+        constraint: &'a Constraint,
+        names: &mut Names<'a>,
+    ) -> String {
+        match constraint {
+            Constraint::Modal(modal) => {
+                let mut text = format!("({}", modal.name());
+                for time in modal.times() {
+                    text.push(' ');
+                    text.push_str(&self.number(time));
+                }
+                for condition in modal.conditions() {
+                    text.push(' ');
+                    text.push_str(&self.condition(condition, names));
+                }
+                text + ")"
+            }
+            Constraint::And(parts) => {
+                let parts: Vec<_> = parts.iter().map(|p| self.constraint(p, names)).collect();
+                format!("(and {})", parts.join(" "))
+            }
+            Constraint::Forall(variables, part) => {
+                let (declared, outside) = self.declared(variables, names);
+                let part = self.constraint(part, names);
+                names.truncate(outside);
+                format!("(forall ({declared}) {part})")
+            }
+            Constraint::Preference(preference, part) => {
+                let name = &self.task.problem().preferences[preference.index()];
+                format!("(preference {name} {})", self.constraint(part, names))
+            }
+        }
+    }
+
+    /// The declaration of variables, which are in scope from now on, and how many were before.
+    fn declared<'a>(&self, variables: &'a [Variable], names: &mut Names<'a>) -> (String, usize) {
+        let outside = names.len();
+        let mut declared = Vec::new();
+        for variable in variables {
+            let name = unused(&variable.name, names);
+            declared.push(format!("{name} - {}", self.types(&variable.types)));
+            names.push(name);
+        }
+        (declared.join(" "), outside)
+    }
+
     fn joined<'a>(&self, head: &str, parts: &'a [Condition], names: &mut Names<'a>) -> String {
         let mut text = format!("({head}");
         for part in parts {
@@ -63,16 +113,10 @@ impl Writer<'_> {
         part: &'a Condition,
         names: &mut Names<'a>,
     ) -> String {
-        let outside = names.len();
-        let mut declared = Vec::new();
-        for variable in variables {
-            let name = unused(&variable.name, names);
-            declared.push(format!("{name} - {}", self.types(&variable.types)));
-            names.push(name);
-        }
+        let (declared, outside) = self.declared(variables, names);
         let part = self.condition(part, names);
         names.truncate(outside);
-        format!("({quantifier} ({}) {part})", declared.join(" "))
+        format!("({quantifier} ({declared}) {part})")
     }
 
     /// The expression, its variables numbered as in `names`.
@@ -94,6 +138,9 @@ impl Writer<'_> {
             }
             Expression::Duration => "?duration".to_owned(),
             Expression::TotalTime => "(total-time)".to_owned(),
+            Expression::Violations(preference) => {
+                format!("(is-violated {})", problem.preferences[preference.index()])
+            }
             // Only the domain's own unknowns can stand outside of actions.
             Expression::Unknown(
                 Unknown::Domain(place) | Unknown::Action(place) | Unknown::Parameter(place),

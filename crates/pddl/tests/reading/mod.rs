@@ -189,6 +189,9 @@ impl Printer<'_> {
             Expression::Constant(value) => value.to_string(),
             Expression::Fluent(fluent) => self.fluent(fluent),
             Expression::Duration => "?duration".to_owned(),
+            Expression::Violations(preference) => {
+                format!("(is-violated {})", self.0.preferences[preference.index()])
+            }
             Expression::TotalTime => "(total-time)".to_owned(),
             Expression::Unknown(Unknown::Domain(index)) => format!("unknown {index}"),
             Expression::Unknown(Unknown::Action(index)) => format!("own unknown {index}"),

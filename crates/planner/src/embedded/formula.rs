@@ -177,7 +177,9 @@ impl Linear {
                 duration: Rational::ONE,
                 ..Self::default()
             },
-            Expression::TotalTime | Expression::Unknown(_) => return None,
+            Expression::TotalTime | Expression::Violations(_) | Expression::Unknown(_) => {
+                return None;
+            }
             Expression::Add(parts) => {
                 let mut sum = Self::default();
                 for part in parts {

@@ -25,8 +25,8 @@ pub(crate) fn keep_relevant(task: &Task, grounding: &mut Grounding, situation: &
         relevance.read_action(&running.action);
     }
     if let Some(metric) = &task.problem().metric {
-        let only_grows = !metric.maximize && metric.expression.as_ref().is_some_and(is_growing);
-        let is_time = matches!(metric.expression, Some(problem::Expression::TotalTime));
+        let only_grows = !metric.maximize && is_growing(&metric.expression);
+        let is_time = matches!(metric.expression, problem::Expression::TotalTime);
         for (number, action) in grounding.actions.iter().enumerate() {
             if !is_time && changes_numbers(action, only_grows) {
                 relevance.keep(number);

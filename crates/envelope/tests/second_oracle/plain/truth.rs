@@ -135,7 +135,7 @@ impl Search<'_> {
             Expression::Fluent(fluent) => context.values[fluent.index()].clone(),
             Expression::Duration => context.duration.clone(),
             Expression::Unknown(Unknown::Parameter(id)) => Some(self.parameter(*id as usize)),
-            Expression::Unknown(_) | Expression::TotalTime => {
+            Expression::Unknown(_) | Expression::TotalTime | Expression::Violations(_) => {
                 return Err(Trouble::GaveUp(GaveUp::NotCovered));
             }
             Expression::Add(parts) => all(parts)?.map(|parts| {

@@ -7,9 +7,9 @@ use elbowroom_num::Rational;
 use super::forms::{Form, forms, head, words};
 use crate::plan::{Step, TimeTriggeredPlan};
 use crate::problem::{
-    Atom, Body, Comparison, Condition, ContinuousEffect, DurationConstraint, Effect, Expression,
-    Fluent, Function, FunctionId, Guard, Predicate, PredicateId, Problem, Rule, Schema,
-    TimedChange, TimedInitial, Unknown, UpdateOperator,
+    Atom, Body, Comparison, Condition, Constraint, ContinuousEffect, DurationConstraint, Effect,
+    Expression, Fluent, Function, FunctionId, Guard, Modal, Predicate, PredicateId, PreferenceId,
+    Problem, Rule, Schema, TimedChange, TimedInitial, Unknown, UpdateOperator,
 };
 use crate::task::Task;
 use crate::validate::{Report, Settings, Verdict, validate};
@@ -48,6 +48,47 @@ impl World {
     pub(super) fn goal(mut self, goal: &str) -> Self {
         self.problem.goal = self.conjunction(goal);
         self
+    }
+
+    /// `(within 3 (p))` and the like.
+    pub(super) fn constraint(mut self, text: &str) -> Self {
+        let constraint = self.modal(text);
+        self.problem.constraints.push(constraint);
+        self
+    }
+
+    /// The same, as a preference of that name.
+    pub(super) fn prefer(mut self, name: &str, text: &str) -> Self {
+        let modal = self.modal(text);
+        let preference = PreferenceId::from(self.problem.preferences.len());
+        self.problem.preferences.push(name.to_owned());
+        let constraint = Constraint::Preference(preference, Box::new(modal));
+        self.problem.constraints.push(constraint);
+        self
+    }
+
+    fn modal(&mut self, text: &str) -> Constraint {
+        let form = forms(text).remove(0);
+        let Form::List(parts) = &form else {
+            panic!("{text}")
+        };
+        let words = words(&form);
+        let lists = parts.iter().filter(|part| matches!(part, Form::List(_)));
+        let mut conditions: Vec<_> = lists.map(|part| self.condition(part)).collect();
+        let mut next = || conditions.remove(0);
+        Constraint::Modal(match words.as_slice() {
+            ["at", "end"] => Modal::AtEnd(next()),
+            ["always"] => Modal::Always(next()),
+            ["sometime"] => Modal::Sometime(next()),
+            ["within", time] => Modal::Within(number(time), next()),
+            ["at-most-once"] => Modal::AtMostOnce(next()),
+            ["sometime-after"] => Modal::SometimeAfter(next(), next()),
+            ["sometime-before"] => Modal::SometimeBefore(next(), next()),
+            ["always-within", time] => Modal::AlwaysWithin(number(time), next(), next()),
+            ["hold-during", from, until] => Modal::HoldDuring(number(from), number(until), next()),
+            ["hold-after", time] => Modal::HoldAfter(number(time), next()),
+            other => panic!("{other:?}"),
+        })
     }
 
     pub(super) fn settings(mut self, settings: Settings) -> Self {

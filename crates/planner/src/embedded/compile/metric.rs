@@ -87,7 +87,7 @@ impl Draft {
         let metric = task.problem().metric.as_ref()?;
         let values = &situation.state.values;
         let mut is_defined = true;
-        let ground = metric.expression.as_ref()?.map_fluents(&mut |fluent| {
+        let ground = metric.expression.map_fluents(&mut |fluent| {
             let objects = fluent.arguments.iter().map(|term| match term {
                 Term::Object(object) => Some(*object),
                 Term::Variable(_) => None,
@@ -96,6 +96,10 @@ impl Draft {
             let found = objects.and_then(|objects| task.find_fluent(fluent.function, &objects));
             is_defined &= found.is_some_and(|found| values.contains_key(&found));
             found.unwrap_or(FluentId(u32::MAX))
+        });
+        ground.visit_leaves(&mut |leaf| {
+            // How often preferences are violated, the judge says.
+            is_defined &= !matches!(leaf, Expression::Violations(_));
         });
         if !is_defined {
             return None;

@@ -1,0 +1,12 @@
+(define (problem night)
+  (:domain rounds)
+  (:objects gate yard shed - place)
+  (:init (at gate))
+  (:goal (and (seen shed)
+              (forall (?p - place) (preference all-seen (seen ?p)))))
+  (:constraints (and
+    (within 20 (seen shed))
+    (sometime-before (at shed) (seen yard))
+    (preference quiet (at-most-once (at yard)))))
+  (:metric minimize (+ (total-time)
+    (+ (* 10 (is-violated all-seen)) (* 3 (is-violated thorough))))))

@@ -1,0 +1,157 @@
+//! Constraints on the course of a plan, and preferences (PDDL 3).
+//!
+//! Gerevini, Haslum, Long, Saetti & Dimopoulos, "Deterministic planning in the fifth international
+//! planning competition: PDDL3 and experimental evaluation of the planners", AIJ 173 (2009).
+
+use elbowroom_num::Rational;
+
+use crate::problem::{Condition, PreferenceId, SchemaId, Variable};
+
+/// A constraint on the states that a plan goes through, over conditions of type `C`.
+///
+/// There is one state at each moment: the one after all that happens then. Before anything
+/// happens, the initial state counts, too, and what holds in the end holds for ever.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Modal<C> {
+    /// `(at end c)`: it holds in the end.
+    AtEnd(C),
+    /// `(always c)`: it holds at every moment.
+    Always(C),
+    /// `(sometime c)`: it holds at some moment.
+    Sometime(C),
+    /// `(within t c)`: it holds at some moment that is no later than `t`.
+    Within(Rational, C),
+    /// `(at-most-once c)`: once it has ceased to hold, it never holds again.
+    AtMostOnce(C),
+    /// `(sometime-after c d)`: whenever `c` holds, `d` holds then or later.
+    SometimeAfter(C, C),
+    /// `(sometime-before c d)`: whenever `c` holds, `d` held at some earlier moment.
+    SometimeBefore(C, C),
+    /// `(always-within t c d)`: whenever `c` holds, `d` holds then, or at most `t` later.
+    AlwaysWithin(Rational, C, C),
+    /// `(hold-during t u c)`: it holds at each moment from `t` until before `u`.
+    HoldDuring(Rational, Rational, C),
+    /// `(hold-after t c)`: it holds at `t` and at each moment later.
+    HoldAfter(Rational, C),
+}
+
+impl<C> Modal<C> {
+    /// As PDDL writes it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::AtEnd(_) => "at end",
+            Self::Always(_) => "always",
+            Self::Sometime(_) => "sometime",
+            Self::Within(..) => "within",
+            Self::AtMostOnce(_) => "at-most-once",
+            Self::SometimeAfter(..) => "sometime-after",
+            Self::SometimeBefore(..) => "sometime-before",
+            Self::AlwaysWithin(..) => "always-within",
+            Self::HoldDuring(..) => "hold-during",
+            Self::HoldAfter(..) => "hold-after",
+        }
+    }
+
+    /// The times between the name and the conditions, in the order in which they are written.
+    pub fn times(&self) -> Vec<&Rational> {
+        match self {
+            Self::Within(time, _) | Self::AlwaysWithin(time, ..) | Self::HoldAfter(time, _) => {
+                vec![time]
+            }
+            Self::HoldDuring(from, until, _) => vec![from, until],
+            _ => Vec::new(),
+        }
+    }
+
+    /// The conditions, in the order in which they are written.
+    pub fn conditions(&self) -> Vec<&C> {
+        match self {
+            Self::AtEnd(c)
+            | Self::Always(c)
+            | Self::Sometime(c)
+            | Self::Within(_, c)
+            | Self::AtMostOnce(c)
+            | Self::HoldDuring(_, _, c)
+            | Self::HoldAfter(_, c) => vec![c],
+            Self::SometimeAfter(c, d)
+            | Self::SometimeBefore(c, d)
+            | Self::AlwaysWithin(_, c, d) => vec![c, d],
+        }
+    }
+
+    /// The same constraint on other conditions.
+    pub fn map<D>(&self, mut other: impl FnMut(&C) -> D) -> Modal<D> {
+        match self {
+            Self::AtEnd(c) => Modal::AtEnd(other(c)),
+            Self::Always(c) => Modal::Always(other(c)),
+            Self::Sometime(c) => Modal::Sometime(other(c)),
+            Self::Within(time, c) => Modal::Within(time.clone(), other(c)),
+            Self::AtMostOnce(c) => Modal::AtMostOnce(other(c)),
+            Self::SometimeAfter(c, d) => Modal::SometimeAfter(other(c), other(d)),
+            Self::SometimeBefore(c, d) => Modal::SometimeBefore(other(c), other(d)),
+            Self::AlwaysWithin(time, c, d) => Modal::AlwaysWithin(time.clone(), other(c), other(d)),
+            Self::HoldDuring(from, until, c) => {
+                Modal::HoldDuring(from.clone(), until.clone(), other(c))
+            }
+            Self::HoldAfter(time, c) => Modal::HoldAfter(time.clone(), other(c)),
+        }
+    }
+}
+
+/// An entry of `:constraints`, or a preference of the goal, which is one at the end.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Constraint {
+    /// On the course of the plan.
+    Modal(Modal<Condition>),
+    /// All of them.
+    And(Vec<Constraint>),
+    /// For all objects of the variables' types.
+    Forall(Vec<Variable>, Box<Constraint>),
+    /// It need not be kept; each violated instance counts.
+    Preference(PreferenceId, Box<Constraint>),
+}
+
+/// A preference among an action's conditions: it counts each time that the action is done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActionPreference {
+    /// The action.
+    pub schema: SchemaId,
+    /// Which preference.
+    pub preference: PreferenceId,
+    /// Variables of the enclosing `forall`s, after the action's parameters: one instance for all
+    /// of their objects.
+    pub variables: Vec<Variable>,
+    /// Read on arrival at the start; of an instantaneous action, at its moment.
+    pub at_start: Condition,
+    /// Read at every moment of the open interval between start and end.
+    pub over_all: Condition,
+    /// Read on arrival at the end.
+    pub at_end: Condition,
+}
+
+/// The constraints of a task, without variables.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Constraints {
+    /// Every valid plan keeps them.
+    pub hard: Vec<Modal<crate::ground::Condition>>,
+    /// Those that need not be kept.
+    pub soft: Vec<SoftConstraint>,
+    /// Whether the states before the task's beginning count, and are not known.
+    pub(crate) is_past_lost: bool,
+}
+
+/// One instance of a preference among a task's constraints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SoftConstraint {
+    /// Which preference.
+    pub preference: PreferenceId,
+    /// It is violated, once, if any of these is.
+    pub all: Vec<Modal<crate::ground::Condition>>,
+}
+
+impl Constraints {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.hard.is_empty() && self.soft.is_empty()
+    }
+}

@@ -1,0 +1,263 @@
+//! One constraint on the course of a plan: when its conditions held, and whether that keeps it.
+
+use std::cmp::Ordering;
+
+use elbowroom_num::Rational;
+
+use super::violation::Reason;
+use crate::constraint::Modal;
+use crate::describe::decimal;
+use crate::ground::Condition;
+use crate::task::Task;
+
+/// How close the beginning of a phase is known that is irrational.
+const CLOSE: (i64, i64) = (1, 1_000_000);
+
+/// When a phase begins.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Beginning {
+    /// The time; if it is irrational, up to a millionth less.
+    pub(super) time: Rational,
+    /// Whether `time` is the time itself.
+    pub(super) is_exact: bool,
+    /// Whether the phase begins right after that moment, which does not belong to it.
+    pub(super) is_after: bool,
+}
+
+impl Beginning {
+    pub(super) fn at(time: &Rational) -> Self {
+        Self {
+            time: time.clone(),
+            is_exact: true,
+            is_after: false,
+        }
+    }
+
+    /// The latest that the time can be.
+    fn latest(&self) -> Rational {
+        if self.is_exact {
+            self.time.clone()
+        } else {
+            &self.time + Rational::new(CLOSE.0, CLOSE.1)
+        }
+    }
+
+    /// How the first moments of the phase compare to a time; `None` where that is not known.
+    fn order(&self, time: &Rational) -> Option<Ordering> {
+        if !self.is_exact {
+            // It lies strictly between the two.
+            return if *time <= self.time {
+                Some(Ordering::Greater)
+            } else if *time >= self.latest() {
+                Some(Ordering::Less)
+            } else {
+                None
+            };
+        }
+        match self.time.cmp(time) {
+            Ordering::Equal if self.is_after => Some(Ordering::Greater),
+            order => Some(order),
+        }
+    }
+}
+
+/// A time throughout which the conditions of a constraint do not change.
+#[derive(Clone, Debug)]
+pub(super) struct Phase {
+    from: Beginning,
+    /// The truth of the conditions; of the second, false if there is only one.
+    holds: [bool; 2],
+    /// Why the first condition is false, where that may be a violation.
+    reasons: Vec<Reason>,
+}
+
+/// The phases of one constraint.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Track(Vec<Phase>);
+
+/// Whether a constraint is kept.
+#[derive(Debug)]
+pub(super) enum Finding {
+    Kept,
+    /// From when on, why, and why the condition is false then.
+    Broken(Beginning, String, Vec<Reason>),
+    /// Two times are too close to each other to be told apart.
+    Unclear(Rational),
+}
+
+impl Track {
+    /// Notes what the conditions are from a moment on.
+    pub(super) fn push(
+        &mut self,
+        from: Beginning,
+        holds: [bool; 2],
+        explain: impl FnOnce() -> Vec<Reason>,
+    ) {
+        if self.0.last().is_some_and(|last| last.holds == holds) {
+            return;
+        }
+        let reasons = if holds[0] { Vec::new() } else { explain() };
+        self.0.push(Phase {
+            from,
+            holds,
+            reasons,
+        });
+    }
+
+    /// Whether the constraint is kept by a plan that is over at `end`.
+    pub(super) fn finding(&self, task: &Task, modal: &Modal<Condition>, end: &Rational) -> Finding {
+        let text = |condition| task.describe_condition(condition);
+        let broken = |phase: &Phase, why: String| {
+            Finding::Broken(phase.from.clone(), why, phase.reasons.clone())
+        };
+        let at =
+            |time: &Rational, why: String| Finding::Broken(Beginning::at(time), why, Vec::new());
+        match modal {
+            Modal::AtEnd(c) => match self.0.last() {
+                Some(last) if !last.holds[0] => Finding::Broken(
+                    Beginning::at(end),
+                    format!("{} does not hold in the end", text(c)),
+                    last.reasons.clone(),
+                ),
+                _ => Finding::Kept,
+            },
+            Modal::Always(c) => match self.0.iter().find(|phase| !phase.holds[0]) {
+                Some(phase) => broken(phase, format!("{} does not hold", text(c))),
+                None => Finding::Kept,
+            },
+            Modal::Sometime(c) if self.0.iter().any(|phase| phase.holds[0]) => {
+                let _ = c;
+                Finding::Kept
+            }
+            Modal::Sometime(c) => at(end, format!("{} never holds", text(c))),
+            Modal::Within(time, c) => self.within(time).unwrap_or_else(|| {
+                let by = decimal(time);
+                at(time, format!("{} does not hold until {by}", text(c)))
+            }),
+            Modal::AtMostOnce(c) => match self.0.iter().filter(|p| p.holds[0]).nth(1) {
+                Some(phase) => broken(phase, format!("{} holds again", text(c))),
+                None => Finding::Kept,
+            },
+            Modal::SometimeAfter(c, d) => {
+                let Some(position) = self.0.iter().rposition(|phase| phase.holds[0]) else {
+                    return Finding::Kept;
+                };
+                if self.0[position..].iter().any(|phase| phase.holds[1]) {
+                    return Finding::Kept;
+                }
+                let why = format!("{} holds, and {} does not then or later", text(c), text(d));
+                broken(&self.0[position], why)
+            }
+            Modal::SometimeBefore(c, d) => {
+                let Some(position) = self.0.iter().position(|phase| phase.holds[0]) else {
+                    return Finding::Kept;
+                };
+                let phase = &self.0[position];
+                // A phase without a first moment has an earlier one before each of its moments.
+                let is_before = phase.from.is_after && phase.holds[1];
+                if is_before || self.0[..position].iter().any(|phase| phase.holds[1]) {
+                    return Finding::Kept;
+                }
+                let why = format!("{} holds, and {} never did before", text(c), text(d));
+                broken(phase, why)
+            }
+            Modal::AlwaysWithin(time, c, d) => {
+                let why = || {
+                    let (c, d, time) = (text(c), text(d), decimal(time));
+                    format!("{c} holds, and {d} does not within {time}")
+                };
+                self.always_within(time, &why)
+            }
+            Modal::HoldDuring(from, until, c) => {
+                self.throughout(from, Some(until), &format!("{} does not hold", text(c)))
+            }
+            Modal::HoldAfter(from, c) => {
+                self.throughout(from, None, &format!("{} does not hold", text(c)))
+            }
+        }
+    }
+
+    /// Whether the first condition holds at a moment no later than `time`; `None`: it does not.
+    fn within(&self, time: &Rational) -> Option<Finding> {
+        // The first phase in which it holds is the earliest.
+        let phase = self.0.iter().find(|phase| phase.holds[0])?;
+        match phase.from.order(time) {
+            Some(Ordering::Greater) => None,
+            Some(_) => Some(Finding::Kept),
+            None => Some(Finding::Unclear(time.clone())),
+        }
+    }
+
+    fn always_within(&self, time: &Rational, why: &dyn Fn() -> String) -> Finding {
+        let mut unclear = None;
+        for (position, phase) in self.0.iter().enumerate() {
+            // The first moment of a phase waits longest.
+            if !phase.holds[0] || phase.holds[1] {
+                continue;
+            }
+            let answered = self.0[position..].iter().find(|phase| phase.holds[1]);
+            let is_kept = answered.map_or(Some(false), |later| {
+                let (from, to) = (&phase.from, &later.from);
+                if from.is_exact && to.is_exact {
+                    // Without a first moment, the answer comes later than any wait that begins
+                    // with one.
+                    let is_later = to.is_after && !from.is_after;
+                    return Some(match (&to.time - &from.time).cmp(time) {
+                        Ordering::Less => true,
+                        Ordering::Equal => !is_later,
+                        Ordering::Greater => false,
+                    });
+                }
+                let (least, most) = (&to.time - from.latest(), to.latest() - &from.time);
+                if most <= *time {
+                    Some(true)
+                } else if least >= *time {
+                    Some(false)
+                } else {
+                    None
+                }
+            });
+            match is_kept {
+                Some(true) => {}
+                Some(false) => {
+                    return Finding::Broken(phase.from.clone(), why(), Vec::new());
+                }
+                None => unclear = Some(phase.from.time.clone()),
+            }
+        }
+        unclear.map_or(Finding::Kept, Finding::Unclear)
+    }
+
+    /// Whether the first condition holds at each moment from `from` until before `until`.
+    fn throughout(&self, from: &Rational, until: Option<&Rational>, why: &str) -> Finding {
+        if until.is_some_and(|until| until <= from) {
+            return Finding::Kept;
+        }
+        let mut unclear = None;
+        for (position, phase) in self.0.iter().enumerate() {
+            if phase.holds[0] {
+                continue;
+            }
+            let begins_before = until.map_or(Some(true), |until| {
+                Some(phase.from.order(until)? == Ordering::Less)
+            });
+            let ends_after = self.0.get(position + 1).map_or(Some(true), |next| {
+                Some(next.from.order(from)? == Ordering::Greater)
+            });
+            match (begins_before, ends_after) {
+                (Some(true), Some(true)) => {
+                    let is_under_way = phase.from.order(from) != Some(Ordering::Greater);
+                    let begins = if is_under_way {
+                        Beginning::at(from)
+                    } else {
+                        phase.from.clone()
+                    };
+                    return Finding::Broken(begins, why.to_owned(), phase.reasons.clone());
+                }
+                (Some(false), _) | (_, Some(false)) => {}
+                _ => unclear = Some(phase.from.time.clone()),
+            }
+        }
+        unclear.map_or(Finding::Kept, Finding::Unclear)
+    }
+}

@@ -1,0 +1,226 @@
+//! Constraints on the course of a plan: which of them it keeps.
+//!
+//! For each constraint the judge notes what its conditions are at the beginning, after each
+//! happening group, and, while numbers move, in each cell between two cuts (see
+//! [`piece`](super::piece)). Only changes are kept: a [`Phase`] begins where a condition's truth
+//! changes and goes on until the next one, the last one for ever. That loses nothing: each
+//! constraint is decided by the first moments of phases.
+
+use elbowroom_num::Rational;
+
+use super::judge::Judge;
+use super::piece::Piece;
+use super::reading::Fault;
+use super::stop::{Place, Stop};
+use super::track::{Beginning, Finding, Track};
+use super::violation::{Difficulty, Mistake, Undecided, When};
+use crate::constraint::{Constraints, Modal};
+use crate::ground::Condition;
+
+/// The phases of all constraints of a task.
+#[derive(Debug)]
+pub(super) struct Course<'a> {
+    constraints: &'a Constraints,
+    hard: Vec<Track>,
+    soft: Vec<Vec<Track>>,
+}
+
+impl<'a> Course<'a> {
+    pub(super) fn new(constraints: &'a Constraints) -> Self {
+        let tracks = |count| vec![Track::default(); count];
+        Self {
+            constraints,
+            hard: tracks(constraints.hard.len()),
+            soft: constraints
+                .soft
+                .iter()
+                .map(|soft| tracks(soft.all.len()))
+                .collect(),
+        }
+    }
+
+    /// Calls `visit` for each constraint with its track, and whether it is hard.
+    fn visit(
+        &mut self,
+        mut visit: impl FnMut(&'a Modal<Condition>, &mut Track, bool) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        for (modal, track) in self.constraints.hard.iter().zip(&mut self.hard) {
+            visit(modal, track, true)?;
+        }
+        for (soft, tracks) in self.constraints.soft.iter().zip(&mut self.soft) {
+            for (modal, track) in soft.all.iter().zip(tracks) {
+                visit(modal, track, false)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes the present state, which begins at `time`.
+    pub(super) fn note(&mut self, judge: &Judge<'_>, time: &Rational) -> Result<(), Stop> {
+        self.visit(|modal, track, is_hard| {
+            let mut holds = [false; 2];
+            for (condition, holds) in modal.conditions().into_iter().zip(&mut holds) {
+                *holds = truth(
+                    judge,
+                    judge.reads(condition, None),
+                    condition,
+                    time,
+                    is_hard,
+                )?;
+            }
+            let now = &judge.now;
+            let explain = || match modal.conditions().first() {
+                Some(condition) if is_hard && explains(modal) => {
+                    judge.explain(condition, now, None)
+                }
+                _ => Vec::new(),
+            };
+            track.push(Beginning::at(time), holds, explain);
+            Ok(())
+        })
+    }
+
+    /// Notes what changes while numbers move, from the group at `from` on.
+    pub(super) fn note_motion(
+        &mut self,
+        judge: &Judge<'_>,
+        piece: &Piece<'_>,
+        from: &Rational,
+    ) -> Result<(), Stop> {
+        self.visit(|modal, track, is_hard| {
+            let conditions = modal.conditions();
+            let place = Place::condition(from, None, When::Course, conditions[0]);
+            let cells = match piece.course(&conditions) {
+                Ok(cells) => cells,
+                Err(fault @ (Fault::Undefined(_) | Fault::DivisionByZero(_))) if !is_hard => {
+                    let _ = fault;
+                    return Ok(());
+                }
+                Err(fault) => return Err(judge.stop(fault, &place)),
+            };
+            for cell in cells {
+                let mut holds = [false; 2];
+                for (known, holds) in cell.holds.iter().zip(&mut holds) {
+                    *holds = *known;
+                }
+                let beginning = Beginning {
+                    time: from + cell.at,
+                    is_exact: cell.is_exact,
+                    is_after: cell.is_open,
+                };
+                track.push(beginning, holds, Vec::new);
+            }
+            Ok(())
+        })
+    }
+
+    /// The first violation of a hard constraint, when the plan is over at `end`.
+    pub(super) fn violation(&self, judge: &Judge<'_>, end: &Rational) -> Result<(), Stop> {
+        if self.constraints.is_past_lost && !self.constraints.hard.is_empty() {
+            return Err(undecided(None, Difficulty::Past));
+        }
+        let mut first: Option<(Beginning, Mistake)> = None;
+        let mut unclear = None;
+        for (modal, track) in self.constraints.hard.iter().zip(&self.hard) {
+            match track.finding(judge.task, modal, end) {
+                Finding::Kept => {}
+                Finding::Unclear(time) => {
+                    unclear.get_or_insert_with(|| (time, judge.task.describe_modal(modal)));
+                }
+                Finding::Broken(at, why, reasons) => {
+                    let key = |at: &Beginning| (at.time.clone(), at.is_after);
+                    if first
+                        .as_ref()
+                        .is_some_and(|(earlier, _)| key(earlier) <= key(&at))
+                    {
+                        continue;
+                    }
+                    let mistake = Mistake::Constraint {
+                        constraint: judge.task.describe_modal(modal),
+                        why,
+                        is_after: at.is_after,
+                        is_exact: at.is_exact,
+                        reasons,
+                    };
+                    first = Some((at, mistake));
+                }
+            }
+        }
+        match (first, unclear) {
+            (Some((at, mistake)), _) => Err(judge.violation(&at.time, None, mistake)),
+            (None, Some((time, constraint))) => {
+                Err(undecided(Some(time), Difficulty::CloseTimes { constraint }))
+            }
+            (None, None) => Ok(()),
+        }
+    }
+
+    /// For each soft constraint, whether it is violated, and by what: `Err` where that is not
+    /// known.
+    pub(super) fn soft(
+        &self,
+        judge: &Judge<'_>,
+        end: &Rational,
+    ) -> Vec<Result<Option<(Rational, String)>, Undecided>> {
+        let constraints = self.constraints.soft.iter().zip(&self.soft);
+        constraints
+            .map(|(soft, tracks)| {
+                if self.constraints.is_past_lost {
+                    return Err(Undecided {
+                        time: None,
+                        difficulty: Difficulty::Past,
+                    });
+                }
+                let mut unclear = None;
+                for (modal, track) in soft.all.iter().zip(tracks) {
+                    let constraint = || judge.task.describe_modal(modal);
+                    match track.finding(judge.task, modal, end) {
+                        Finding::Kept => {}
+                        Finding::Broken(at, why, _) => {
+                            return Ok(Some((at.time, format!("{}: {why}", constraint()))));
+                        }
+                        Finding::Unclear(time) => {
+                            unclear = Some(Undecided {
+                                time: Some(time),
+                                difficulty: Difficulty::CloseTimes {
+                                    constraint: constraint(),
+                                },
+                            });
+                        }
+                    }
+                }
+                unclear.map_or(Ok(None), Err)
+            })
+            .collect()
+    }
+}
+
+fn undecided(time: Option<Rational>, difficulty: Difficulty) -> Stop {
+    Stop::Undecided(Box::new(Undecided { time, difficulty }))
+}
+
+/// What was read; a soft condition that says nothing does not hold.
+fn truth(
+    judge: &Judge<'_>,
+    read: Result<bool, Fault>,
+    condition: &Condition,
+    time: &Rational,
+    is_hard: bool,
+) -> Result<bool, Stop> {
+    match read {
+        Err(Fault::Undefined(_) | Fault::DivisionByZero(_)) if !is_hard => Ok(false),
+        Err(fault) => Err(judge.stop(
+            fault,
+            &Place::condition(time, None, When::Course, condition),
+        )),
+        Ok(truth) => Ok(truth),
+    }
+}
+
+/// Whether the falsehood of its condition is what violates a constraint.
+fn explains(modal: &Modal<Condition>) -> bool {
+    matches!(
+        modal,
+        Modal::Always(_) | Modal::HoldDuring(..) | Modal::HoldAfter(..) | Modal::AtEnd(_)
+    )
+}
