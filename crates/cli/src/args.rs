@@ -9,6 +9,7 @@ mod number;
 mod odds;
 mod plan;
 mod run;
+mod serve;
 mod world_check;
 
 use std::ffi::OsString;
@@ -27,6 +28,7 @@ use number::{positive, positive_or_zero};
 pub(crate) use odds::OddsArgs;
 pub(crate) use plan::{EMBEDDED, PlanArgs};
 pub(crate) use run::{RunArgs, RunningChoice};
+pub(crate) use serve::{CtlArgs, CtlCommand, ServeArgs};
 pub(crate) use world_check::WorldCheckArgs;
 
 /// How much elbow room does a temporal plan have?
@@ -100,6 +102,10 @@ pub(crate) enum Command {
     Envelope(Box<EnvelopeArgs>),
     /// Execute a plan, monitor it, and replan when it no longer works
     Run(Box<RunArgs>),
+    /// Run an executive that takes goals, facts and questions while it executes
+    Serve(Box<ServeArgs>),
+    /// Ask an executive something, or have it do something else
+    Ctl(CtlArgs),
     /// Play through the protocol with a program that is a world, and say what it does wrong
     WorldCheck(WorldCheckArgs),
     /// Compare executors over many simulated runs
@@ -133,6 +139,8 @@ impl Command {
             Self::Stn(arguments) => arguments.json,
             Self::Envelope(arguments) => arguments.json,
             Self::Run(arguments) => arguments.json,
+            Self::Serve(arguments) => arguments.run.json,
+            Self::Ctl(arguments) => arguments.json,
             Self::WorldCheck(arguments) => arguments.json,
             Self::Compare(arguments) => arguments.json,
             Self::Learn(arguments) => arguments.json,

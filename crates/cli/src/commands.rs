@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 pub(crate) mod compare;
+pub(crate) mod ctl;
 pub(crate) mod envelope;
 pub(crate) mod export;
 pub(crate) mod learn;
@@ -10,6 +11,7 @@ pub(crate) mod odds;
 pub(crate) mod plan;
 pub(crate) mod report;
 pub(crate) mod run;
+pub(crate) mod serve;
 pub(crate) mod shell;
 pub(crate) mod stn;
 pub(crate) mod val;

@@ -5,11 +5,13 @@
 //! compute is computed in the library.
 
 mod args;
+mod attendance;
 mod bug;
 mod clock;
 mod commands;
 mod conversation;
 mod exit;
+mod http;
 mod input;
 mod interrupt;
 mod journal;
@@ -58,6 +60,8 @@ pub fn run(line: Vec<OsString>) -> u8 {
         Command::Report(arguments) => commands::report::run(&arguments),
         Command::Completions(arguments) => commands::shell::completions(&arguments),
         Command::Man(arguments) => commands::shell::man(&arguments),
+        Command::Serve(arguments) => commands::serve::run(&arguments, &mut output),
+        Command::Ctl(arguments) => commands::ctl::run(&arguments, &mut output),
         Command::Run(arguments) => commands::run::run(&arguments, &mut output),
     };
     let exit = answer.unwrap_or_else(|failure| {

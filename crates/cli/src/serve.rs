@@ -50,6 +50,8 @@ struct Shared {
 #[derive(Default)]
 struct State {
     trace: String,
+    /// Where each line ends.
+    ends: Vec<usize>,
     lines: usize,
     is_over: bool,
     /// Clients that wait for news.
@@ -61,6 +63,8 @@ impl Board {
     pub(crate) fn add(&self, line: &str) {
         let mut state = self.lock();
         state.trace.push_str(line);
+        let end = state.trace.len();
+        state.ends.push(end);
         state.lines += 1;
         drop(state);
         self.0.changed.notify_all();
@@ -93,7 +97,7 @@ impl Board {
     }
 
     /// What the page shows now, as JSON; made once for all clients.
-    fn document(&self) -> Result<Arc<str>, String> {
+    pub(crate) fn document(&self) -> Result<Arc<str>, String> {
         let cached = self.0.document.lock();
         let mut cached = cached.unwrap_or_else(PoisonError::into_inner);
         let (lines, trace) = {
@@ -111,6 +115,91 @@ impl Board {
         let text: Arc<str> = text.into();
         *cached = Some((lines, Arc::clone(&text)));
         Ok(text)
+    }
+}
+
+impl Board {
+    /// The page as it is now.
+    pub(crate) fn page(&self) -> Result<String, String> {
+        elbowroom_page::live_page(NAME, &self.trace()).map_err(|error| error.to_string())
+    }
+
+    /// Tells a client of every change, until the run is over or the client has gone.
+    pub(crate) fn tell_changes(&self, client: &mut dyn Write) -> io::Result<()> {
+        self.listened(|| self.tell_all_changes(client))
+    }
+
+    /// Tells a client every line of the trace behind line `after`, or from now on, until the run is
+    /// over or the client has gone.
+    pub(crate) fn tell_lines(
+        &self,
+        after: Option<usize>,
+        client: &mut dyn Write,
+    ) -> io::Result<()> {
+        self.listened(|| self.tell_all_lines(after, client))
+    }
+
+    fn listened(&self, tell: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        self.lock().listeners += 1;
+        let told = tell();
+        self.lock().listeners -= 1;
+        self.0.changed.notify_all();
+        told
+    }
+
+    /// Waits until there are more than `told` lines, or none will come, or for a while.
+    fn await_lines(&self, told: usize) -> MutexGuard<'_, State> {
+        let state = self.lock();
+        let waits = |state: &mut State| state.lines <= told && !state.is_over;
+        let changed = &self.0.changed;
+        let waited = changed.wait_timeout_while(state, SIGN_OF_LIFE, waits);
+        waited.unwrap_or_else(PoisonError::into_inner).0
+    }
+
+    fn tell_all_changes(&self, client: &mut dyn Write) -> io::Result<()> {
+        let mut told = 0;
+        loop {
+            let (lines, is_over) = {
+                let state = self.await_lines(told);
+                (state.lines, state.is_over)
+            };
+            if is_over {
+                let document = self.document().map_err(io::Error::other)?;
+                write!(client, "event: over\ndata: {document}\n\n")?;
+                return client.flush();
+            }
+            if lines == told {
+                client.write_all(b": nothing new\n\n")?;
+            } else {
+                told = lines;
+                write!(client, "event: change\ndata: {lines}\n\n")?;
+            }
+            client.flush()?;
+        }
+    }
+
+    fn tell_all_lines(&self, after: Option<usize>, client: &mut dyn Write) -> io::Result<()> {
+        let mut told = after.unwrap_or_else(|| self.lock().lines);
+        loop {
+            let (news, is_over) = {
+                let state = self.await_lines(told);
+                told = told.min(state.lines);
+                let from = told.checked_sub(1).map_or(0, |last| state.ends[last]);
+                (state.trace[from..].to_owned(), state.is_over)
+            };
+            for line in news.lines() {
+                told += 1;
+                write!(client, "id: {told}\nevent: entry\ndata: {line}\n\n")?;
+            }
+            if is_over {
+                client.write_all(b"event: over\ndata: {}\n\n")?;
+                return client.flush();
+            }
+            if news.is_empty() {
+                client.write_all(b": nothing new\n\n")?;
+            }
+            client.flush()?;
+        }
     }
 }
 
@@ -146,23 +235,46 @@ impl Control {
         Ok(Self { token, interrupt })
     }
 
-    /// Compares all bytes, so that the time it takes does not tell how many are right.
     fn allows(&self, request: &Request) -> bool {
-        let expected = format!("Bearer {}", self.token);
         let headers = request.headers().iter();
         let mut given = headers.filter(|header| header.field.equiv("Authorization"));
-        given.next().is_some_and(|header| {
-            let given = header.value.as_str().as_bytes();
-            let pairs = given.iter().zip(expected.as_bytes());
-            let differences = pairs.fold(0, |differences, (a, b)| differences | (a ^ b));
-            given.len() == expected.len() && differences == 0
-        })
+        given
+            .next()
+            .is_some_and(|header| self.is_known_to(header.value.as_str()))
     }
+
+    /// Whether this is the header of somebody who knows the token. Compares all bytes, so that the
+    /// time it takes does not tell how many are right.
+    pub(crate) fn is_known_to(&self, authorization: &str) -> bool {
+        let expected = format!("Bearer {}", self.token);
+        let given = authorization.as_bytes();
+        let pairs = given.iter().zip(expected.as_bytes());
+        let differences = pairs.fold(0, |differences, (a, b)| differences | (a ^ b));
+        given.len() == expected.len() && differences == 0
+    }
+
+    /// The token itself, for those who ask in its name.
+    pub(crate) fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// Has the run end in order.
+    pub(crate) fn stop(&self) {
+        self.interrupt.request();
+    }
+}
+
+/// Whether a client asks for a server of this machine by one of its names: a page of somebody
+/// else's, whose name leads here, may not read what is local.
+pub(crate) fn is_local_name(host: &str) -> bool {
+    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+    let ip = name.trim_matches(['[', ']']).parse::<IpAddr>();
+    name.eq_ignore_ascii_case("localhost") || ip.is_ok_and(|ip| ip.is_loopback())
 }
 
 /// An address that the page is served at.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Address(SocketAddr);
+pub(crate) struct Address(pub(crate) SocketAddr);
 
 impl Address {
     /// Reads `PORT`, `HOST:PORT` or `HOST`; without a host, the page is for this machine only.
@@ -246,7 +358,7 @@ impl Doorman {
         }
         let path = request.url().split(['?', '#']).next().unwrap_or_default();
         match (request.method(), path) {
-            (Method::Get, "/") => match self.page() {
+            (Method::Get, "/") => match self.board.page() {
                 Ok(page) => request.respond(typed(200, page, "text/html; charset=utf-8")),
                 Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
             },
@@ -266,24 +378,16 @@ impl Doorman {
         }
     }
 
-    /// Whether the client wants this server: a page of somebody else's, whose name leads here, may
-    /// not read what is local.
+    /// Whether the client wants this server.
     fn is_asked_for(&self, request: &Request) -> bool {
         if !self.own.ip().is_loopback() {
             return true;
         }
         let headers = request.headers().iter();
         let mut hosts = headers.filter(|header| header.field.equiv("Host"));
-        hosts.next().is_some_and(|header| {
-            let host = header.value.as_str();
-            let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-            let ip = name.trim_matches(['[', ']']).parse::<IpAddr>();
-            name.eq_ignore_ascii_case("localhost") || ip.is_ok_and(|ip| ip.is_loopback())
-        })
-    }
-
-    fn page(&self) -> Result<String, elbowroom_page::PageError> {
-        elbowroom_page::live_page(NAME, &self.board.trace())
+        hosts
+            .next()
+            .is_some_and(|header| is_local_name(header.value.as_str()))
     }
 
     fn stop(&self, request: &Request) -> Response<io::Cursor<Vec<u8>>> {
@@ -300,47 +404,13 @@ impl Doorman {
         }
     }
 
-    /// Tells a client of every change, until the run is over or the client has gone.
     fn tell(&self, mut client: Box<dyn Write + Send>) -> io::Result<()> {
-        self.board.lock().listeners += 1;
-        let told = self.tell_all(client.as_mut());
-        self.board.lock().listeners -= 1;
-        self.board.0.changed.notify_all();
-        told
-    }
-
-    fn tell_all(&self, client: &mut dyn Write) -> io::Result<()> {
         client.write_all(
             b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
               X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
         )?;
         client.flush()?;
-        let mut told = 0;
-        loop {
-            let (lines, is_over) = {
-                let state = self.board.lock();
-                let waits = |state: &mut State| state.lines == told && !state.is_over;
-                let waited = self
-                    .board
-                    .0
-                    .changed
-                    .wait_timeout_while(state, SIGN_OF_LIFE, waits);
-                let state = waited.unwrap_or_else(PoisonError::into_inner).0;
-                (state.lines, state.is_over)
-            };
-            if is_over {
-                let document = self.board.document().map_err(io::Error::other)?;
-                write!(client, "event: over\ndata: {document}\n\n")?;
-                return client.flush();
-            }
-            if lines == told {
-                client.write_all(b": nothing new\n\n")?;
-            } else {
-                told = lines;
-                write!(client, "event: change\ndata: {lines}\n\n")?;
-            }
-            client.flush()?;
-        }
+        self.board.tell_changes(client.as_mut())
     }
 }
 

@@ -161,6 +161,7 @@
 pub mod answers;
 mod box_text;
 pub mod execute;
+pub mod executive;
 mod explain;
 pub mod export;
 pub mod flow;

@@ -89,6 +89,8 @@ pub enum Event {
         /// Its value.
         value: Rational,
     },
+    /// People, or other programs, ask something of the run ([`Request`]).
+    Asked(Request),
     /// The world has said something that cannot be understood.
     Unintelligible {
         /// The message, or its beginning.
@@ -96,6 +98,28 @@ pub enum Event {
         /// The mistake in it.
         why: String,
     },
+}
+
+/// What is asked of a run that goes on when its goal is reached
+/// ([`Run::lasting`](crate::run::Run::lasting)); to others nothing of it means anything.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// To reach this goal, too, or in place of that of the same name.
+    Pursue {
+        /// By which it is named from then on.
+        name: String,
+        /// The goal, as the domain's language writes it.
+        goal: String,
+    },
+    /// To reach the goal of that name no more.
+    Abandon {
+        /// Its name.
+        name: String,
+    },
+    /// To start nothing more; what is under way goes on.
+    Pause,
+    /// To go on after a pause.
+    Resume,
 }
 
 /// The outcome of an action.

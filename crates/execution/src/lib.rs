@@ -43,7 +43,7 @@ mod record;
 pub mod run;
 mod world;
 
-pub use event::{Command, Ending, Event, Measured, Observation, Ticket};
+pub use event::{Command, Ending, Event, Measured, Observation, Request, Ticket};
 pub use executor::{Decided, Decision, Executor, Mission, Moment, News, Order, Planned, StepId};
 pub use forms::Forms;
 pub use odds::{Compared, Odds, Remainder};

@@ -111,6 +111,11 @@ impl Progression {
         &self.task
     }
 
+    /// The same state, of a task that differs in its goal alone.
+    pub(crate) fn pursue(&mut self, task: &Arc<Task>) {
+        self.task = Arc::clone(task);
+    }
+
     /// The moment.
     pub fn time(&self) -> &Rational {
         &self.time

@@ -101,6 +101,8 @@ pub enum Cause {
     GoalReached,
     /// A plan has been made.
     NewPlan,
+    /// The goals were changed from outside.
+    Asked,
     /// Part of the goal can never become true again.
     NeverAgain,
     /// Each part of the goal could still become true, but not all of them.
@@ -127,6 +129,7 @@ impl Cause {
         (Self::PlanDone, "plan-done"),
         (Self::GoalReached, "goal-reached"),
         (Self::NewPlan, "new-plan"),
+        (Self::Asked, "asked"),
         (Self::NeverAgain, "never-again"),
         (Self::NotTogether, "not-together"),
     ];
@@ -239,6 +242,7 @@ impl Reason {
             Cause::PlanDone => format!("the plan is done, but the goal is not reached: {about}"),
             Cause::GoalReached => "the goal is reached".to_owned(),
             Cause::NewPlan => "there is a new plan".to_owned(),
+            Cause::Asked => format!("the goals have changed: {about}"),
             Cause::NeverAgain => match self.since {
                 Some(_) => format!("{about} can never become true again"),
                 None => format!("{about} could never become true"),

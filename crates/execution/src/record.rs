@@ -6,7 +6,7 @@ use elbowroom_num::Rational;
 use crate::event::{Command, Observation};
 use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
-use crate::run::Report;
+use crate::run::{Report, Verdict};
 
 /// Takes the record of a run as it comes about.
 pub trait Recorder: Send {
@@ -98,6 +98,25 @@ pub enum Entry<'a> {
         why_not: Option<&'a str>,
         /// Whether it is certain that there is none.
         is_unsolvable: bool,
+    },
+    /// The goals have changed, and the rest of the running plan reaches these, too: it is gone on
+    /// with, and taken up anew.
+    Kept {
+        /// The time.
+        now: &'a Rational,
+        /// How the goals have changed.
+        reason: &'a Reason,
+    },
+    /// A lasting run has nothing to do, or cannot do it, and waits for a change.
+    Resting {
+        /// The time.
+        now: &'a Rational,
+        /// What came of the goals; `None` if there were none.
+        verdict: Option<&'a Verdict>,
+        /// The goals by name: those that were reached, or else those that are open.
+        goals: &'a [String],
+        /// What can never become true again, as in [`Report::dead_end`].
+        dead_end: &'a [Reason],
     },
     /// Somebody asked the run to end.
     Interrupted {

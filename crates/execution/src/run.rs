@@ -23,6 +23,9 @@
 //! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
 //!
+//! A run may also outlast its goal ([`Run::lasting`]): goals are given and abandoned while it goes
+//! on, and it can be paused.
+//!
 //! However a run ends, nothing is left running: what has not ended is cancelled, and has
 //! [`FAREWELL`] to stop. Only a world that has failed is told nothing more.
 //!
@@ -37,6 +40,7 @@ mod drive;
 mod farewell;
 mod handover;
 mod intake;
+mod lasting;
 mod progress;
 mod settings;
 
@@ -48,6 +52,7 @@ use elbowroom_num::Rational;
 pub use account::{Account, ExecutedStep};
 pub use drive::{Next, NotAsked};
 pub use farewell::FAREWELL;
+pub use lasting::{FIRST_GOAL, GoalReader};
 pub use settings::{
     Patience, PlanningTime, Report, RunSettings, RunningRule, UnknownSetting, Verdict,
 };
@@ -62,6 +67,7 @@ use crate::record::{Entry, Recorder};
 use crate::world::{World, WorldError};
 use agenda::Todo;
 use dead_end::Happened;
+use lasting::Lasting;
 use farewell::Closing;
 use progress::Progress;
 
@@ -99,6 +105,12 @@ pub struct Run<'a> {
     /// Asked whether to end.
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
+    /// What was believed before the first event of the history.
+    beginning: Progression,
+    /// Told what is believed, whenever something was taken in.
+    listener: Box<dyn FnMut(&Progression) + Send + 'a>,
+    /// What a run needs that goes on when its goal is reached.
+    lasting: Option<Lasting<'a>>,
     /// The tasks before the executor is asked again; the next one is last.
     agenda: Vec<Todo>,
     /// The question that the world has not answered.
@@ -141,8 +153,12 @@ impl<'a> Run<'a> {
             PlanningTime::Seconds(seconds) => seconds.clone(),
             PlanningTime::Measured => Rational::ZERO,
         };
+        let belief = Progression::new(Arc::clone(&task));
         Self {
-            belief: Progression::new(Arc::clone(&task)),
+            beginning: belief.clone(),
+            listener: Box::new(|_| {}),
+            lasting: None,
+            belief,
             account: Account::default(),
             steps: 0,
             task,
@@ -182,6 +198,15 @@ impl<'a> Run<'a> {
         self
     }
 
+    /// The same run, which tells `listener` what it believes, at its beginning and whenever it has
+    /// taken in what the world reported. Decisions wait for that.
+    #[must_use]
+    pub fn told_to(mut self, mut listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+        listener(&self.belief);
+        self.listener = Box::new(listener);
+        self
+    }
+
     fn decide(&mut self) -> Decided {
         let news = std::mem::take(&mut self.news);
         let decided = self.ports.executor.decide(&Moment {
@@ -199,6 +224,9 @@ impl<'a> Run<'a> {
     /// One decision; what follows from it goes onto the agenda.
     fn decide_and_follow(&mut self) -> Result<(), Stop> {
         self.heed()?;
+        if self.attend()? {
+            return Ok(());
+        }
         let decided = self.decide();
         match decided.decision {
             Decision::Start(orders) => {
@@ -327,20 +355,26 @@ impl<'a> Run<'a> {
         situation: &Situation,
         running: &[Ticket],
     ) -> Result<(), Stop> {
-        let prepared = self.prepare(plan, situation, running);
-        let mission = match prepared {
-            Ok(mission) => mission,
+        match self.prepare(plan, situation, running) {
+            Ok(mission) => {
+                self.note_plan(plan);
+                self.begin_mission(&mission)
+            }
             Err(error) => {
                 let why = error.to_string();
-                return Err(Stop::Over(Verdict::NoPlan { why }));
+                Err(Stop::Over(Verdict::NoPlan { why }))
             }
-        };
+        }
+    }
+
+    /// Begins with a plan that is ready.
+    fn begin_mission(&mut self, mission: &Mission) -> Result<(), Stop> {
         self.account.begin_plan(&mission.running);
         self.steps = mission.time_triggered.steps.len();
         self.progress.begin_plan();
         self.news.clear();
-        self.ports.recorder.record(&Entry::Mission(&mission));
-        if let Err(reason) = self.ports.executor.adopt(&mission) {
+        self.ports.recorder.record(&Entry::Mission(mission));
+        if let Err(reason) = self.ports.executor.adopt(mission) {
             return self.replan(&reason);
         }
         // What has ended while the plan was made, the plan still waits for.

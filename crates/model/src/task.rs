@@ -9,7 +9,7 @@ use crate::derivation::{Derivation, Rules};
 use crate::domains::Domains;
 use crate::ground::{Condition, FactId, FluentId};
 use crate::grounder::Grounder;
-use crate::problem::{FunctionId, ObjectId, PredicateId, Problem, SchemaId};
+use crate::problem::{self, FunctionId, ObjectId, PredicateId, Problem, SchemaId};
 use crate::state::{State, TimedHappening};
 use crate::table::Table;
 
@@ -119,6 +119,17 @@ impl Task {
     /// themselves, or refuse.
     pub fn only_judged(&self) -> Option<&'static str> {
         (!self.constraints.hard.is_empty()).then_some("trajectory constraints (`:constraints`)")
+    }
+
+    /// The same task with another goal. Facts and fluents keep their numbers.
+    #[must_use]
+    pub fn with_goal(&self, goal: problem::Condition) -> Self {
+        let mut task = self.clone();
+        task.goal = self.grounding(|grounder| grounder.ground_condition(&goal, &mut Vec::new()));
+        let mut problem = (*self.problem).clone();
+        problem.goal = goal;
+        task.problem = Arc::new(problem);
+        task
     }
 
     /// The same task with a table of its own, in which what is mentioned from now on gets numbers

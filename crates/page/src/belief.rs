@@ -133,6 +133,10 @@ impl<'t> Belief<'t> {
             }
             ObservationLine::Started { .. }
             | ObservationLine::Feedback { .. }
+            | ObservationLine::Goal { .. }
+            | ObservationLine::Abandon { .. }
+            | ObservationLine::Pause { .. }
+            | ObservationLine::Resume { .. }
             | ObservationLine::Unintelligible { .. } => {}
         }
         self.note(texts);

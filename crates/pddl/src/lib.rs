@@ -52,6 +52,6 @@ mod syntax;
 
 pub use elbowroom_text::{Diagnostic, Diagnostics, Label, Severity, Source};
 pub use feature::{Feature, is_unsupported};
-pub use lower::read_problem;
+pub use lower::{read_goal, read_problem};
 pub use plan_text::{LineKind, read_plan, write_plan};
 pub use problem_text::{ProblemText, WriteProblemError, end_times, write_problem};

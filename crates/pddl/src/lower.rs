@@ -24,9 +24,10 @@ mod timed;
 mod typed_list;
 
 use elbowroom_model::Problem;
-use elbowroom_model::problem::TypeId;
+use elbowroom_model::problem::{Condition, TypeId};
 
 use crate::lower::names::Names;
+use crate::lower::scope::Scope;
 use crate::lower::sections::Sections;
 use crate::lower::typed_list::TypeNames;
 use crate::report::Report;
@@ -59,6 +60,57 @@ pub fn read_problem(
         }
     }
     reader.finish()
+}
+
+/// Reads a goal for a problem that is known already: one condition, as it stands behind `:goal`.
+///
+/// Returns the condition with the warnings, if any.
+///
+/// # Errors
+/// When the text is no condition on what the problem has. All mistakes that were found are in the
+/// diagnostics.
+pub fn read_goal(
+    goal: &Source,
+    problem: &Problem,
+) -> Result<(Condition, Vec<Diagnostic>), Diagnostics> {
+    let mut reader = Reader::new(&Source::new("domain", ""), goal);
+    reader.names = Names::of(problem);
+    reader.problem = problem.clone();
+    let nodes = syntax::parse(FileId::Problem, goal.text(), &mut reader.report);
+    let whole = Span {
+        file: FileId::Problem,
+        start: 0,
+        end: goal.text().len(),
+    };
+    let mut scope = Scope::default();
+    let condition = match nodes.as_slice() {
+        [node] => reader.condition(node, &mut scope),
+        [] => {
+            reader
+                .report
+                .error(whole, "an empty goal")
+                .advise("expected a condition such as `(predicate object …)` or `(and …)`");
+            Condition::TRUE
+        }
+        [_, second, ..] => {
+            reader
+                .report
+                .error(second.span, "a second condition in the goal")
+                .advise("join them by `and`");
+            Condition::TRUE
+        }
+    };
+    if !scope.soft.is_empty() {
+        let message = "a preference cannot be part of a goal that is given while a plan runs";
+        reader
+            .report
+            .error(whole, message)
+            .advise("write it into the problem, or leave it out");
+    }
+    reader.problem.goal = condition;
+    reader.check_expansion(Some(whole));
+    let condition = (!reader.report.is_failed()).then_some(reader.problem.goal);
+    Diagnostics::outcome(condition, reader.report.into_diagnostics())
 }
 
 /// The problem as far as it is read, with what is needed to read on.

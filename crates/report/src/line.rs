@@ -29,6 +29,10 @@ pub enum Line {
     Planning(PlanningLine),
     /// A plan has been made, or not.
     Planned(PlannedLine),
+    /// The goals have changed, and the rest of the plan is kept.
+    Kept(KeptLine),
+    /// A lasting run waits for a change.
+    Resting(RestingLine),
     /// Somebody asked the run to end.
     Interrupted(InterruptedLine),
     /// The run is over.
@@ -338,6 +342,32 @@ pub enum ObservationLine {
         /// The time.
         time: Exact,
     },
+    /// A lasting run is to reach this goal, too.
+    Goal {
+        /// Its name.
+        name: String,
+        /// The goal, in PDDL.
+        goal: String,
+        /// The time.
+        time: Exact,
+    },
+    /// A lasting run is to reach the goal of that name no more.
+    Abandon {
+        /// Its name.
+        name: String,
+        /// The time.
+        time: Exact,
+    },
+    /// A lasting run is to start nothing more.
+    Pause {
+        /// The time.
+        time: Exact,
+    },
+    /// A lasting run is to go on after a pause.
+    Resume {
+        /// The time.
+        time: Exact,
+    },
     /// Something that cannot be understood.
     Unintelligible {
         /// The message.
@@ -402,6 +432,33 @@ pub struct PlannedLine {
     /// Whether it is certain that there is none.
     #[serde(rename = "unsolvable")]
     pub is_unsolvable: bool,
+}
+
+/// The goals have changed, and the rest of the running plan reaches these, too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptLine {
+    /// The time.
+    pub now: Exact,
+    /// How they have changed.
+    pub reason: ReasonLine,
+}
+
+/// A lasting run waits for a change.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RestingLine {
+    /// The time.
+    pub now: Exact,
+    /// What came of the goals: [`Verdict::name`](elbowroom_execution::run::Verdict::name); `None` if
+    /// there were none.
+    pub verdict: Option<String>,
+    /// A further explanation.
+    pub why: Option<String>,
+    /// The goals by name: those that were reached, or else those that are open.
+    pub goals: Vec<String>,
+    /// What can never become true again.
+    pub dead_end: Vec<ReasonLine>,
 }
 
 /// Somebody asked the run to end.
@@ -473,6 +530,8 @@ impl Line {
             Observed(&'a ObservedLine),
             Planning(&'a PlanningLine),
             Planned(&'a PlannedLine),
+            Kept(&'a KeptLine),
+            Resting(&'a RestingLine),
             Interrupted(&'a InterruptedLine),
         }
 
@@ -489,6 +548,8 @@ impl Line {
             Self::Observed(line) => Named::Observed(line),
             Self::Planning(line) => Named::Planning(line),
             Self::Planned(line) => Named::Planned(line),
+            Self::Kept(line) => Named::Kept(line),
+            Self::Resting(line) => Named::Resting(line),
             Self::Interrupted(line) => Named::Interrupted(line),
         };
         written(&named)

@@ -19,7 +19,7 @@ pub(crate) struct RunArgs {
     #[arg(value_name = "DOMAIN", required_unless_present_any = ["replay", "resume"])]
     pub(crate) domain: Option<PathBuf>,
     /// The problem, in PDDL
-    #[arg(value_name = "PROBLEM", required_unless_present_any = ["replay", "resume"])]
+    #[arg(value_name = "PROBLEM")]
     pub(crate) problem: Option<PathBuf>,
     /// The plan to begin with; without it, the planner makes one
     #[arg(value_name = "PLAN", conflicts_with = "plan")]

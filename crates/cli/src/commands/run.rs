@@ -1,15 +1,15 @@
 //! `elbowroom run`: execute a plan in a world.
 
 mod journaled;
-mod live;
-mod process;
+pub(super) mod live;
+pub(super) mod process;
 mod realtime;
 mod replay;
-mod resume;
+pub(super) mod resume;
 mod shown;
-mod spec;
+pub(super) mod spec;
 mod text;
-mod trace_file;
+pub(super) mod trace_file;
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -22,10 +22,13 @@ use elbowroom::execute::{RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::Verdict;
 use elbowroom::execution::{Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
+use elbowroom::num::Rational;
 use elbowroom::report::trace;
 use elbowroom::sim::WorldModel;
+use elbowroom::text::Source;
 
 use crate::args::RunArgs;
+use crate::attendance::{Attendance, Attended};
 use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
@@ -46,13 +49,38 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return replay::run(path, arguments.json, output);
     }
     if let Some(path) = &arguments.resume {
-        return resume::run(path, arguments, output);
+        return resume::run(path, arguments, &resume::Alone, output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
-        return Err(Failure::new("DOMAIN and PROBLEM are missing", ""));
+        return Err(Failure::new(
+            "PROBLEM is missing",
+            "give domain and problem, in this order: elbowroom run DOMAIN PROBLEM",
+        ));
     };
+    let problem = || Ok((&input::source(problem, "problem")?).into());
     let (spec, world) = spec::of(arguments, domain, problem)?;
-    let task = task(&spec, output)?;
+    let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
+    let attendance = Attendance::default();
+    let interrupt = Interrupt::listen();
+    let job = Job {
+        spec: &spec,
+        task: &task,
+        first,
+        interrupt: &interrupt,
+        attendance: &attendance,
+    };
+    job.execute(arguments, output)
+}
+
+/// The problem of a specification, and the plan to begin with. What is wrong with a file is told
+/// before anything is done.
+pub(super) fn checked(
+    arguments: &RunArgs,
+    spec: &RunSpec,
+    world: Option<&Source>,
+    output: &mut Output,
+) -> Result<(Arc<Task>, Option<TimeTriggeredPlan>), Failure> {
+    let task = task(spec, output)?;
     let first = match arguments.plan() {
         Some(path) => Some(input::time_triggered(
             &task,
@@ -62,9 +90,8 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         )?),
         None => None,
     };
-    // What is wrong with a file is told before anything is done.
     spec.likelihoods(&task).map_err(contradiction)?;
-    if let Some(source) = &world {
+    if let Some(source) = world {
         WorldModel::read(source, task.problem())
             .map_err(|wrong| contradiction(SpecError::World(wrong)))?;
     }
@@ -72,56 +99,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         Failure::new(error, "`elbowroom help envelope` says what --vary can name")
     })?;
     spec.check().map_err(contradiction)?;
-    let interrupt = Interrupt::listen();
-    let task = Arc::new(task);
-    if let (Some(path), Some(command)) = (&arguments.journal, &arguments.world_process) {
-        let job = Job {
-            spec: &spec,
-            task: &task,
-            first,
-            interrupt: &interrupt,
-        };
-        return job.journaled(path, command, arguments, output);
-    }
-    let mut file = TraceFile::open(arguments.trace.as_deref())?;
-    let views = Views::open(arguments, &spec, &task, &interrupt)?;
-    let outcome = {
-        let mut sink = |line: &str| file.write(line);
-        let mut writer = trace::TraceWriter::new(Arc::clone(&task), &mut sink);
-        let written = writer.header(&spec);
-        written.map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
-        let mut writer = views.shown(&mut writer, &task);
-        let mut writer = live::Live::new(&mut writer);
-        let job = Job {
-            spec: &spec,
-            task: &task,
-            first,
-            interrupt: &interrupt,
-        };
-        match &arguments.world_process {
-            Some(command) => {
-                let manners = process::Manners {
-                    patience: arguments.answer_within.clone(),
-                    is_strict: arguments.strict_world,
-                };
-                let interrupt = interrupt.clone();
-                let mut world = process::ProcessWorld::start(command, &task, manners, interrupt)?;
-                let outcome = job.run(&mut world, &mut writer);
-                world.stop();
-                outcome.map_err(contradiction)?
-            }
-            None => job.simulated(&mut writer).map_err(contradiction)?,
-        }
-    };
-    views.close();
-    let trouble = file.close();
-    let shown = show(arguments, &outcome, output);
-    // The run has been what it was, whatever became of its record.
-    if let Some(trouble) = trouble {
-        output::warn(&trouble);
-    }
-    shown?;
-    exit(outcome.verdict())
+    Ok((Arc::new(task), first))
 }
 
 fn show(arguments: &RunArgs, outcome: &RunOutcome, output: &mut Output) -> Result<(), Failure> {
@@ -133,7 +111,7 @@ fn show(arguments: &RunArgs, outcome: &RunOutcome, output: &mut Output) -> Resul
 }
 
 /// Shows what came of a run with a journal; `trouble` is why that could not be written.
-fn conclude(
+pub(super) fn conclude(
     arguments: &RunArgs,
     outcome: &RunOutcome,
     trouble: Option<&str>,
@@ -150,7 +128,7 @@ fn conclude(
 }
 
 /// The problem of a specification, with its warnings told.
-fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
+pub(super) fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
     let (domain, problem) = (spec.domain.source(), spec.problem.source());
     let read = elbowroom::pddl::read_problem(&domain, &problem);
     let problem = Arc::new(input::with_warnings(read, output)?);
@@ -158,14 +136,63 @@ fn task(spec: &RunSpec, output: &mut Output) -> Result<Task, Failure> {
 }
 
 /// Everything that a run needs but the world.
-struct Job<'a> {
-    spec: &'a RunSpec,
-    task: &'a Arc<Task>,
-    first: Option<TimeTriggeredPlan>,
-    interrupt: &'a Interrupt,
+pub(super) struct Job<'a> {
+    pub(super) spec: &'a RunSpec,
+    pub(super) task: &'a Arc<Task>,
+    pub(super) first: Option<TimeTriggeredPlan>,
+    pub(super) interrupt: &'a Interrupt,
+    pub(super) attendance: &'a Attendance,
 }
 
 impl Job<'_> {
+    /// The run that the arguments ask for, from its beginning to its exit code.
+    pub(super) fn execute(self, arguments: &RunArgs, output: &mut Output) -> Answer {
+        if let (Some(path), Some(command)) = (&arguments.journal, &arguments.world_process) {
+            return self.journaled(path, command, arguments, output);
+        }
+        let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
+        let mut file = TraceFile::open(arguments.trace.as_deref())?;
+        let views = Views::open(arguments, spec, task, interrupt)?;
+        let outcome = {
+            let mut sink = |line: &str| file.write(line);
+            let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
+            let written = writer.header(spec);
+            written.map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
+            let writer = self.attendance.witnessed(&mut writer, task, false);
+            let mut writer = views.shown(writer, task);
+            let mut writer = live::Live::new(&mut writer);
+            match &arguments.world_process {
+                Some(command) => {
+                    let manners = process::Manners {
+                        patience: arguments.answer_within.clone(),
+                        is_strict: arguments.strict_world,
+                    };
+                    let interrupt = interrupt.clone();
+                    let world = process::ProcessWorld::start(command, task, manners, interrupt)?;
+                    let mut world = self.attended(world, &Rational::ONE);
+                    let outcome = self.run(&mut world, &mut writer);
+                    world.into_inner().stop();
+                    outcome.map_err(contradiction)?
+                }
+                None => self.simulated(&mut writer).map_err(contradiction)?,
+            }
+        };
+        views.close();
+        let trouble = file.close();
+        let shown = show(arguments, &outcome, output);
+        // The run has been what it was, whatever became of its record.
+        if let Some(trouble) = trouble {
+            output::warn(&trouble);
+        }
+        shown?;
+        exit(outcome.verdict())
+    }
+
+    /// A world that takes requests, if the run is attended.
+    fn attended<'w, W: World>(&self, world: W, factor: &Rational) -> Attended<'w, W> {
+        Attended::new(world, self.attendance, self.task, self.interrupt, factor)
+    }
+
     fn run(
         self,
         world: &mut dyn World,
@@ -173,6 +200,7 @@ impl Job<'_> {
     ) -> Result<RunOutcome, SpecError> {
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
+            .told_to(self.attendance.listener())
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
     }
@@ -206,20 +234,24 @@ impl Job<'_> {
         let interrupt = self.interrupt;
         let views = Views::open(arguments, self.spec, self.task, interrupt)?;
         let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
-        let mut world = Careful {
+        let world = Careful {
             inner: world,
             kept: kept.clone(),
             refused: Vec::new(),
         };
+        let mut world = self.attended(world, &Rational::ONE);
         let outcome = {
             let writer = JournalWriter {
                 task: Arc::clone(self.task),
                 file: &mut file,
                 kept: kept.clone(),
+                desk: self.attendance.desk().cloned(),
             };
+            let writer = self.attendance.witnessed(writer, self.task, true);
             let mut writer = views.shown(writer, self.task);
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
+                .told_to(self.attendance.listener())
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
                 inner: Stopwatch::start(interrupt),
@@ -227,7 +259,7 @@ impl Job<'_> {
             };
             execute(request, &mut world, &mut watch)
         };
-        world.inner.stop();
+        world.into_inner().inner.stop();
         views.close();
         let outcome = outcome.map_err(contradiction)?;
         conclude(arguments, &outcome, file.trouble().as_deref(), output)
@@ -247,13 +279,15 @@ impl Job<'_> {
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
         let planner = spec.planner_for(Some(&model), &clock, &goes_on)?;
-        let mut world = Realtime {
+        let world = Realtime {
             inner: world.as_mut(),
             pace: &pace,
             interrupt: self.interrupt,
         };
+        let mut world = self.attended(world, factor);
         let request = RunRequest::new(spec, task)
             .beginning_with(self.first)
+            .told_to(self.attendance.listener())
             .planned_by(PacedPlanner {
                 inner: planner,
                 pace: &pace,

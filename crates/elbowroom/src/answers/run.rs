@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use elbowroom_execution::run::{Report, Verdict};
-use elbowroom_execution::{Entry, NoRecord, Planner, Recorder, World};
+use elbowroom_execution::{Entry, NoRecord, Planner, Progression, Recorder, World};
 use elbowroom_model::{Task, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 use elbowroom_report::trace::line::ReportLine;
@@ -26,6 +26,8 @@ pub struct RunRequest<'a> {
     pub planner: Option<Box<dyn Planner + 'a>>,
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
+    /// Told what the run believes, whenever that may have changed.
+    pub listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>>,
 }
 
 /// The answer, and the report that it was made of.
@@ -76,6 +78,7 @@ impl<'a> RunRequest<'a> {
             plan: None,
             planner: None,
             recorder: Box::new(NoRecord),
+            listener: None,
         }
     }
 
@@ -91,6 +94,13 @@ impl<'a> RunRequest<'a> {
     pub fn planned_by(self, planner: impl Planner + 'a) -> Self {
         let planner: Option<Box<dyn Planner + 'a>> = Some(Box::new(planner));
         Self { planner, ..self }
+    }
+
+    /// Tells what the run believes, as [`Execution::told_to`](crate::execute::Execution::told_to).
+    #[must_use]
+    pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+        let listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>> = Some(Box::new(listener));
+        Self { listener, ..self }
     }
 
     /// Keeps a record.
@@ -134,7 +144,13 @@ pub fn run(
         watched: &shared,
         plans: 0,
     };
+    let mut listener = request.listener;
     let report = execution
+        .told_to(move |belief| {
+            if let Some(listener) = &mut listener {
+                listener(belief);
+            }
+        })
         .beginning_with(request.plan)
         .planned_by(planner)
         .recorded_by(recorder)

@@ -4,12 +4,36 @@ use std::sync::Arc;
 
 use elbowroom_execution::executors::{ExecutorSpec, Foresight, Means, UnknownExecutor};
 use elbowroom_execution::run::{Ports, Report, Run, RunSettings};
-use elbowroom_execution::{Executor, NoRecord, Odds, Outlook, Planner, Preparer, Recorder, World};
+use elbowroom_execution::{
+    Executor, NoRecord, Odds, Outlook, Planner, Preparer, Progression, Recorder, World,
+};
+use elbowroom_model::problem::Condition;
 use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_pddl::{Diagnostics, Source};
 use elbowroom_probability::Likelihoods;
 
 use super::{Analyst, Embedded, WholeRegion};
 use crate::flow;
+
+/// A goal in PDDL that is given while a run of this task goes on: the condition alone, as it stands
+/// behind `:goal`.
+///
+/// # Errors
+/// In words, in one line, when it is no condition on what the problem has.
+pub fn read_goal(task: &Task, text: &str) -> Result<Condition, String> {
+    match elbowroom_pddl::read_goal(&Source::new("the goal", text), task.problem()) {
+        Ok((goal, _warnings)) => Ok(goal),
+        Err(mistakes) => Err(first_mistake(&mistakes)),
+    }
+}
+
+fn first_mistake(mistakes: &Diagnostics) -> String {
+    let mut errors = mistakes.errors();
+    errors.next().map_or_else(
+        || "it is no condition".to_owned(),
+        |first| first.to_string().replace(": error:", ":"),
+    )
+}
 
 /// Executes a plan in a world, with one of the
 /// [executors](elbowroom_execution::executors::EXECUTORS), and with the embedded planner for when
@@ -95,6 +119,8 @@ pub struct Execution<'a> {
     recorder: Box<dyn Recorder + 'a>,
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
+    is_lasting: bool,
+    listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>>,
 }
 
 /// The executor of a run: a registered one, or the caller's own.
@@ -121,6 +147,8 @@ impl<'a> Execution<'a> {
             recorder: Box::new(NoRecord),
             is_to_end: Box::new(|| false),
             is_explaining: false,
+            is_lasting: false,
+            listener: None,
         }
     }
 
@@ -209,6 +237,18 @@ impl<'a> Execution<'a> {
         }
     }
 
+    /// Goes on when the goal is reached, and takes other goals, in PDDL, while it runs: see
+    /// [`Run::lasting`].
+    pub fn lasting(self, is_lasting: bool) -> Self {
+        Self { is_lasting, ..self }
+    }
+
+    /// See [`Run::told_to`].
+    pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
+        let listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>> = Some(Box::new(listener));
+        Self { listener, ..self }
+    }
+
     /// The run, to be driven step by step: by an event loop.
     #[must_use = "a run does nothing until it is asked what is next"]
     pub fn run(self) -> Run<'a> {
@@ -234,7 +274,14 @@ impl<'a> Execution<'a> {
             executor,
             recorder: self.recorder,
         };
-        let run = Run::new(self.task, self.plan, self.settings, ports).ending_when(self.is_to_end);
+        let mut run =
+            Run::new(self.task, self.plan, self.settings, ports).ending_when(self.is_to_end);
+        if self.is_lasting {
+            run = run.lasting(read_goal);
+        }
+        if let Some(listener) = self.listener {
+            run = run.told_to(listener);
+        }
         if self.is_explaining {
             run.explaining()
         } else {

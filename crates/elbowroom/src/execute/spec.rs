@@ -64,6 +64,10 @@ pub struct RunSpec {
     pub likelihoods: Option<NamedText>,
     /// Whether there is a plan to begin with; in a trace, it is the first entry.
     pub has_plan: bool,
+    /// Whether the run goes on when its goal is reached, and takes others (`elbowroom serve`); left
+    /// out where it does not.
+    #[serde(default, rename = "lasting", skip_serializing_if = "std::ops::Not::not")]
+    pub is_lasting: bool,
     /// The executor.
     #[serde(with = "as_text")]
     pub executor: ExecutorSpec,
@@ -154,6 +158,7 @@ impl RunSpec {
             planner_time: None,
             likelihoods: None,
             has_plan: false,
+            is_lasting: false,
             executor: ExecutorSpec::default(),
             seed: 0,
             planner_states: planner.most_states,

@@ -6,6 +6,7 @@ mod bad_worlds;
 mod esterel;
 mod guarantee;
 mod handover;
+mod lasting;
 mod likelier;
 mod literal;
 mod lookahead;

@@ -95,6 +95,12 @@ impl Account {
         }
     }
 
+    /// The actions of the present plan that were started, or went on when it began.
+    pub(super) fn of_plan(&self) -> impl Iterator<Item = (Ticket, &Opened)> + '_ {
+        let tickets = self.steps.values();
+        tickets.map(|ticket| (*ticket, &self.entries[index(*ticket)]))
+    }
+
     pub(super) fn ticket(&self, step: StepId) -> Option<Ticket> {
         self.steps.get(&step).copied()
     }

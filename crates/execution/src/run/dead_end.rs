@@ -56,6 +56,7 @@ impl Run<'_> {
     pub(super) fn dead_end(&self) -> Vec<Reason> {
         let mut past = Past {
             task: &self.task,
+            beginning: &self.beginning,
             history: &self.history,
             account: &self.account,
             now: &self.now,
@@ -77,6 +78,7 @@ impl Run<'_> {
 /// The history of a run, to be asked about.
 struct Past<'a> {
     task: &'a Arc<Task>,
+    beginning: &'a Progression,
     history: &'a [Happened],
     account: &'a Account,
     now: &'a Rational,
@@ -206,7 +208,8 @@ impl Past<'_> {
 
     /// The belief after `count` events.
     fn after(&self, count: usize) -> Progression {
-        let mut state = Progression::new(Arc::clone(self.task));
+        let mut state = self.beginning.clone();
+        state.pursue(self.task);
         for happened in &self.history[..count] {
             // What cannot be computed stays as it was, as when it happened.
             let _ = state.arrive(&happened.time);

@@ -170,6 +170,9 @@ impl Run<'_> {
 
     fn after_look(&mut self) -> Result<(), Stop> {
         self.heed()?;
+        if self.is_to_turn() {
+            return Ok(());
+        }
         if self.is_goal_certain() {
             return Err(Stop::Over(Verdict::GoalReached));
         }

@@ -40,6 +40,10 @@ impl Run<'_> {
             return;
         }
         let verdict = match stop {
+            Stop::Over(verdict) if self.goes_on_after(&verdict) => {
+                self.rest(&verdict);
+                return;
+            }
             Stop::Over(verdict) => verdict,
             Stop::World(error) => Verdict::WorldFailed { why: error.message },
         };

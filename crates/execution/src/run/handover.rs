@@ -63,11 +63,19 @@ impl Run<'_> {
 
     /// Asks the planner; the plan is taken up when the time that this takes has passed.
     pub(super) fn plan_from_here(&mut self, reason: &Reason) -> Result<(), Stop> {
+        if self.is_to_turn() {
+            return Ok(());
+        }
+        if self.is_paused() {
+            self.agenda.push(Todo::Plan(reason.clone()));
+            self.stay();
+            return Ok(());
+        }
         self.news.clear();
         if self.go_without_plan(reason) {
             return Ok(());
         }
-        let (situation, running) = self.situation();
+        let (situation, running) = self.situation(&self.allowance);
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason,
@@ -115,6 +123,10 @@ impl Run<'_> {
 
     /// Takes up a plan, as soon as the time is over that it took to make it.
     pub(super) fn adopt(&mut self, made: Box<Made>) -> Result<(), Stop> {
+        if self.is_to_turn() {
+            // It was made for other goals.
+            return Ok(());
+        }
         if self.now < made.ready {
             let ready = made.ready.clone();
             self.agenda.push(Todo::Adopt(made));
@@ -128,10 +140,11 @@ impl Run<'_> {
 
     /// Where things will stand when the new plan can begin: after the time that planning is
     /// expected to take, and ε after whatever happens last before that.
-    fn situation(&self) -> (Situation, Vec<Ticket>) {
+    pub(super) fn situation(&self, allowance: &Rational) -> (Situation, Vec<Ticket>) {
         let epsilon = self.task.epsilon();
-        let mut time = &self.now + &self.allowance;
-        if self.now.is_positive() || self.account.started() > 0 {
+        let mut time = &self.now + allowance;
+        // Another goal makes another problem, which is written anew for planners that read files.
+        if self.now.is_positive() || self.account.started() > 0 || self.has_other_goals() {
             time += epsilon;
         }
         if time.is_zero() {

@@ -12,7 +12,7 @@ use crate::quantities;
 use crate::record::Entry;
 
 /// The objection to a report that is ignored or corrected.
-type Remark = Option<&'static str>;
+pub(super) type Remark = Option<&'static str>;
 
 /// The objection to a report on a ticket that was not given out.
 const NEVER_STARTED: &str = "nothing of that number was started";
@@ -33,6 +33,7 @@ impl Run<'_> {
         // Time passes for the belief when everything that happened in it is known.
         let now = self.now.clone();
         let _ = self.belief.advance(&now);
+        (self.listener)(&self.belief);
     }
 
     fn planned(&self, event: &Event) -> Planned {
@@ -42,6 +43,7 @@ impl Run<'_> {
             Event::Feedback { .. }
             | Event::Fact { .. }
             | Event::Value { .. }
+            | Event::Asked(_)
             | Event::Unintelligible { .. } => return Planned::default(),
         };
         let step = self.account.get(ticket).and_then(|entry| entry.step);
@@ -79,6 +81,7 @@ impl Run<'_> {
                 }
                 None
             }
+            Event::Asked(request) => return self.asked_for(request),
             Event::Unintelligible { said, why } => {
                 self.progress.note_unintelligible(said, why);
                 return Some("cannot be understood; nothing was made of it");

@@ -76,6 +76,20 @@ impl Log {
                 let why = planned.why_not.clone().unwrap_or_default();
                 self.add(&planned.now.0, "planning", what, String::new(), why);
             }
+            Line::Kept(kept) => {
+                let why = kept.reason.words.clone();
+                let what = "the rest of the plan is kept".to_owned();
+                self.add(&kept.now.0, "planning", what, String::new(), why);
+            }
+            Line::Resting(rest) => {
+                let what = match rest.verdict.as_deref() {
+                    None => "there is no goal".to_owned(),
+                    Some("goal-reached") => format!("reached: {}", rest.goals.join(", ")),
+                    Some(verdict) => format!("waits for a change: {}", verdict.replace('-', " ")),
+                };
+                let why = rest.why.clone().unwrap_or_default();
+                self.add(&rest.now.0, "rest", what, String::new(), why);
+            }
             Line::Interrupted(line) => {
                 let what = "somebody asked the run to end".to_owned();
                 self.add(&line.now.0, "end", what, String::new(), String::new());
@@ -230,6 +244,12 @@ fn observation<'a>(observation: &'a ObservationLine, bars: &Bars) -> (&'a Ration
             value,
             time,
         } => (&time.0, format!("{fluent} = {}", nearest(&value.0))),
+        ObservationLine::Goal { name, goal, time } => {
+            (&time.0, format!("asked for: {name}: {goal}"))
+        }
+        ObservationLine::Abandon { name, time } => (&time.0, format!("asked to abandon: {name}")),
+        ObservationLine::Pause { time } => (&time.0, "asked to pause".to_owned()),
+        ObservationLine::Resume { time } => (&time.0, "asked to go on".to_owned()),
         ObservationLine::Unintelligible { said, why, time } => {
             (&time.0, format!("cannot be understood ({why}): {said}"))
         }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use elbowroom_model::Problem;
 use elbowroom_model::problem::{FunctionId, ObjectId, PredicateId, SchemaId, TypeId};
 
 /// The declared names, in lower case.
@@ -17,4 +18,29 @@ pub(super) struct Names {
     /// uses need no further diagnostic.
     pub(super) object_functions: BTreeSet<String>,
     pub(super) schemas: BTreeMap<String, SchemaId>,
+}
+
+impl Names {
+    /// The names of a problem that was read before.
+    pub(super) fn of(problem: &Problem) -> Self {
+        let mut names = Self::default();
+        for (id, named) in (0..).zip(&problem.types) {
+            names.types.insert(named.name.clone(), TypeId(id));
+        }
+        for (id, named) in (0..).zip(&problem.objects) {
+            names.objects.insert(named.name.clone(), ObjectId(id));
+        }
+        for (id, named) in (0..).zip(&problem.predicates) {
+            let same = names.predicates.entry(named.name.clone()).or_default();
+            same.push(PredicateId(id));
+        }
+        for (id, named) in (0..).zip(&problem.functions) {
+            let same = names.functions.entry(named.name.clone()).or_default();
+            same.push(FunctionId(id));
+        }
+        for (id, named) in (0..).zip(&problem.schemas) {
+            names.schemas.insert(named.name.clone(), SchemaId(id));
+        }
+        names
+    }
 }

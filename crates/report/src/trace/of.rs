@@ -1,8 +1,9 @@
 //! From the entries of a run's record to the lines of a trace.
 
-use elbowroom_execution::run::{ExecutedStep, Report};
+use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
     Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned, Reason,
+    Request,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -11,9 +12,9 @@ use indexmap::IndexMap;
 
 use super::line::{
     BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine, GivenLine,
-    InstanceLine, InterruptedLine, IntervalLine, Line, LookedLine, NetworkLine, ObservationLine,
+    InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line, LookedLine, NetworkLine, ObservationLine,
     ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine, PlanningLine,
-    ReasonLine, ReportLine, RunningLine, SituationLine, StepLine, WindowLine,
+    ReasonLine, ReportLine, RestingLine, RunningLine, SituationLine, StepLine, WindowLine,
 };
 use crate::exact::Exact;
 
@@ -85,6 +86,22 @@ impl Line {
                 plan: plan.map(steps),
                 why_not: why_not.map(str::to_owned),
                 is_unsolvable,
+            }),
+            Entry::Kept { now, reason } => Self::Kept(KeptLine {
+                now: exact(now),
+                reason: ReasonLine::of(reason),
+            }),
+            Entry::Resting {
+                now,
+                verdict,
+                goals,
+                dead_end,
+            } => Self::Resting(RestingLine {
+                now: exact(now),
+                verdict: verdict.map(|it| it.name().to_owned()),
+                why: verdict.and_then(Verdict::why).map(str::to_owned),
+                goals: goals.to_vec(),
+                dead_end: dead_end.iter().map(ReasonLine::of).collect(),
             }),
             Entry::Interrupted { now } => Self::Interrupted(InterruptedLine { now: exact(now) }),
             Entry::Over(report) => Self::Over(ReportLine::of(report)),
@@ -193,12 +210,49 @@ impl ObservationLine {
                 value: exact(value),
                 time,
             },
+            Event::Asked(request) => Self::asked(request, time),
             Event::Unintelligible { said, why } => Self::Unintelligible {
                 said: said.clone(),
                 why: why.clone(),
                 time,
             },
         }
+    }
+}
+
+impl ObservationLine {
+    fn asked(request: &Request, time: Exact) -> Self {
+        match request {
+            Request::Pursue { name, goal } => Self::Goal {
+                name: name.clone(),
+                goal: goal.clone(),
+                time,
+            },
+            Request::Abandon { name } => Self::Abandon {
+                name: name.clone(),
+                time,
+            },
+            Request::Pause => Self::Pause { time },
+            Request::Resume => Self::Resume { time },
+        }
+    }
+
+    /// What was asked of the run, and when, if it is that.
+    pub fn request(&self) -> Option<(Request, &Rational)> {
+        let (request, time) = match self {
+            Self::Goal { name, goal, time } => {
+                let (name, goal) = (name.clone(), goal.clone());
+                (Request::Pursue { name, goal }, time)
+            }
+            Self::Abandon { name, time } => {
+                let name = name.clone();
+                (Request::Abandon { name }, time)
+            }
+            Self::Pause { time } => (Request::Pause, time),
+            Self::Resume { time } => (Request::Resume, time),
+            _ => return None,
+        };
+        Some((request, &time.0))
     }
 }
 

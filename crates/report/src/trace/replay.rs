@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World, WorldError,
+    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
@@ -158,9 +158,14 @@ impl ReplayWorld {
             .pop_front()
             .ok_or_else(|| WorldError::new(END))?;
         let mut observations = Vec::with_capacity(reported.len());
-        let reported: Vec<Value> = reported.iter().map(message).collect();
         for observation in &reported {
-            let read = read_observation(observation, &self.task);
+            // What people ask is nothing that a world could report.
+            if let Some((request, time)) = observation.request() {
+                let (event, time) = (Event::Asked(request), time.clone());
+                observations.push(Observation { time, event });
+                continue;
+            }
+            let read = read_observation(&message(observation), &self.task);
             observations.push(read.map_err(|wrong| {
                 WorldError::new(format!("line {line} of the trace: {}", wrong.message))
             })?);
@@ -184,7 +189,7 @@ impl World for ReplayWorld {
         &mut self,
         _facts: &[FactId],
         _fluents: &[FluentId],
-    ) -> Result<Vec<elbowroom_execution::Observation>, WorldError> {
+    ) -> Result<Vec<Observation>, WorldError> {
         self.next().map(|passage| passage.observations)
     }
 }

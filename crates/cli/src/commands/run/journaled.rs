@@ -11,6 +11,7 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::Line;
 
+use crate::attendance::Desk;
 use crate::journal::JournalFile;
 
 /// Whether everything is on the disk that should be.
@@ -25,20 +26,27 @@ impl Kept {
 }
 
 /// Writes each entry into a journal. Before the world is told to start or to cancel something, that
-/// is on the disk; all else is handed to the operating system at once.
+/// is on the disk, and so is what people ask before they are told that it was taken in; all else is handed to the operating system at once.
 pub(super) struct JournalWriter<'a> {
     pub(super) task: Arc<Task>,
     pub(super) file: &'a mut JournalFile,
     pub(super) kept: Kept,
+    /// Who waits for requests to be on the disk.
+    pub(super) desk: Option<Desk>,
 }
 
 impl Recorder for JournalWriter<'_> {
     fn record(&mut self, entry: &Entry<'_>) {
         let line = Line::of(&self.task, entry);
         let is_written = self.file.write(&format!("{}\n", line.text()));
-        let is_kept = is_written && (!matches!(entry, Entry::Command { .. }) || self.file.sync());
+        let is_answer = matches!(entry, Entry::Passed { .. });
+        let has_requests = is_answer && self.desk.as_ref().is_some_and(Desk::has_fetched);
+        let is_to_sync = has_requests || matches!(entry, Entry::Command { .. });
+        let is_kept = is_written && (!is_to_sync || self.file.sync());
         if !is_kept {
             self.kept.0.store(true, Ordering::SeqCst);
+        } else if let Some(desk) = self.desk.as_ref().filter(|_| has_requests) {
+            desk.acknowledge();
         }
     }
 }

@@ -27,6 +27,7 @@ use super::process::{Manners, ProcessWorld};
 use super::shown::Views;
 use super::spec::contradiction;
 use crate::args::RunArgs;
+use crate::attendance::{Attendance, Attended};
 use crate::clock::Clock;
 use crate::exit::{Answer, Failure};
 use crate::input;
@@ -92,8 +93,42 @@ fn unreadable(name: &str, message: &str) -> Failure {
     Failure::new(format!("the journal {name}: {message}"), "")
 }
 
+/// Who wants to attend a run that goes on.
+pub(in crate::commands) trait Host {
+    /// Attends a run of this specification.
+    ///
+    /// # Errors
+    /// When it is not one of those that this host attends.
+    fn attend(
+        &self,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        interrupt: &Interrupt,
+    ) -> Result<Attendance, Failure>;
+}
+
+/// Nobody.
+pub(in crate::commands) struct Alone;
+
+impl Host for Alone {
+    fn attend(&self, spec: &RunSpec, _: &Arc<Task>, _: &Interrupt) -> Result<Attendance, Failure> {
+        if spec.is_lasting {
+            return Err(Failure::new(
+                "this is the journal of an executive that takes requests",
+                "go on with `elbowroom serve --resume`",
+            ));
+        }
+        Ok(Attendance::default())
+    }
+}
+
 /// Goes on with the run of a journal.
-pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answer {
+pub(in crate::commands) fn run(
+    path: &Path,
+    arguments: &RunArgs,
+    host: &dyn Host,
+    output: &mut Output,
+) -> Answer {
     let name = path.display().to_string();
     let Cut {
         journal,
@@ -113,6 +148,7 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
     };
     let mut file = JournalFile::go_on(path, &journal, length)?;
     let interrupt = Interrupt::listen();
+    let attendance = host.attend(&spec, &task, &interrupt)?;
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
     let views = Views::open(arguments, &spec, &task, &interrupt)?;
@@ -134,19 +170,25 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
                 past: ReplayPlanner::new(&stored),
                 present: planner,
             })
+            .told_to(attendance.listener())
             .recorded_by(views.shown(
-                PastRecorder {
-                    past: Arc::clone(&past),
-                    task: Arc::clone(&task),
-                    writer: JournalWriter {
+                attendance.witnessed(
+                    PastRecorder {
+                        past: Arc::clone(&past),
                         task: Arc::clone(&task),
-                        file: &mut file,
-                        kept: kept.clone(),
+                        writer: JournalWriter {
+                            task: Arc::clone(&task),
+                            file: &mut file,
+                            kept: kept.clone(),
+                            desk: attendance.desk().cloned(),
+                        },
                     },
-                },
+                    &task,
+                    true,
+                ),
                 &task,
             ));
-        let mut world = Careful {
+        let world = Careful {
             inner: PastWorld {
                 replay: ReplayWorld::new(&stored, &task),
                 left: stored.lines.iter().filter(|line| is_answer(line)).count(),
@@ -167,13 +209,15 @@ pub(super) fn run(path: &Path, arguments: &RunArgs, output: &mut Output) -> Answ
             kept: kept.clone(),
             refused: Vec::new(),
         };
+        let mut world = Attended::new(world, &attendance, &task, &interrupt, &Rational::ONE)
+            .once(|| past.is_over());
         let mut watch = Watch {
             inner: Stopwatch::start(&interrupt),
             past: Arc::clone(&past),
             kept: kept.clone(),
         };
         let outcome = execute(request, &mut world, &mut watch);
-        if let Some(world) = world.inner.present {
+        if let Some(world) = world.into_inner().inner.present {
             world.stop();
         }
         views.close();

@@ -13,11 +13,11 @@ use crate::exit::Failure;
 use crate::input;
 
 /// What the arguments ask for. Files are read here; what is wrong with the arguments themselves is
-/// told before that. The world file comes with its name, for what is to be said about it.
-pub(super) fn of(
+/// told before that, and before the problem is asked for. The world file comes with its name, for what is to be said about it.
+pub(in crate::commands) fn of(
     arguments: &RunArgs,
     domain: &Path,
-    problem: &Path,
+    problem: impl FnOnce() -> Result<NamedText, Failure>,
 ) -> Result<(RunSpec, Option<Source>), Failure> {
     let empty = || NamedText {
         name: String::new(),
@@ -47,7 +47,7 @@ pub(super) fn of(
     // A misspelt planner is told before files are read.
     spec.check_planner().map_err(contradiction)?;
     spec.domain = (&input::source(domain, "domain")?).into();
-    spec.problem = (&input::source(problem, "problem")?).into();
+    spec.problem = problem()?;
     spec.executor = arguments
         .executor
         .parse()
@@ -92,7 +92,7 @@ fn planning_time(arguments: &RunArgs) -> Result<PlanningTime, Failure> {
 }
 
 /// Advice on arguments, or files, that contradict each other.
-pub(super) fn contradiction(error: SpecError) -> Failure {
+pub(in crate::commands) fn contradiction(error: SpecError) -> Failure {
     let hint = match &error {
         SpecError::World(wrong) => {
             return Failure::from(wrong.clone())

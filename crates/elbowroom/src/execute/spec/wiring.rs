@@ -229,6 +229,7 @@ impl RunSpec {
         Ok(Execution::of(task)
             .by(self.executor.clone())
             .with_settings(self.settings())
+            .lasting(self.is_lasting)
             .with_envelopes(self.envelopes())
             .with_likelihoods(self.likelihoods(task)?)
             .with_odds(odds)

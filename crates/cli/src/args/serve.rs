@@ -1,0 +1,129 @@
+//! What can be said to `elbowroom serve` and `elbowroom ctl`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use elbowroom::num::Rational;
+
+use super::run::RunArgs;
+use crate::http::Target;
+use crate::serve::Address;
+
+/// The port of an executive where none is chosen.
+const PORT: &str = "7316";
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Without PROBLEM, the executive waits for one (`elbowroom ctl problem`). What it can be asked, and \
+what comes of that: docs/serve.md.")]
+#[command(mut_arg("time_limit", |it| it
+    .default_value("1000000000")
+    .help("Time limit of the executive, in seconds of the world; by default 30 years")))]
+#[command(mut_arg("max_replans", |it| it
+    .help("Number of new plans that may be made before the executive rests and waits for a change")))]
+#[command(mut_arg("realtime", |it| it
+    .help("Run a simulated world FACTOR times as fast as the wall clock (0.000001 to 1000000000); \
+           by default as fast. A world process has a clock of its own")))]
+#[command(mut_arg("serve", |it| it.hide(true)))]
+#[command(mut_arg("control", |it| it.hide(true)))]
+#[command(mut_arg("replay", |it| it.hide(true)))]
+pub(crate) struct ServeArgs {
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+    /// Where to listen for HTTP: a port, or HOST:PORT; port 0 is a free one. Only for this machine
+    /// unless HOST says otherwise
+    #[arg(long, value_name = "ADDRESS", value_parser = Address::read, default_value = PORT)]
+    pub(crate) http: Address,
+    /// Listen at this Unix socket, too, which is made; only its owner can reach it
+    #[arg(long, value_name = "PATH")]
+    pub(crate) socket: Option<PathBuf>,
+    /// Let those who know the token in this file change something: give goals and facts, pause,
+    /// stop. Without it, the executive can only be looked at
+    #[arg(long, value_name = "FILE")]
+    pub(crate) token: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+What there is to ask, and what the answers mean: docs/serve.md. Exit codes: 0 done; 2 refused, or \
+nobody answers.")]
+pub(crate) struct CtlArgs {
+    /// Where the executive is: a port, HOST:PORT, or the path of its socket
+    #[arg(long, value_name = "ADDRESS", value_parser = Target::read, default_value = PORT)]
+    #[arg(global = true)]
+    pub(crate) to: Target,
+    /// The file with the token, for what changes something
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(crate) token: Option<PathBuf>,
+    /// Print the answer as one JSON document
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    #[command(subcommand)]
+    pub(crate) what: CtlCommand,
+}
+
+/// What is asked of an executive.
+#[derive(Debug, Subcommand)]
+pub(crate) enum CtlCommand {
+    /// Print how things stand: what it does and why, goals, what is under way, facts and numbers
+    State,
+    /// Print the plan, and what became of its actions
+    Plan,
+    /// Print what is still guaranteed, and how far each quantity may deviate
+    Guarantee,
+    /// Print what is next, and why
+    Next,
+    /// Print each line of the trace as it comes, until the executive ends
+    Events {
+        /// Begin behind line N of the trace, not with the next line
+        #[arg(long, value_name = "N")]
+        after: Option<usize>,
+    },
+    /// Give another goal, such as '(at rover base)', which is to be reached, too
+    Goal {
+        /// The goal, in PDDL, as it stands behind `:goal`
+        #[arg(value_name = "GOAL")]
+        goal: String,
+        /// Its name; the goal of the same name is replaced
+        #[arg(long, value_name = "NAME")]
+        name: Option<String>,
+    },
+    /// Abandon a goal
+    Cancel {
+        /// Its name; that of the problem's own goal is `problem`
+        #[arg(value_name = "NAME")]
+        name: String,
+    },
+    /// Say that a fact is true, or is not
+    Fact {
+        /// The fact, such as '(open door)'
+        #[arg(value_name = "FACT")]
+        fact: String,
+        /// Whether it is true
+        #[arg(value_name = "true|false", default_value = "true", action = clap::ArgAction::Set)]
+        becomes: bool,
+    },
+    /// Say what a number is
+    Number {
+        /// The fluent, such as '(charge rover)'
+        #[arg(value_name = "FLUENT")]
+        fluent: String,
+        /// Its value
+        #[arg(value_name = "VALUE", allow_negative_numbers = true)]
+        value: Rational,
+    },
+    /// Give the problem to an executive that has none, or that has nothing under way
+    Problem {
+        /// The problem file
+        #[arg(value_name = "PROBLEM")]
+        file: PathBuf,
+    },
+    /// Have nothing more started; what is under way goes on
+    Pause,
+    /// Go on after a pause
+    Resume,
+    /// End the executive; what is under way is cancelled
+    Stop,
+    /// Print the interface as an OpenAPI document
+    Openapi,
+}

@@ -1,0 +1,96 @@
+//! A run that is attended: people ask what it does, and ask for something else, while it goes on.
+//!
+//! Requests wait at a [`Desk`]. The run fetches them as observations of its world ([`Attended`]), so
+//! that they stand in its record and it never waits for anybody.
+
+mod desk;
+mod world;
+
+use std::sync::Arc;
+
+use elbowroom::executive::Status;
+use elbowroom::execution::{Entry, Recorder};
+use elbowroom::model::Task;
+use elbowroom::report::trace::Line;
+
+pub(crate) use desk::{Ask, Desk};
+pub(crate) use world::Attended;
+
+use crate::serve::Board;
+
+/// Who attends a run, if anybody does.
+#[derive(Clone, Default)]
+pub(crate) struct Attendance(Option<Attendants>);
+
+#[derive(Clone)]
+struct Attendants {
+    desk: Desk,
+    status: Status,
+    board: Board,
+}
+
+impl Attendance {
+    /// By those who hand in requests at `desk`, and ask `status` and `board`.
+    pub(crate) fn by(desk: Desk, status: Status, board: Board) -> Self {
+        Self(Some(Attendants {
+            desk,
+            status,
+            board,
+        }))
+    }
+
+    /// Where requests wait.
+    pub(crate) fn desk(&self) -> Option<&Desk> {
+        self.0.as_ref().map(|attendants| &attendants.desk)
+    }
+
+    /// To be told what the run believes.
+    pub(crate) fn listener(
+        &self,
+    ) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
+        let status = self.0.as_ref().map(|attendants| attendants.status.clone());
+        move |belief| {
+            if let Some(status) = &status {
+                status.believe(belief);
+            }
+        }
+    }
+
+    /// A record that attendants see, too. Where it is not `written_ahead`, a request counts as taken
+    /// in as soon as it is recorded.
+    pub(crate) fn witnessed<R: Recorder>(
+        &self,
+        inner: R,
+        task: &Arc<Task>,
+        written_ahead: bool,
+    ) -> Witnessed<R> {
+        Witnessed {
+            inner,
+            task: Arc::clone(task),
+            attendants: self.0.clone(),
+            written_ahead,
+        }
+    }
+}
+
+/// Keeps a record, and shows it to attendants.
+pub(crate) struct Witnessed<R> {
+    inner: R,
+    task: Arc<Task>,
+    attendants: Option<Attendants>,
+    written_ahead: bool,
+}
+
+impl<R: Recorder> Recorder for Witnessed<R> {
+    fn record(&mut self, entry: &Entry<'_>) {
+        self.inner.record(entry);
+        if let Some(attendants) = &self.attendants {
+            attendants.status.record(entry);
+            let line = Line::of(&self.task, entry);
+            attendants.board.add(&format!("{}\n", line.text()));
+            if !self.written_ahead && matches!(entry, Entry::Passed { .. }) {
+                attendants.desk.acknowledge();
+            }
+        }
+    }
+}

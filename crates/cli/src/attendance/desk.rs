@@ -1,0 +1,142 @@
+//! Where requests wait until the run takes them in.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use elbowroom::execution::{Event, Observation, Request};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+
+/// The limit on requests that wait.
+const MOST_WAITING: usize = 1000;
+
+/// Something that is asked of a run, or told to it. Facts and fluents are names: what they stand for
+/// is looked up when the run takes them in, so that a replay numbers them in the same order.
+#[derive(Clone, Debug)]
+pub(crate) enum Ask {
+    Request(Request),
+    Fact { fact: String, becomes: bool },
+    Number { fluent: String, value: Rational },
+}
+
+/// Where requests wait.
+#[derive(Clone, Default)]
+pub(crate) struct Desk(Arc<Inner>);
+
+#[derive(Default)]
+struct Inner {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: VecDeque<Ask>,
+    /// How many were handed in, handed to the run, and taken in by it.
+    given: u64,
+    fetched: u64,
+    taken: u64,
+}
+
+impl Desk {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Each change of the state is one statement, or does not matter in halves.
+        let state = self.0.state.lock();
+        state.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Hands in requests, which the run takes in together. The number of the last one, or `None` if
+    /// too many wait.
+    pub(crate) fn hand_in(&self, asks: Vec<Ask>) -> Option<u64> {
+        let mut state = self.lock();
+        if state.waiting.len() >= MOST_WAITING {
+            return None;
+        }
+        state.given += asks.len() as u64;
+        state.waiting.extend(asks);
+        Some(state.given)
+    }
+
+    /// Waits until the run has taken in that request, but not for long; whether it has.
+    pub(crate) fn await_taken(&self, number: u64, patience: Duration) -> bool {
+        let state = self.lock();
+        let waits = |state: &mut State| state.taken < number;
+        let waited = self.0.changed.wait_timeout_while(state, patience, waits);
+        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        state.taken >= number
+    }
+
+    /// Whether nothing waits.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lock().waiting.is_empty()
+    }
+
+    /// Everything that waits, as observed at `now`.
+    pub(super) fn fetch(&self, now: &Rational, task: &Task) -> Vec<Observation> {
+        let asks = {
+            let mut state = self.lock();
+            state.fetched = state.given;
+            std::mem::take(&mut state.waiting)
+        };
+        let events = asks.into_iter().filter_map(|ask| match ask {
+            Ask::Request(request) => Some(Event::Asked(request)),
+            Ask::Fact { fact, becomes } => Some(Event::Fact {
+                fact: task.fact_named(&fact)?,
+                truth: becomes,
+            }),
+            Ask::Number { fluent, value } => Some(Event::Value {
+                fluent: task.fluent_named(&fluent)?,
+                value,
+            }),
+        });
+        let time = now.clone();
+        events
+            .map(|event| Observation {
+                time: time.clone(),
+                event,
+            })
+            .collect()
+    }
+
+    /// Whether the run was handed something that it has not recorded yet.
+    pub(crate) fn has_fetched(&self) -> bool {
+        let state = self.lock();
+        state.taken < state.fetched
+    }
+
+    /// What the run was handed is recorded.
+    pub(crate) fn acknowledge(&self) {
+        let mut state = self.lock();
+        state.taken = state.fetched;
+        drop(state);
+        self.0.changed.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Ask, Desk, MOST_WAITING};
+    use elbowroom::execution::Request;
+    use std::time::Duration;
+
+    #[test]
+    fn a_request_is_taken_when_it_was_fetched_and_recorded() {
+        let desk = Desk::default();
+        let number = desk.hand_in(vec![Ask::Request(Request::Pause)]).expect("room");
+        let soon = Duration::from_millis(1);
+        desk.acknowledge();
+        assert!(!desk.await_taken(number, soon), "it was not fetched");
+        desk.lock().fetched = number;
+        assert!(desk.has_fetched());
+        desk.acknowledge();
+        assert!(desk.await_taken(number, soon));
+    }
+
+    #[test]
+    fn a_desk_has_a_limit() {
+        let desk = Desk::default();
+        let taken = (0..2 * MOST_WAITING).filter_map(|_| desk.hand_in(vec![Ask::Request(Request::Pause)]));
+        assert_eq!(taken.count(), MOST_WAITING);
+    }
+}

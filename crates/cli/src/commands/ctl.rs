@@ -1,0 +1,277 @@
+//! `elbowroom ctl`: asks an executive, `docs/serve.md`.
+
+use std::fmt::Write as _;
+
+use elbowroom::answers::Exact;
+use elbowroom::executive::documents::{
+    GivenNumber, GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal,
+    State, StepNow, Taken,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::args::{CtlArgs, CtlCommand};
+use crate::exit::{Answer, Exit, Failure};
+use crate::http::{self, ask};
+use crate::interrupt::Interrupt;
+use crate::look::{STRONG, styled};
+use crate::number::nearest;
+use crate::output::{self, Output};
+use crate::serve::Control;
+use crate::words::{counted, plain, tame};
+
+/// Asks, and prints the answer.
+pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
+    let desk = Desk { arguments };
+    match &arguments.what {
+        CtlCommand::State => desk.show(output, "/v1/state", state),
+        CtlCommand::Plan => desk.show(output, "/v1/plan", plan),
+        CtlCommand::Guarantee => desk.show(output, "/v1/guarantee", guarantee),
+        CtlCommand::Next => desk.show(output, "/v1/next", next),
+        CtlCommand::Events { after } => desk.events(*after),
+        CtlCommand::Openapi => {
+            let (document, _) = desk.ask::<Value>(("GET", "/v1/openapi.json"), None)?;
+            output.json(&document)?;
+            Ok(Exit::Yes)
+        }
+        CtlCommand::Goal { goal, name } => {
+            let (goal, name) = (goal.clone(), name.clone());
+            desk.change(output, ("POST", "/v1/goals"), Some(&NewGoal { name, goal }))
+        }
+        CtlCommand::Cancel { name } => {
+            let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+            if name.is_empty() || !name.bytes().all(is_plain) {
+                return Err(Failure::new(
+                    "this is no name of a goal",
+                    "`elbowroom ctl state` lists the goals with their names",
+                ));
+            }
+            desk.change(output, ("DELETE", &format!("/v1/goals/{name}")), NOTHING)
+        }
+        CtlCommand::Fact { fact, becomes } => {
+            let (fact, becomes) = (fact.clone(), *becomes);
+            desk.change(output, ("POST", "/v1/facts"), Some(&NewFact { fact, becomes }))
+        }
+        CtlCommand::Number { fluent, value } => {
+            let (fluent, value) = (fluent.clone(), GivenNumber(value.clone()));
+            desk.change(output, ("POST", "/v1/numbers"), Some(&NewNumber { fluent, value }))
+        }
+        CtlCommand::Problem { file } => {
+            let problem = crate::input::source(file, "problem")?.text().to_owned();
+            desk.change(output, ("PUT", "/v1/problem"), Some(&NewProblem { problem }))
+        }
+        CtlCommand::Pause => desk.change(output, ("POST", "/v1/pause"), NOTHING),
+        CtlCommand::Resume => desk.change(output, ("POST", "/v1/resume"), NOTHING),
+        CtlCommand::Stop => desk.change(output, ("POST", "/v1/stop"), NOTHING),
+    }
+}
+
+/// No body.
+const NOTHING: Option<&NewFact> = None;
+
+/// Where an executive is asked.
+struct Desk<'a> {
+    arguments: &'a CtlArgs,
+}
+
+impl Desk<'_> {
+    fn unreachable(&self, error: &std::io::Error) -> Failure {
+        Failure::new(
+            format!("cannot ask the executive at {}: {}", self.arguments.to, plain(error)),
+            "`elbowroom serve` says where it listens; --to names another address",
+        )
+    }
+
+    fn asked(&self, what: (&str, &str), body: Option<&str>) -> Result<http::Answer, Failure> {
+        let control = match &self.arguments.token {
+            Some(path) => Some(Control::read(path, Interrupt::default())?),
+            None => None,
+        };
+        let token = control.as_ref().map(Control::token);
+        let answer = ask(&self.arguments.to, what, token, body);
+        answer.map_err(|error| self.unreachable(&error))
+    }
+
+    /// Asks something; the answer, and the same as it came.
+    fn ask<T: DeserializeOwned>(
+        &self,
+        what: (&str, &str),
+        body: Option<&str>,
+    ) -> Result<(T, Value), Failure> {
+        let answer = self.asked(what, body)?;
+        let status = answer.status;
+        let text = answer.text().map_err(|error| self.unreachable(&error))?;
+        if status >= 300 {
+            return Err(match serde_json::from_str::<Refusal>(&text) {
+                Ok(refusal) => Failure::new(tame(&refusal.error), tame(&refusal.help)),
+                Err(_) => self.unlike(&format!("it answers with status {status}")),
+            });
+        }
+        let unlike = |error: serde_json::Error| self.unlike(&error.to_string());
+        let value: Value = serde_json::from_str(&text).map_err(unlike)?;
+        let document = T::deserialize(&value).map_err(unlike)?;
+        Ok((document, value))
+    }
+
+    fn unlike(&self, why: &str) -> Failure {
+        Failure::new(
+            format!("what answers at {} is no executive: {}", self.arguments.to, tame(why)),
+            "`elbowroom serve` says where it listens; --to names another address",
+        )
+    }
+
+    fn show<T: DeserializeOwned>(
+        &self,
+        output: &mut Output,
+        path: &str,
+        words: fn(&T) -> String,
+    ) -> Answer {
+        let (document, value) = self.ask::<T>(("GET", path), None)?;
+        if self.arguments.json {
+            output.json(&value)?;
+        } else {
+            output::print(&words(&document))?;
+        }
+        Ok(Exit::Yes)
+    }
+
+    fn change(
+        &self,
+        output: &mut Output,
+        what: (&str, &str),
+        body: Option<&impl Serialize>,
+    ) -> Answer {
+        let body = body.and_then(|body| serde_json::to_string(body).ok());
+        let (taken, value) = self.ask::<Taken>(what, body.as_deref())?;
+        if self.arguments.json {
+            output.json(&value)?;
+            return Ok(Exit::Yes);
+        }
+        let name = taken.name.map_or(String::new(), |name| format!("{name}: "));
+        output::print(&if taken.taken {
+            format!("{name}done\n")
+        } else {
+            format!("{name}it will be taken in as soon as a plan is made\n")
+        })?;
+        Ok(Exit::Yes)
+    }
+
+    /// Prints each line as it comes.
+    fn events(&self, after: Option<usize>) -> Answer {
+        let path = after.map_or("/v1/events".to_owned(), |after| {
+            format!("/v1/events?after={after}")
+        });
+        let answer = self.asked(("GET", &path), None)?;
+        if answer.status != 200 {
+            return Err(self.unlike(&format!("it answers with status {}", answer.status)));
+        }
+        let mut is_over = false;
+        for line in answer.lines() {
+            let line = line.map_err(|error| self.unreachable(&error))?;
+            is_over |= line == "event: over";
+            if let Some(data) = line.strip_prefix("data: ")
+                && !is_over
+            {
+                output::print(&format!("{data}\n"))?;
+            }
+        }
+        if is_over {
+            return Ok(Exit::Yes);
+        }
+        Err(Failure::new(
+            format!("the executive at {} has gone away", self.arguments.to),
+            "if it has a journal, `elbowroom serve --resume` goes on with it",
+        ))
+    }
+}
+
+fn state(state: &State) -> String {
+    let mut text = format!(
+        "{} at {}, plan {}",
+        styled(STRONG, &state.activity.to_string()),
+        nearest(&state.now.0),
+        state.plans
+    );
+    if let Some(why) = &state.why {
+        let _ = write!(text, ": {}", tame(why));
+    }
+    text.push('\n');
+    for goal in &state.goals {
+        let _ = writeln!(text, "  goal {}: {}", tame(&goal.name), tame(&goal.goal));
+    }
+    for running in &state.running {
+        let _ = write!(text, "  running {} since {}", running.action, nearest(&running.since.0));
+        if let Some(planned) = &running.planned {
+            let _ = write!(text, ", planned {}", nearest(&planned.0));
+        }
+        if let Some(note) = &running.note {
+            let _ = write!(text, ": {}", tame(note));
+        }
+        text.push('\n');
+    }
+    let _ = writeln!(text, "  {}", counted(state.facts.len(), "fact"));
+    for fact in &state.facts {
+        let _ = writeln!(text, "    {fact}");
+    }
+    for number in &state.numbers {
+        let _ = writeln!(text, "    {} = {}", number.fluent, nearest(&number.value.0));
+    }
+    text
+}
+
+fn step(step: &StepNow) -> String {
+    let duration = step.duration.as_ref();
+    let duration = duration.map_or(String::new(), |it| format!(" [{}]", nearest(&it.0)));
+    format!("{:>10}: {}{duration} {}", nearest(&step.start.0), step.action, step.state)
+}
+
+fn plan(plan: &PlanNow) -> String {
+    let mut text = match &plan.since {
+        Some(since) => format!("plan {}, since {}\n", plan.plans, nearest(&since.0)),
+        None => "there is no plan\n".to_owned(),
+    };
+    for own in &plan.steps {
+        let _ = writeln!(text, "{}", step(own));
+    }
+    text
+}
+
+fn guarantee(guarantee: &GuaranteeNow) -> String {
+    let promise = guarantee.promise.as_deref().unwrap_or("none");
+    let mut text = format!("guarantee: {promise}");
+    if let Some(since) = &guarantee.since {
+        let _ = write!(text, ", since {}", nearest(&since.0));
+    }
+    text.push('\n');
+    if let Some(deviation) = &guarantee.deviation {
+        let _ = writeln!(text, "  last deviation: {}", tame(deviation));
+    }
+    let end = |end: &Option<Exact>| end.as_ref().map_or("-".to_owned(), |it| nearest(&it.0));
+    for room in &guarantee.parameters {
+        let _ = writeln!(
+            text,
+            "  {}: planned {}, from {} to {}",
+            room.name,
+            nearest(&room.nominal.0),
+            end(&room.least),
+            end(&room.most)
+        );
+    }
+    text
+}
+
+fn next(next: &NextNow) -> String {
+    let mut text = next.decision.as_deref().unwrap_or("nothing was decided").to_owned();
+    if let Some(until) = &next.until {
+        let _ = write!(text, " until {}", nearest(&until.0));
+    }
+    if let Some(why) = &next.why {
+        let _ = write!(text, ": {}", tame(why));
+    }
+    text.push('\n');
+    if let Some(own) = &next.step {
+        let _ = writeln!(text, "{}", step(own));
+    }
+    text
+}

@@ -1,0 +1,249 @@
+//! `elbowroom serve`: a long-lived executive, `docs/serve.md`.
+
+mod answers;
+mod changes;
+mod front;
+
+use std::cell::OnceCell;
+use std::fmt;
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::execute::{NamedText, RunSpec};
+use elbowroom::executive::Status;
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::report::trace::TraceWriter;
+
+use super::run::resume::{self, Host};
+use super::run::spec;
+use super::run::{Job, checked};
+use crate::args::ServeArgs;
+use crate::attendance::Attendance;
+use crate::exit::{Answer, Exit, Failure};
+use crate::http::{self, Listener};
+use crate::interrupt::Interrupt;
+use crate::output::{self, Output};
+use crate::serve::Control;
+use crate::words::plain;
+use crate::input;
+use front::Front;
+
+/// Executes what is asked for, until it is asked to end.
+pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
+    check(arguments)?;
+    let interrupt = Interrupt::listen();
+    // A token that cannot be read is told before anything is done.
+    control(arguments, &interrupt)?;
+    if let Some(journal) = &arguments.run.resume {
+        let server = Server {
+            arguments,
+            front: OnceCell::new(),
+        };
+        let answer = resume::run(journal, &arguments.run, &server, output);
+        if let Some(front) = server.front.get() {
+            front.close();
+        }
+        return in_order(answer);
+    }
+    let Some(domain) = &arguments.run.domain else {
+        return Err(Failure::new("DOMAIN is missing", "give the domain, in PDDL"));
+    };
+    let domain_text: NamedText = (&input::source(domain, "domain")?).into();
+    let mut front = None;
+    let problem = || match &arguments.run.problem {
+        Some(problem) => Ok((&input::source(problem, "problem")?).into()),
+        None => {
+            let opened = open(arguments, &interrupt, &domain_text)?;
+            let text = opened.await_problem(&interrupt);
+            front = Some(opened);
+            let name = "the problem that was given".to_owned();
+            Ok(NamedText { name, text: text.unwrap_or_default() })
+        }
+    };
+    let (mut spec, world) = spec::of(&arguments.run, domain, problem)?;
+    if front.is_some() && spec.problem.text.is_empty() {
+        // It was asked to end before there was a problem.
+        return Ok(Exit::Yes);
+    }
+    spec.is_lasting = true;
+    if spec.world_process.is_none() && spec.realtime.is_none() {
+        spec.realtime = Some(Rational::ONE);
+        if arguments.run.planning_time.is_none() {
+            spec.planning_time = elbowroom::execution::run::PlanningTime::Measured;
+        }
+    }
+    let knows_one_goal = spec.executor.registered.name == "lookahead";
+    if knows_one_goal || spec.executor.asks_odds() {
+        return Err(Failure::new(
+            format!("`{}` reckons with one goal, and goals change here", spec.executor),
+            "choose another executor, such as guarded or live",
+        ));
+    }
+    let (task, first) = checked(&arguments.run, &spec, world.as_ref(), output)?;
+    let front = match front {
+        Some(front) => front,
+        None => open(arguments, &interrupt, &domain_text)?,
+    };
+    let attendance = begin(&front, &spec, &task)?;
+    let job = Job {
+        spec: &spec,
+        task: &task,
+        first,
+        interrupt: &interrupt,
+        attendance: &attendance,
+    };
+    let answer = job.execute(&arguments.run, output);
+    front.close();
+    in_order(answer)
+}
+
+/// Who runs until told to end has done what was asked when it ends in order.
+fn in_order(answer: Answer) -> Answer {
+    answer.map(|exit| match exit {
+        Exit::Interrupted => Exit::Yes,
+        other => other,
+    })
+}
+
+fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<Control>, Failure> {
+    let token = arguments.token.as_ref();
+    token.map(|path| Control::read(path, interrupt.clone())).transpose()
+}
+
+/// What belongs to `elbowroom run` alone.
+fn check(arguments: &ServeArgs) -> Result<(), Failure> {
+    let run = &arguments.run;
+    let (is_replayed, is_shown) = (run.replay.is_some(), run.serve.is_some());
+    for (is_given, option) in [(is_replayed, "--replay"), (is_shown, "--serve")] {
+        if is_given {
+            return Err(Failure::new(
+                format!("{option} belongs to `elbowroom run`"),
+                "an executive listens at --http, and its journal is gone on with by --resume",
+            ));
+        }
+    }
+    if run.is_spoiled() {
+        return Err(Failure::new(
+            "--world spoiler has no wall clock",
+            "name a world file, or a program with --world-process",
+        ));
+    }
+    Ok(())
+}
+
+/// Listens, and says where.
+fn open(
+    arguments: &ServeArgs,
+    interrupt: &Interrupt,
+    domain: &NamedText,
+) -> Result<Arc<Front>, Failure> {
+    let control = control(arguments, interrupt)?;
+    let address = arguments.http.0;
+    let cannot = |why: &dyn fmt::Display| {
+        Failure::new(
+            format!("cannot listen at {address}: {why}"),
+            "choose another port with --http; with port 0, a free one is taken",
+        )
+    };
+    let listener = TcpListener::bind(address).map_err(|error| cannot(&plain(&error)))?;
+    let own = listener.local_addr().map_err(|error| cannot(&plain(&error)))?;
+    let socket = match &arguments.socket {
+        Some(path) => Some(socket(path)?),
+        None => None,
+    };
+    let has_token = control.is_some();
+    let front = Arc::new(Front::new(control, own, domain));
+    for (listener, is_local_only) in [
+        (Some(Listener::Tcp(listener)), own.ip().is_loopback()),
+        (socket, false),
+    ] {
+        let Some(listener) = listener else { continue };
+        let served = Arc::clone(&front);
+        http::serve(listener, front.clients(), move |request, stream| {
+            served.serve(request, is_local_only, stream)
+        });
+    }
+    let with_token = if has_token {
+        ""
+    } else {
+        "; to be looked at only, as there is no --token"
+    };
+    output::tell(&format!("listening at http://{own}/{with_token}"));
+    if let Some(path) = &arguments.socket {
+        output::tell(&format!("listening at {}", path.display()));
+    }
+    Ok(front)
+}
+
+/// A socket that only its owner can reach. One that nobody listens at any more is replaced.
+#[cfg(unix)]
+fn socket(path: &Path) -> Result<Listener, Failure> {
+    use std::os::unix::fs::PermissionsExt as _;
+    use std::os::unix::net::{UnixListener, UnixStream};
+
+    let cannot = |why: &dyn fmt::Display| {
+        Failure::new(
+            format!("cannot listen at {}: {why}", path.display()),
+            "choose a path in a folder that exists and that you may write to",
+        )
+    };
+    let is_socket = std::fs::symlink_metadata(path)
+        .is_ok_and(|it| std::os::unix::fs::FileTypeExt::is_socket(&it.file_type()));
+    if is_socket {
+        if UnixStream::connect(path).is_ok() {
+            return Err(cannot(&"another program listens there"));
+        }
+        let _ = std::fs::remove_file(path);
+    }
+    let listener = UnixListener::bind(path).map_err(|error| cannot(&plain(&error)))?;
+    let owner_only = std::fs::Permissions::from_mode(0o600);
+    std::fs::set_permissions(path, owner_only).map_err(|error| cannot(&plain(&error)))?;
+    Ok(Listener::Unix(listener))
+}
+
+#[cfg(not(unix))]
+fn socket(path: &Path) -> Result<Listener, Failure> {
+    Err(Failure::new(
+        format!("cannot listen at {}: this system has no such sockets", path.display()),
+        "leave out --socket; --http serves the same",
+    ))
+}
+
+/// From now on there is a run to ask about.
+fn begin(front: &Front, spec: &RunSpec, task: &Arc<Task>) -> Result<Attendance, Failure> {
+    let status = Status::new(task);
+    let board = front.board();
+    let mut header = |line: &str| board.add(line);
+    let written = TraceWriter::new(Arc::clone(task), &mut header).header(spec);
+    written.map_err(|error| Failure::new(format!("cannot show the run: {error}"), ""))?;
+    front.begin(status.clone(), task);
+    Ok(Attendance::by(front.desk().clone(), status, board.clone()))
+}
+
+/// Attends a run that goes on after a crash.
+struct Server<'a> {
+    arguments: &'a ServeArgs,
+    front: OnceCell<Arc<Front>>,
+}
+
+impl Host for Server<'_> {
+    fn attend(
+        &self,
+        spec: &RunSpec,
+        task: &Arc<Task>,
+        interrupt: &Interrupt,
+    ) -> Result<Attendance, Failure> {
+        if !spec.is_lasting {
+            return Err(Failure::new(
+                "this is the journal of a run that ends with its goal",
+                "go on with `elbowroom run --resume`",
+            ));
+        }
+        let front = open(self.arguments, interrupt, &spec.domain)?;
+        let attendance = begin(&front, spec, task);
+        let _ = self.front.set(front);
+        attendance
+    }
+}

@@ -1,0 +1,218 @@
+//! Requests that change something: checked here, in the thread of the client, and taken in by the run
+//! when it next looks.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use elbowroom::execute::read_goal;
+use elbowroom::execution::Request;
+use elbowroom::execution::run::FIRST_GOAL;
+use elbowroom::executive::documents::{
+    Activity, NewFact, NewGoal, NewNumber, NewProblem, State, Taken,
+};
+use elbowroom::executive::goal_text;
+use elbowroom::model::{Problem, Task};
+use elbowroom::pddl::{self, Source};
+use serde::de::DeserializeOwned;
+
+use super::front::{Front, Refused};
+use crate::attendance::Ask;
+
+/// How long a client waits for the run to take its request in; afterwards it is told that it will.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// The longest name of a goal, in bytes.
+const LONGEST_NAME: usize = 64;
+
+impl Front {
+    /// Does what is asked for.
+    pub(super) fn change(&self, verb: &str, path: &str, body: &[u8]) -> Result<Taken, Refused> {
+        match (verb, path) {
+            ("PUT", "/v1/problem") => self.problem(read(body)?),
+            ("POST", "/v1/goals") => self.goal(read(body)?),
+            ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
+            ("POST", "/v1/facts") => self.fact(read(body)?),
+            ("POST", "/v1/numbers") => self.number(read(body)?),
+            ("POST", "/v1/pause") => self.hand_in(vec![Ask::Request(Request::Pause)], None),
+            ("POST", "/v1/resume") => self.hand_in(vec![Ask::Request(Request::Resume)], None),
+            _ => {
+                self.stop();
+                Ok(Taken { taken: true, name: None })
+            }
+        }
+    }
+
+    /// Hands requests in, in this order, and waits a little for the run to take them in.
+    fn hand_in(&self, asks: Vec<Ask>, name: Option<String>) -> Result<Taken, Refused> {
+        let (status, _) = self.run()?;
+        if status.state().activity == Activity::Over {
+            return Err(Refused::new(409, "the executive has ended", "start another one"));
+        }
+        let full = || {
+            let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
+            Refused::new(503, "too many requests wait for the executive", help)
+        };
+        let number = self.desk().hand_in(asks).ok_or_else(full)?;
+        let taken = self.desk().await_taken(number, PATIENCE);
+        Ok(Taken { taken, name })
+    }
+
+    fn goal(&self, given: NewGoal) -> Result<Taken, Refused> {
+        let (status, task) = self.run()?;
+        let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
+        let read = read_goal(task, &given.goal);
+        read.map_err(|why| Refused::new(422, why, help))?;
+        let name = match given.name {
+            Some(name) => named(name)?,
+            None => {
+                let open = status.goals();
+                loop {
+                    let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
+                    let name = format!("goal-{number}");
+                    if !open.contains(&name) {
+                        break name;
+                    }
+                }
+            }
+        };
+        let goal = given.goal.trim().to_owned();
+        let request = Request::Pursue { name: name.clone(), goal };
+        self.hand_in(vec![Ask::Request(request)], Some(name))
+    }
+
+    fn abandon(&self, name: &str) -> Result<Taken, Refused> {
+        let open = self.run()?.0.goals();
+        // What waits to be taken in may be the goal.
+        if !open.iter().any(|known| known == name) && self.desk().is_empty() {
+            let help = match open.as_slice() {
+                [] => "no goals are open".to_owned(),
+                open => format!("these are open: {}", open.join(", ")),
+            };
+            return Err(Refused::new(404, "no goal of that name is open", help));
+        }
+        let name = name.to_owned();
+        let request = Request::Abandon { name: name.clone() };
+        self.hand_in(vec![Ask::Request(request)], Some(name))
+    }
+
+    fn fact(&self, given: NewFact) -> Result<Taken, Refused> {
+        let (_, task) = self.run()?;
+        let help = "write it as the problem does, such as (at rover base)";
+        let unknown = || {
+            let error = format!("the problem has no fact `{}`", given.fact.escape_debug());
+            Refused::new(422, error, help)
+        };
+        let fact = task.fact_named(&given.fact).ok_or_else(unknown)?;
+        if task.is_derived(fact) {
+            let error = format!("`{}` follows from other facts", given.fact);
+            return Err(Refused::new(422, error, "say those instead"));
+        }
+        let (fact, becomes) = (task.fact_name(fact), given.becomes);
+        self.hand_in(vec![Ask::Fact { fact, becomes }], None)
+    }
+
+    fn number(&self, given: NewNumber) -> Result<Taken, Refused> {
+        let (_, task) = self.run()?;
+        let unknown = || {
+            let error = format!("the problem has no fluent `{}`", given.fluent.escape_debug());
+            Refused::new(422, error, "write it as the problem does, such as (charge rover)")
+        };
+        let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
+        let (fluent, value) = (task.fluent_name(fluent), given.value.0);
+        self.hand_in(vec![Ask::Number { fluent, value }], None)
+    }
+
+    /// The first problem begins the run. A later one is a new situation for the same objects.
+    fn problem(&self, given: NewProblem) -> Result<Taken, Refused> {
+        let domain = self.domain.source();
+        let read = pddl::read_problem(&domain, &Source::new("the problem", given.problem.as_str()));
+        let (problem, _) = read.map_err(|mistakes| {
+            let first = mistakes.errors().next().map(ToString::to_string);
+            let help = "`elbowroom check DOMAIN PROBLEM` lists all mistakes";
+            Refused::new(422, first.unwrap_or_default(), help)
+        })?;
+        let Ok((status, task)) = self.run() else {
+            self.set_problem(given.problem)?;
+            return Ok(Taken { taken: true, name: None });
+        };
+        let state = status.state();
+        check_further(&problem, task, &state)?;
+        self.hand_in(turned(&Task::new(problem), task, &state), None)
+    }
+}
+
+/// Whether a running executive can turn to another problem.
+fn check_further(problem: &Problem, task: &Task, state: &State) -> Result<(), Refused> {
+    if problem.objects != task.problem().objects {
+        return Err(Refused::new(
+            409,
+            "this problem has other objects than the one that is executed",
+            "stop the executive, and start one for this problem",
+        ));
+    }
+    if !problem.timed.is_empty() {
+        return Err(Refused::new(
+            409,
+            "a problem with timed initials can only be the first one",
+            "leave them out, or start another executive",
+        ));
+    }
+    if !state.running.is_empty() {
+        return Err(Refused::new(
+            409,
+            "actions are under way, and what they do is no part of this problem",
+            "pause, wait until they have ended, and give it again; or give goals and facts",
+        ));
+    }
+    Ok(())
+}
+
+/// What is to be said so that things are as that problem has them, and its goal is the goal.
+fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
+    let mut asks = Vec::new();
+    let named = |fact: &_| new.fact_name(*fact);
+    let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
+    let is_derived = |fact: &str| task.fact_named(fact).is_none_or(|fact| task.is_derived(fact));
+    let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
+    for fact in gone.filter(|fact| !is_derived(fact)) {
+        let (fact, becomes) = (fact.clone(), false);
+        asks.push(Ask::Fact { fact, becomes });
+    }
+    for fact in facts {
+        let becomes = true;
+        asks.push(Ask::Fact { fact, becomes });
+    }
+    for (fluent, value) in &new.initial().values {
+        let (fluent, value) = (new.fluent_name(*fluent), value.clone());
+        asks.push(Ask::Number { fluent, value });
+    }
+    for goal in &state.goals {
+        let name = goal.name.clone();
+        asks.push(Ask::Request(Request::Abandon { name }));
+    }
+    let (name, goal) = (FIRST_GOAL.to_owned(), goal_text(new));
+    asks.push(Ask::Request(Request::Pursue { name, goal }));
+    asks
+}
+
+/// A name that can stand in a path.
+fn named(name: String) -> Result<String, Refused> {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
+    if name.is_empty() || name.len() > LONGEST_NAME || !name.bytes().all(is_plain) {
+        return Err(Refused::new(
+            422,
+            "this is no name for a goal",
+            "use up to 64 letters, digits, and `-`, `_` or `.`",
+        ));
+    }
+    Ok(name)
+}
+
+/// Reads a body.
+fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refused> {
+    serde_json::from_slice(body).map_err(|error| {
+        let help = "GET /v1/openapi.json says what belongs into it";
+        Refused::new(422, format!("the body cannot be read: {error}"), help)
+    })
+}

@@ -1,0 +1,263 @@
+//! Where clients are received: what they want, and whether they may.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU64, AtomicUsize};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+use elbowroom::execute::NamedText;
+use elbowroom::executive::documents::Refusal;
+use elbowroom::executive::{METHODS, Status, openapi};
+use elbowroom::model::Task;
+use serde::Serialize;
+
+use crate::attendance::Desk;
+use crate::http::{Misunderstood, Request, Stream, respond, respond_with_events};
+use crate::interrupt::Interrupt;
+use crate::serve::{Board, Control, is_local_name};
+
+const JSON: &str = "application/json";
+const TEXT: &str = "text/plain; charset=utf-8";
+const HTML: &str = "text/html; charset=utf-8";
+
+/// How often it is looked whether the executive was asked to end.
+const GLANCE: Duration = Duration::from_millis(100);
+
+/// Why a request is refused: a status, what is wrong, and what to do.
+pub(super) struct Refused(pub(super) u16, pub(super) String, pub(super) String);
+
+impl Refused {
+    pub(super) fn new(status: u16, error: impl Into<String>, help: impl Into<String>) -> Self {
+        Self(status, error.into(), help.into())
+    }
+}
+
+/// Everything that clients can reach.
+pub(super) struct Front {
+    control: Option<Control>,
+    own: SocketAddr,
+    pub(super) domain: NamedText,
+    desk: Desk,
+    board: Board,
+    /// The run, once there is a problem; its task has a table of its own, so that what clients
+    /// mention is not what the run does.
+    run: OnceLock<(Status, Task)>,
+    problem: Mutex<Option<String>>,
+    has_problem: Condvar,
+    clients: Arc<AtomicUsize>,
+    /// How many goals were named here.
+    pub(super) named: AtomicU64,
+}
+
+impl Front {
+    pub(super) fn new(control: Option<Control>, own: SocketAddr, domain: &NamedText) -> Self {
+        Self {
+            control,
+            own,
+            domain: domain.clone(),
+            desk: Desk::default(),
+            board: Board::default(),
+            run: OnceLock::new(),
+            problem: Mutex::default(),
+            has_problem: Condvar::new(),
+            clients: Arc::default(),
+            named: AtomicU64::new(0),
+        }
+    }
+
+    pub(super) fn clients(&self) -> &Arc<AtomicUsize> {
+        &self.clients
+    }
+
+    pub(super) fn desk(&self) -> &Desk {
+        &self.desk
+    }
+
+    pub(super) fn board(&self) -> &Board {
+        &self.board
+    }
+
+    /// From now on there is a run.
+    pub(super) fn begin(&self, status: Status, task: &Task) {
+        let _ = self.run.set((status, task.with_own_table()));
+    }
+
+    /// The run and its task, if there is one already.
+    pub(super) fn run(&self) -> Result<&(Status, Task), Refused> {
+        let waiting = "the executive has no problem yet";
+        let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
+        self.run.get().ok_or_else(|| Refused::new(409, waiting, help))
+    }
+
+    /// The run is over: clients have a moment to hear of it.
+    pub(super) fn close(&self) {
+        self.board.close();
+    }
+
+    /// Waits for a problem; `None` if the executive is asked to end before.
+    pub(super) fn await_problem(&self, interrupt: &Interrupt) -> Option<String> {
+        let mut problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner);
+        while problem.is_none() && !interrupt.is_requested() {
+            let waited = self.has_problem.wait_timeout(problem, GLANCE);
+            problem = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        problem.clone()
+    }
+
+    /// Takes the first problem.
+    pub(super) fn set_problem(&self, text: String) -> Result<(), Refused> {
+        let mut problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner);
+        if problem.is_some() {
+            let help = "ask again in a moment; `elbowroom ctl state` says how things stand";
+            return Err(Refused::new(409, "another problem has just been given", help));
+        }
+        *problem = Some(text);
+        self.has_problem.notify_all();
+        Ok(())
+    }
+
+    /// Serves a client. `is_local_only` is whether only this machine should reach it.
+    pub(super) fn serve(
+        &self,
+        request: Result<Request, Misunderstood>,
+        is_local_only: bool,
+        stream: &mut Stream,
+    ) -> io::Result<()> {
+        let request = match request {
+            Ok(request) => request,
+            Err(Misunderstood(status, why)) => {
+                let help = "docs/serve.md says what an executive understands";
+                return refuse(stream, &Refused::new(status, why, help));
+            }
+        };
+        let is_own = |host: &str| is_local_name(host);
+        if is_local_only && !request.header("host").is_some_and(is_own) {
+            let error = format!("this is not the page of that host; {} is", self.own);
+            return refuse(stream, &Refused::new(403, error, "use the address itself"));
+        }
+        match self.answer(&request, stream) {
+            Ok(told) => told,
+            Err(refused) => refuse(stream, &refused),
+        }
+    }
+
+    fn answer(&self, request: &Request, stream: &mut Stream) -> Result<io::Result<()>, Refused> {
+        let broken = |why: String| Refused::new(500, why, "this is a bug; please report it");
+        Ok(match (request.verb.as_str(), request.path.as_str()) {
+            ("GET", "/") => {
+                self.run()?;
+                respond(stream, 200, HTML, &self.board.page().map_err(broken)?)
+            }
+            ("GET", "/document") => {
+                self.run()?;
+                respond(stream, 200, JSON, &self.board.document().map_err(broken)?)
+            }
+            ("GET", "/events") => {
+                let begun = respond_with_events(stream);
+                begun.and_then(|()| self.board.tell_changes(stream))
+            }
+            ("GET", "/v1/events") => {
+                let after = first_line(request)?;
+                let begun = respond_with_events(stream);
+                begun.and_then(|()| self.board.tell_lines(after, stream))
+            }
+            ("POST", "/stop") => {
+                self.allow(request)?;
+                self.stop();
+                respond(stream, 202, TEXT, "The executive is being stopped.\n")
+            }
+            ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
+            ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
+            ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.0.plan())),
+            ("GET", "/v1/guarantee") => {
+                respond(stream, 200, JSON, &text(&self.run()?.0.guarantee()))
+            }
+            ("GET", "/v1/next") => respond(stream, 200, JSON, &text(&self.run()?.0.next())),
+            ("GET", path) => return Err(no_such(path, "GET")),
+            (verb, path) => {
+                if !is_known(verb, path) {
+                    return Err(no_such(path, verb));
+                }
+                self.allow(request)?;
+                let taken = self.change(verb, path, &request.body)?;
+                let status = if taken.taken { 200 } else { 202 };
+                respond(stream, status, JSON, &text(&taken))
+            }
+        })
+    }
+
+    /// Whether the client may change something.
+    fn allow(&self, request: &Request) -> Result<(), Refused> {
+        match (&self.control, request.header("authorization")) {
+            (None, _) => Err(Refused::new(
+                403,
+                "this executive can only be looked at",
+                "start it with --token FILE",
+            )),
+            (Some(control), Some(given)) if control.is_known_to(given) => Ok(()),
+            (Some(_), given) => Err(Refused::new(
+                401,
+                match given {
+                    Some(_) => "this is not the token",
+                    None => "this takes the executive's token",
+                },
+                "`elbowroom ctl --token FILE`, or the header `Authorization: Bearer TOKEN`",
+            )),
+        }
+    }
+
+    pub(super) fn stop(&self) {
+        if let Some(control) = &self.control {
+            control.stop();
+        }
+    }
+}
+
+/// Behind which line of the trace a client wants to hear: the one it names, or has heard last.
+fn first_line(request: &Request) -> Result<Option<usize>, Refused> {
+    let mut members = request.query.split('&');
+    let asked = members.find_map(|member| member.strip_prefix("after="));
+    let number = asked.or_else(|| request.header("last-event-id"));
+    let number = number.map(str::parse::<usize>).transpose();
+    number.map_err(|_| {
+        let help = "for example /v1/events?after=0 for all lines";
+        Refused::new(422, "`after` is no number of a line", help)
+    })
+}
+
+/// Whether there is such a request.
+fn is_known(verb: &str, path: &str) -> bool {
+    METHODS.iter().any(|method| verb == method.verb && is_path(path, method.path))
+}
+
+fn is_path(path: &str, pattern: &str) -> bool {
+    match pattern.strip_suffix("{name}") {
+        Some(head) => path.strip_prefix(head).is_some_and(|name| !name.is_empty()),
+        None => path == pattern,
+    }
+}
+
+fn no_such(path: &str, verb: &str) -> Refused {
+    let mut own = METHODS.iter().filter(|method| is_path(path, method.path));
+    let help = "GET /v1/openapi.json lists what can be asked";
+    match own.next() {
+        Some(method) => {
+            let error = format!("{path} is not for {verb}, but for {}", method.verb);
+            Refused::new(405, error, help)
+        }
+        None => Refused::new(404, "there is nothing at this path", help),
+    }
+}
+
+fn refuse(stream: &mut Stream, Refused(status, error, help): &Refused) -> io::Result<()> {
+    let (error, help) = (error.clone(), help.clone());
+    respond(stream, *status, JSON, &text(&Refusal { error, help }))
+}
+
+/// A document as text, with a line feed.
+fn text(document: &impl Serialize) -> String {
+    let mut text = serde_json::to_string(document).unwrap_or_else(|_| "null".to_owned());
+    text.push('\n');
+    text
+}

@@ -1,0 +1,221 @@
+//! As much of HTTP/1.1 as an executive and its client need, over TCP and Unix sockets: one request
+//! a connection, bodies of a known length, and limits on everything.
+
+mod client;
+mod stream;
+
+use std::collections::BTreeMap;
+use std::io::{self, Read as _, Write as _};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+pub(crate) use client::{Answer, Target, ask};
+pub(crate) use stream::{Listener, Stream};
+
+use crate::clock::Clock;
+
+/// The limit on clients that are served at once; others are asked to come back.
+const MOST_CLIENTS: usize = 64;
+
+/// How long a client has to say what it wants.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// How long a client may take to read a piece of its answer.
+const READING_TIME: Duration = Duration::from_secs(10);
+
+/// The limit on the first line and the headers, in bytes.
+const LONGEST_HEAD: usize = 16 << 10;
+
+/// The limit on a body, in bytes.
+pub(crate) const LONGEST_BODY: usize = 4 << 20;
+
+/// What a client wants.
+#[derive(Debug, Default)]
+pub(crate) struct Request {
+    pub(crate) verb: String,
+    /// Without the query.
+    pub(crate) path: String,
+    pub(crate) query: String,
+    /// By name, in lower case.
+    headers: BTreeMap<String, String>,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Request {
+    /// The value of a header; its name in lower case.
+    pub(crate) fn header(&self, name: &str) -> Option<&str> {
+        self.headers.get(name).map(String::as_str)
+    }
+}
+
+/// Why a client is not understood: a status and a sentence.
+pub(crate) struct Misunderstood(pub(crate) u16, pub(crate) &'static str);
+
+/// Serves clients, each in a thread of its own, until the program ends.
+pub(crate) fn serve(
+    listener: Listener,
+    clients: &Arc<AtomicUsize>,
+    handler: impl Fn(Result<Request, Misunderstood>, &mut Stream) -> io::Result<()> + Send + Sync + 'static,
+) {
+    let (clients, handler) = (Arc::clone(clients), Arc::new(handler));
+    thread::spawn(move || {
+        loop {
+            let Ok(mut stream) = listener.accept() else {
+                // Out of file descriptors, perhaps: others will be closed.
+                thread::sleep(Duration::from_millis(50));
+                continue;
+            };
+            let (clients, handler) = (Arc::clone(&clients), Arc::clone(&handler));
+            let is_too_many = clients.fetch_add(1, Ordering::SeqCst) >= MOST_CLIENTS;
+            let served = thread::Builder::new().spawn({
+                let clients = Arc::clone(&clients);
+                move || {
+                    let _ = stream.set_write_timeout(READING_TIME);
+                    let request = if is_too_many {
+                        Err(Misunderstood(503, "too many clients; come back later"))
+                    } else {
+                        read(&mut stream)
+                    };
+                    // A client that has gone away needs no answer.
+                    let _ = handler(request, &mut stream);
+                    stream.close();
+                    clients.fetch_sub(1, Ordering::SeqCst);
+                }
+            });
+            if served.is_err() {
+                clients.fetch_sub(1, Ordering::SeqCst);
+            }
+        }
+    });
+}
+
+const CUT_OFF: Misunderstood = Misunderstood(400, "the request ends in the middle");
+
+/// Reads a request.
+fn read(stream: &mut Stream) -> Result<Request, Misunderstood> {
+    let clock = Clock::start();
+    let mut text = Vec::new();
+    let end = loop {
+        if let Some(end) = text.windows(4).position(|bytes| bytes == b"\r\n\r\n") {
+            break end;
+        }
+        if text.len() > LONGEST_HEAD {
+            return Err(Misunderstood(431, "the headers are longer than 16 KB"));
+        }
+        if more(stream, &mut text, &clock)? == 0 {
+            return Err(CUT_OFF);
+        }
+    };
+    let body = text.split_off(end + 4);
+    let head = String::from_utf8(text);
+    let head = head.map_err(|_| Misunderstood(400, "the headers are not UTF-8"))?;
+    let mut request = head_of(&head)?;
+    request.body = body;
+    if request.header("transfer-encoding").is_some() {
+        return Err(Misunderstood(411, "a body needs a Content-Length; it cannot come in chunks"));
+    }
+    let length = match request.header("content-length") {
+        None => 0,
+        Some(length) => {
+            let length = length.parse::<usize>();
+            length.map_err(|_| Misunderstood(400, "the Content-Length is no number"))?
+        }
+    };
+    if length > LONGEST_BODY {
+        return Err(Misunderstood(413, "the body is longer than 4 MB"));
+    }
+    if request.header("expect").is_some() {
+        let _ = stream.write_all(b"HTTP/1.1 100 Continue\r\n\r\n");
+    }
+    while request.body.len() < length {
+        if more(stream, &mut request.body, &clock)? == 0 {
+            return Err(CUT_OFF);
+        }
+    }
+    request.body.truncate(length);
+    Ok(request)
+}
+
+/// Reads what there is, within the client's time.
+fn more(stream: &mut Stream, text: &mut Vec<u8>, clock: &Clock) -> Result<usize, Misunderstood> {
+    let late = Misunderstood(408, "the request was not complete after 5 seconds");
+    let left = PATIENCE.saturating_sub(clock.elapsed());
+    if left.is_zero() || stream.set_read_timeout(left).is_err() {
+        return Err(late);
+    }
+    let mut bytes = [0; 8192];
+    let count = stream.read(&mut bytes).map_err(|_| late)?;
+    text.extend_from_slice(&bytes[..count]);
+    Ok(count)
+}
+
+fn head_of(head: &str) -> Result<Request, Misunderstood> {
+    let nonsense = || Misunderstood(400, "this is not HTTP");
+    let mut lines = head.split("\r\n");
+    let mut words = lines.next().unwrap_or_default().split(' ');
+    let (Some(verb), Some(target), Some(version), None) =
+        (words.next(), words.next(), words.next(), words.next())
+    else {
+        return Err(nonsense());
+    };
+    if !version.starts_with("HTTP/1.") || !target.starts_with('/') {
+        return Err(nonsense());
+    }
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let mut request = Request {
+        verb: verb.to_owned(),
+        path: path.to_owned(),
+        query: query.to_owned(),
+        ..Request::default()
+    };
+    for line in lines.filter(|line| !line.is_empty()) {
+        let (name, value) = line.split_once(':').ok_or_else(nonsense)?;
+        let (name, value) = (name.to_ascii_lowercase(), value.trim().to_owned());
+        request.headers.insert(name, value);
+    }
+    Ok(request)
+}
+
+/// Sends an answer.
+pub(crate) fn respond(stream: &mut Stream, status: u16, kind: &str, text: &str) -> io::Result<()> {
+    let head = format!(
+        "HTTP/1.1 {status} {}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\
+         Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
+        phrase(status),
+        text.len()
+    );
+    stream.write_all(head.as_bytes())?;
+    stream.write_all(text.as_bytes())?;
+    stream.flush()
+}
+
+/// Begins an answer that goes on: a stream of events.
+pub(crate) fn respond_with_events(stream: &mut Stream) -> io::Result<()> {
+    stream.write_all(
+        b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
+          X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
+    )?;
+    stream.flush()
+}
+
+fn phrase(status: u16) -> &'static str {
+    match status {
+        200 => "OK",
+        202 => "Accepted",
+        400 => "Bad Request",
+        401 => "Unauthorized",
+        403 => "Forbidden",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        408 => "Request Timeout",
+        409 => "Conflict",
+        411 => "Length Required",
+        413 => "Content Too Large",
+        422 => "Unprocessable Content",
+        431 => "Request Header Fields Too Large",
+        503 => "Service Unavailable",
+        _ => "Internal Server Error",
+    }
+}

@@ -1,0 +1,222 @@
+//! An executive that was started, and a client that knows nothing of the command.
+
+use std::fs;
+use std::io::{BufRead as _, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::command::root;
+
+pub(crate) const TOKEN: &str = "a-token-of-some-length";
+
+/// How long anything may take.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A folder that no other test uses.
+pub(crate) fn folder(name: &str) -> PathBuf {
+    let name = format!("elbowroom-{}-{name}", std::process::id());
+    let folder = std::env::temp_dir().join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir(&folder).expect("a folder can be made");
+    folder
+}
+
+/// An executive.
+pub(crate) struct Executive {
+    child: Option<Child>,
+    folder: PathBuf,
+    port: u16,
+}
+
+impl Drop for Executive {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+impl Executive {
+    /// One whose token, socket and trace are in `folder`.
+    pub(crate) fn start(folder: &Path, line: &[&str]) -> Self {
+        let token = folder.join("token");
+        fs::write(&token, TOKEN).expect("written");
+        let token = token.display().to_string();
+        Self::launch(folder, &[line, &["--token", &token]].concat())
+    }
+
+    pub(crate) fn without_token(folder: &Path, line: &[&str]) -> Self {
+        Self::launch(folder, line)
+    }
+
+    fn launch(folder: &Path, line: &[&str]) -> Self {
+        let file = |name: &str| folder.join(name).display().to_string();
+        let (socket, trace) = (file("socket"), file("trace.jsonl"));
+        let has_journal = line.iter().any(|it| ["--journal", "--resume"].contains(it));
+        let kept = ["--trace", &trace];
+        let kept: &[&str] = if has_journal { &[] } else { &kept };
+        let mut child = Command::new(env!("CARGO_BIN_EXE_elbowroom"))
+            .current_dir(root())
+            .env("NO_COLOR", "1")
+            .args(["serve", "--http", "0", "--socket", &socket])
+            .args(line)
+            .args(kept)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the command can be started");
+        let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
+        let mut text = String::new();
+        let port = loop {
+            let before = text.len();
+            let count = said.read_line(&mut text).expect("UTF-8");
+            assert!(count > 0, "it does not listen: {text}");
+            let port = text[before..].split("127.0.0.1:").nth(1);
+            if let Some(port) = port.and_then(|it| it.split('/').next()) {
+                break port.parse().expect("a port");
+            }
+        };
+        // Whatever else it says must not fill the pipe.
+        std::thread::spawn(move || {
+            let mut rest = String::new();
+            let _ = said.read_to_string(&mut rest);
+        });
+        Self {
+            child: Some(child),
+            folder: folder.to_owned(),
+            port,
+        }
+    }
+
+    pub(crate) fn address(&self) -> String {
+        format!("127.0.0.1:{}", self.port)
+    }
+
+    pub(crate) fn socket(&self) -> String {
+        self.folder.join("socket").display().to_string()
+    }
+
+    pub(crate) fn token(&self) -> String {
+        self.folder.join("token").display().to_string()
+    }
+
+    pub(crate) fn kill(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+
+    /// Waits for its end.
+    pub(crate) fn end(&mut self) -> Output {
+        let mut child = self.child.take().expect("it runs");
+        let begun = Instant::now();
+        while begun.elapsed() < PATIENCE {
+            if child.try_wait().expect("it can be asked").is_some() {
+                return child.wait_with_output().expect("its output");
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let _ = child.kill();
+        panic!("it does not end");
+    }
+
+    pub(crate) fn ctl(&self, line: &[&str]) -> Output {
+        crate::command::elbowroom(&[&["ctl"], line].concat())
+    }
+
+    pub(crate) fn get(&self, path: &str) -> (u16, Value) {
+        self.ask("GET", path, None, "")
+    }
+
+    pub(crate) fn get_by_socket(&self, path: &str) -> (u16, Value) {
+        let stream = UnixStream::connect(self.socket()).expect("it listens");
+        talk(stream, "GET", path, None, "")
+    }
+
+    pub(crate) fn post(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.ask("POST", path, Some(TOKEN), &body.to_string())
+    }
+
+    pub(crate) fn put(&self, path: &str, body: &Value) -> (u16, Value) {
+        self.ask("PUT", path, Some(TOKEN), &body.to_string())
+    }
+
+    pub(crate) fn delete(&self, path: &str) -> (u16, Value) {
+        self.ask("DELETE", path, Some(TOKEN), "")
+    }
+
+    pub(crate) fn ask(
+        &self,
+        verb: &str,
+        path: &str,
+        token: Option<&str>,
+        body: &str,
+    ) -> (u16, Value) {
+        let stream = TcpStream::connect(self.address()).expect("it listens");
+        talk(stream, verb, path, token, body)
+    }
+
+    /// The page.
+    pub(crate) fn page(&self) -> String {
+        let stream = TcpStream::connect(self.address()).expect("it listens");
+        let (status, text) = said(stream, "GET", "/", None, "");
+        assert_eq!(status, 200, "{text}");
+        text
+    }
+
+    /// Waits until things stand like that.
+    #[track_caller]
+    pub(crate) fn await_state(&self, is_so: impl Fn(&Value) -> bool) -> Value {
+        let begun = Instant::now();
+        loop {
+            let (status, state) = self.get("/v1/state");
+            if status == 200 && is_so(&state) {
+                return state;
+            }
+            assert!(begun.elapsed() < PATIENCE, "it stays like this: {state}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    pub(crate) fn trace_lines(&self) -> Vec<Value> {
+        let text = fs::read_to_string(self.folder.join("trace.jsonl")).expect("a trace");
+        let lines = text.lines().map(serde_json::from_str);
+        lines.collect::<Result<_, _>>().expect("JSON")
+    }
+}
+
+fn talk(
+    stream: impl Read + Write,
+    verb: &str,
+    path: &str,
+    token: Option<&str>,
+    body: &str,
+) -> (u16, Value) {
+    let (status, text) = said(stream, verb, path, token, body);
+    let value = serde_json::from_str(&text);
+    (status, value.unwrap_or_else(|_| Value::String(text)))
+}
+
+fn said(
+    mut stream: impl Read + Write,
+    verb: &str,
+    path: &str,
+    token: Option<&str>,
+    body: &str,
+) -> (u16, String) {
+    let token = token.map_or(String::new(), |it| format!("Authorization: Bearer {it}\r\n"));
+    let length = body.len();
+    let request = format!(
+        "{verb} {path} HTTP/1.1\r\nHost: localhost\r\n{token}Content-Length: {length}\r\n\r\n{body}"
+    );
+    stream.write_all(request.as_bytes()).expect("it reads");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("it answers");
+    let (head, text) = answer.split_once("\r\n\r\n").expect("HTTP");
+    let status = head.split(' ').nth(1).expect("HTTP");
+    (status.parse().expect("a status"), text.to_owned())
+}

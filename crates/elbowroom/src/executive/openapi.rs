@@ -1,0 +1,211 @@
+//! The interface as an `OpenAPI` document.
+
+use serde_json::{Map, Value, json};
+
+use super::documents::{
+    GuaranteeNow, NewFact, NewGoal, NewNumber, NewProblem, NextNow, PlanNow, Refusal, State, Taken,
+};
+use super::schema::Described;
+
+/// Something that can be asked of an executive.
+pub struct Method {
+    /// `GET`, `POST`, `PUT` or `DELETE`.
+    pub verb: &'static str,
+    /// The path; `{name}` stands for a part of it.
+    pub path: &'static str,
+    /// What it is for.
+    pub about: &'static str,
+    body: Option<Schema>,
+    answer: Answer,
+}
+
+type Schema = fn(&mut Map<String, Value>) -> Value;
+
+enum Answer {
+    Json(Schema),
+    Other(&'static str, &'static str),
+}
+
+impl Method {
+    /// Whether it changes something, for which a token is needed.
+    pub fn changes(&self) -> bool {
+        self.verb != "GET"
+    }
+}
+
+const fn get(path: &'static str, about: &'static str, answer: Answer) -> Method {
+    Method {
+        verb: "GET",
+        path,
+        about,
+        body: None,
+        answer,
+    }
+}
+
+const fn change(
+    verb: &'static str,
+    path: &'static str,
+    about: &'static str,
+    body: Option<Schema>,
+) -> Method {
+    Method {
+        verb,
+        path,
+        about,
+        body,
+        answer: Answer::Json(Taken::schema),
+    }
+}
+
+/// Everything that can be asked of an executive.
+pub const METHODS: &[Method] = &[
+    get("/v1/state", "How things stand", Answer::Json(State::schema)),
+    get("/v1/plan", "The plan, and what became of its actions", Answer::Json(PlanNow::schema)),
+    get(
+        "/v1/guarantee",
+        "What is still guaranteed, and how far each quantity may deviate",
+        Answer::Json(GuaranteeNow::schema),
+    ),
+    get("/v1/next", "What is next, and why", Answer::Json(NextNow::schema)),
+    get(
+        "/v1/events",
+        "Every line of the trace from now on, as server-sent events; with `?after=N`, or the header \
+         Last-Event-ID, those behind line N",
+        Answer::Other("text/event-stream", "Events named `entry`; `over` when there are no more"),
+    ),
+    get(
+        "/v1/openapi.json",
+        "This description",
+        Answer::Other("application/json", "An OpenAPI document"),
+    ),
+    change(
+        "PUT",
+        "/v1/problem",
+        "A problem, for an executive that was started without one",
+        Some(NewProblem::schema),
+    ),
+    change("POST", "/v1/goals", "Another goal, which is to be reached, too", Some(NewGoal::schema)),
+    change("DELETE", "/v1/goals/{name}", "That goal is abandoned", None),
+    change("POST", "/v1/facts", "A fact is so from now on", Some(NewFact::schema)),
+    change("POST", "/v1/numbers", "A number is so from now on", Some(NewNumber::schema)),
+    change(
+        "POST",
+        "/v1/pause",
+        "Nothing more is started; what is under way goes on",
+        None,
+    ),
+    change("POST", "/v1/resume", "The end of a pause", None),
+    change("POST", "/v1/stop", "The executive ends: what is under way is cancelled", None),
+];
+
+/// The interface as a document of `OpenAPI` 3.1.
+pub fn openapi() -> Value {
+    let mut schemas = Map::new();
+    let refusal = Refusal::schema(&mut schemas);
+    let mut paths = Map::new();
+    for method in METHODS {
+        let (kind, answer) = match &method.answer {
+            Answer::Json(schema) => ("application/json", json!({ "schema": schema(&mut schemas) })),
+            Answer::Other(kind, about) => {
+                (*kind, json!({ "schema": { "type": "string", "description": about } }))
+            }
+        };
+        let mut content = Map::new();
+        content.insert(kind.to_owned(), answer);
+        let mut operation = json!({
+            "summary": method.about,
+            "responses": {
+                "200": { "description": "Done", "content": content.clone() },
+                "default": {
+                    "description": "Refused",
+                    "content": { "application/json": { "schema": refusal.clone() } },
+                },
+            },
+        });
+        if method.changes() {
+            operation["responses"]["202"] = json!({
+                "description": "It has come in, but is not taken in yet: a plan is being made",
+                "content": content,
+            });
+            operation["security"] = json!([{ "token": [] }]);
+        }
+        if let Some(body) = method.body {
+            operation["requestBody"] = json!({
+                "required": true,
+                "content": { "application/json": { "schema": body(&mut schemas) } },
+            });
+        }
+        if method.path.contains("{name}") {
+            operation["parameters"] = json!([{
+                "name": "name", "in": "path", "required": true, "schema": { "type": "string" },
+            }]);
+        }
+        let path = paths.entry(method.path).or_insert_with(|| json!({}));
+        path[method.verb.to_lowercase()] = operation;
+    }
+    json!({
+        "openapi": "3.1.0",
+        "info": {
+            "title": "elbowroom serve",
+            "version": "1",
+            "description": "A long-lived executive of temporal plans.",
+        },
+        "paths": paths,
+        "components": {
+            "schemas": schemas,
+            "securitySchemes": { "token": { "type": "http", "scheme": "bearer" } },
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{METHODS, openapi};
+    use serde_json::Value;
+
+    /// All references in a document.
+    fn references<'v>(value: &'v Value, found: &mut Vec<&'v str>) {
+        match value {
+            Value::Object(members) => {
+                for (name, member) in members {
+                    match member.as_str() {
+                        Some(to) if name == "$ref" => found.push(to),
+                        _ => references(member, found),
+                    }
+                }
+            }
+            Value::Array(members) => members.iter().for_each(|it| references(it, found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn what_the_description_refers_to_is_described() {
+        let document = openapi();
+        let mut found = Vec::new();
+        references(&document, &mut found);
+        assert!(found.len() > 20);
+        for reference in found {
+            let pointer = reference.strip_prefix('#').expect("local");
+            assert!(document.pointer(pointer).is_some(), "{reference}");
+        }
+    }
+
+    #[test]
+    fn everything_that_changes_something_needs_a_token() {
+        let document = openapi();
+        for method in METHODS {
+            let operation = &document["paths"][method.path][method.verb.to_lowercase()];
+            assert!(operation.is_object(), "{}", method.path);
+            assert_eq!(operation["security"].is_array(), method.verb != "GET", "{}", method.path);
+        }
+    }
+
+    #[test]
+    fn members_that_may_be_left_out_are_not_required() {
+        let goal = &openapi()["components"]["schemas"]["NewGoal"];
+        assert_eq!(goal["required"], serde_json::json!(["goal"]));
+        assert!(goal["properties"]["name"]["description"].as_str().is_some());
+    }
+}

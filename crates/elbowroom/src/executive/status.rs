@@ -1,0 +1,398 @@
+//! How a run stands, for those who ask while it goes on.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom_execution::run::{FIRST_GOAL, Verdict};
+use elbowroom_execution::{
+    Command, Decided, Decision, Entry, Event, Mission, Observation, Progression, Promise, Request,
+    StepId, Ticket,
+};
+use elbowroom_model::ground::{FactId, FluentId};
+use elbowroom_model::{Situation, Task};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_pddl::{ProblemText, write_problem};
+use elbowroom_report::exact::Exact;
+
+use super::documents::{
+    Activity, GuaranteeNow, NextNow, NumberNow, OpenGoal, PlanNow, Room, Running, State, StepNow,
+};
+
+/// Follows a lasting run by its record. Clones are the same; whoever asks is answered at once, and
+/// holds nothing up: names are made from a copy of what is believed.
+#[derive(Clone, Default)]
+pub struct Status(Arc<Mutex<Known>>);
+
+#[derive(Default)]
+struct Known {
+    now: Rational,
+    is_planning: bool,
+    is_paused: bool,
+    is_over: bool,
+    /// Why it rests, if it does.
+    rest: Option<String>,
+    /// Why a plan is made.
+    why: Option<String>,
+    goals: Vec<OpenGoal>,
+    running: BTreeMap<u64, Running>,
+    /// Of these, those that were seen to start.
+    started: BTreeSet<u64>,
+    plans: usize,
+    steps: Vec<StepNow>,
+    since: Option<Rational>,
+    room: Vec<Room>,
+    promise: Option<(Promise, Rational)>,
+    deviation: Option<String>,
+    decided: Option<(Rational, Decided)>,
+    belief: Option<Arc<Progression>>,
+}
+
+impl Status {
+    /// Of a run of this task that has not begun.
+    pub fn new(task: &Task) -> Self {
+        let goal = goal_text(task);
+        let mut goals = Vec::new();
+        if !task.problem().goal.is_trivial() {
+            let name = FIRST_GOAL.to_owned();
+            goals.push(OpenGoal { name, goal });
+        }
+        let known = Known {
+            goals,
+            ..Known::default()
+        };
+        Self(Arc::new(Mutex::new(known)))
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        // Whoever panicked has left what is known of the run as it was or as it is.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes note of an entry of the record.
+    pub fn record(&self, entry: &Entry<'_>) {
+        self.known().record(entry);
+    }
+
+    /// Takes note of what is believed.
+    pub fn believe(&self, belief: &Progression) {
+        let belief = Arc::new(belief.clone());
+        self.known().belief = Some(belief);
+    }
+
+    /// The names of the open goals.
+    pub fn goals(&self) -> Vec<String> {
+        let known = self.known();
+        known.goals.iter().map(|goal| goal.name.clone()).collect()
+    }
+
+    /// How things stand.
+    pub fn state(&self) -> State {
+        let (mut state, belief) = {
+            let known = self.known();
+            (known.state(), known.belief.clone())
+        };
+        if let Some(belief) = belief {
+            // What was given up for its silence is believed to run no more.
+            let runs = |ticket: u64| belief.running().contains_key(&Ticket(ticket));
+            let started = self.known().started.clone();
+            state
+                .running
+                .retain(|it| runs(it.ticket) || !started.contains(&it.ticket));
+            let task = belief.task();
+            let facts = (0..).map(FactId).take(task.fact_count());
+            let facts = facts.filter(|fact| belief.fact(*fact));
+            state.facts = facts.map(|fact| task.fact_name(fact)).collect();
+            let fluents = (0..).map(FluentId).take(task.fluent_count());
+            let numbers = fluents.filter_map(|fluent| {
+                let value = Exact(belief.value(fluent)?.clone());
+                let fluent = task.fluent_name(fluent);
+                Some(NumberNow { fluent, value })
+            });
+            state.numbers = numbers.collect();
+        }
+        state
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> PlanNow {
+        let known = self.known();
+        PlanNow {
+            steps: known.steps.clone(),
+            since: known.since.clone().map(Exact),
+            plans: known.plans,
+        }
+    }
+
+    /// What is guaranteed.
+    pub fn guarantee(&self) -> GuaranteeNow {
+        let known = self.known();
+        let promise = known.promise.as_ref();
+        GuaranteeNow {
+            promise: promise.map(|(promise, _)| promise.name().to_owned()),
+            since: promise.map(|(_, since)| Exact(since.clone())),
+            deviation: known.deviation.clone(),
+            parameters: known.room.clone(),
+        }
+    }
+
+    /// What is next, and why.
+    pub fn next(&self) -> NextNow {
+        let known = self.known();
+        let decided = known.decided.as_ref();
+        let until = decided.and_then(|(_, decided)| match &decided.decision {
+            Decision::Wait { until } => until.clone().map(Exact),
+            _ => None,
+        });
+        let to_come = known.steps.iter().find(|step| step.state == TO_COME);
+        NextNow {
+            decision: decided.map(|(_, it)| it.decision.name().to_owned()),
+            decided: decided.map(|(time, _)| Exact(time.clone())),
+            until,
+            why: known
+                .rest
+                .clone()
+                .or_else(|| decided.map(|(_, it)| it.reason.to_string())),
+            step: to_come.cloned(),
+        }
+    }
+}
+
+const TO_COME: &str = "to-come";
+const RUNNING: &str = "running";
+
+/// The goal of a problem, in PDDL, as it stands behind `:goal`.
+pub fn goal_text(task: &Task) -> String {
+    let text = write_problem(task, &Situation::initial(task), &ProblemText::default());
+    let text = text.unwrap_or_default();
+    let goal = text.split("(:goal ").nth(1).unwrap_or_default();
+    let line = goal.lines().next().unwrap_or_default();
+    line.strip_suffix(')').unwrap_or(line).to_owned()
+}
+
+impl Known {
+    fn state(&self) -> State {
+        let activity = match () {
+            () if self.is_over => Activity::Over,
+            () if self.is_paused => Activity::Paused,
+            () if self.rest.is_some() => Activity::Resting,
+            () if self.is_planning => Activity::Planning,
+            () if self.plans == 0 => Activity::Beginning,
+            () => Activity::Executing,
+        };
+        State {
+            now: Exact(self.now.clone()),
+            why: self.rest.clone().or_else(|| self.why.clone()),
+            activity,
+            goals: self.goals.clone(),
+            running: self.running.values().cloned().collect(),
+            plans: self.plans,
+            facts: Vec::new(),
+            numbers: Vec::new(),
+        }
+    }
+
+    fn record(&mut self, entry: &Entry<'_>) {
+        match entry {
+            Entry::Mission(mission) => self.take_up(mission),
+            Entry::Decided { now, decided } => self.decide(now, decided),
+            Entry::Command { now, command, .. } => self.command(now, command),
+            Entry::Passed { now, .. } | Entry::Looked { now, .. } => self.now.clone_from(now),
+            Entry::Taken {
+                observation,
+                remark,
+                ..
+            } => self.observe(observation, remark.is_some()),
+            Entry::Planning { reason, .. } => {
+                self.is_planning = true;
+                self.rest = None;
+                self.why = Some(reason.to_string());
+            }
+            Entry::Planned { .. } => self.is_planning = false,
+            Entry::Kept { .. } | Entry::Interrupted { .. } => {}
+            Entry::Resting {
+                now,
+                verdict,
+                goals,
+                dead_end,
+            } => {
+                self.now.clone_from(now);
+                self.steps.clear();
+                self.since = None;
+                self.room.clear();
+                self.promise = None;
+                self.decided = None;
+                let reasons: Vec<String> = dead_end.iter().map(ToString::to_string).collect();
+                let goals = goals.join(", ");
+                self.rest = Some(match verdict {
+                    None => "there is no goal".to_owned(),
+                    Some(Verdict::GoalReached) => {
+                        self.goals.clear();
+                        format!("reached: {goals}")
+                    }
+                    Some(verdict) => {
+                        let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
+                        let why: Vec<String> = why.collect();
+                        let words = in_words(verdict);
+                        match why.is_empty() {
+                            true => format!("{words}: {goals}"),
+                            false => format!("{words}: {goals}: {}", why.join("; ")),
+                        }
+                    }
+                });
+            }
+            Entry::Over(report) => {
+                self.is_over = true;
+                self.now.clone_from(&report.time);
+                let why = report.verdict.why().map_or(String::new(), |why| format!(": {why}"));
+                self.rest = Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
+            }
+        }
+    }
+
+    fn take_up(&mut self, mission: &Mission) {
+        self.plans += 1;
+        (self.is_planning, self.rest, self.why) = (false, None, None);
+        self.since = Some(mission.now.clone());
+        let numbered = mission.time_triggered.steps.iter().zip(&mission.instances);
+        let mut steps: Vec<StepNow> = numbered
+            .map(|(step, instance)| {
+                let ticket = mission.running.get(&StepId::from(*instance)).map(|it| it.0);
+                StepNow {
+                    action: step.action.name.clone(),
+                    start: Exact(&mission.origin + &step.start),
+                    duration: step.duration.clone().map(Exact),
+                    state: if ticket.is_some() { RUNNING } else { TO_COME }.to_owned(),
+                    ticket,
+                }
+            })
+            .collect();
+        steps.sort_by(|one, other| one.start.0.cmp(&other.start.0));
+        self.steps = steps;
+        let parameters = mission.plan.parameters.iter().enumerate();
+        self.room = parameters
+            .map(|(index, parameter)| {
+                let allowed = mission.envelope.as_ref();
+                let allowed = allowed.and_then(|envelope| envelope.intervals().get(index));
+                let end = |of: fn(&Interval) -> Option<&Rational>| {
+                    allowed.and_then(of).cloned().map(Exact)
+                };
+                Room {
+                    name: parameter.name.clone(),
+                    nominal: Exact(parameter.nominal.clone()),
+                    least: end(|interval| interval.lower.value()),
+                    most: end(|interval| interval.upper.value()),
+                }
+            })
+            .collect();
+        self.promise = None;
+    }
+
+    fn decide(&mut self, now: &Rational, decided: &Decided) {
+        if let Some(promise) = decided.reason.promise
+            && self.promise.as_ref().is_none_or(|(known, _)| *known != promise)
+        {
+            self.promise = Some((promise, now.clone()));
+        }
+        if decided.decision == Decision::Replan {
+            self.deviation = Some(decided.reason.to_string());
+            self.promise = None;
+        }
+        self.decided = Some((now.clone(), decided.clone()));
+    }
+
+    fn command(&mut self, now: &Rational, command: &Command) {
+        let (ticket, action, duration) = match command {
+            Command::Start {
+                ticket,
+                action,
+                duration,
+            } => (ticket, action, duration),
+            Command::Cancel { ticket } => {
+                // What was never seen to start may never be seen to end.
+                if !self.started.contains(&ticket.0) {
+                    self.end(ticket.0, "cancelled");
+                }
+                return;
+            }
+        };
+        let same = |step: &&mut StepNow| step.state == TO_COME && step.action == action.name;
+        if let Some(step) = self.steps.iter_mut().find(same) {
+            RUNNING.clone_into(&mut step.state);
+            step.ticket = Some(ticket.0);
+        }
+        let running = Running {
+            ticket: ticket.0,
+            action: action.name.clone(),
+            since: Exact(now.clone()),
+            planned: duration.clone().map(Exact),
+            completion: None,
+            note: None,
+        };
+        self.running.insert(ticket.0, running);
+    }
+
+    fn end(&mut self, ticket: u64, how: &str) {
+        self.running.remove(&ticket);
+        self.started.remove(&ticket);
+        let own = self.steps.iter_mut().filter(|step| step.ticket == Some(ticket));
+        for step in own.filter(|step| step.state == RUNNING) {
+            how.clone_into(&mut step.state);
+        }
+    }
+
+    fn observe(&mut self, observation: &Observation, is_remarkable: bool) {
+        match &observation.event {
+            Event::Started { ticket, .. } => {
+                self.started.insert(ticket.0);
+                let is_instantaneous = self
+                    .running
+                    .get(&ticket.0)
+                    .is_some_and(|running| running.planned.is_none());
+                if is_instantaneous {
+                    self.end(ticket.0, "succeeded");
+                }
+            }
+            Event::Ended { ticket, ending, .. } => self.end(ticket.0, ending.name()),
+            Event::Feedback {
+                ticket,
+                completion,
+                note,
+            } => {
+                if let Some(running) = self.running.get_mut(&ticket.0) {
+                    running.completion = completion.clone().map(Exact);
+                    running.note = Some(note.clone()).filter(|note| !note.is_empty());
+                }
+            }
+            // What was objected to had no effect.
+            Event::Asked(request) if !is_remarkable => self.asked(request),
+            Event::Asked(_)
+            | Event::Fact { .. }
+            | Event::Value { .. }
+            | Event::Unintelligible { .. } => {}
+        }
+    }
+
+    fn asked(&mut self, request: &Request) {
+        match request {
+            Request::Pursue { name, goal } => {
+                self.goals.retain(|known| known.name != *name);
+                self.goals.push(OpenGoal {
+                    name: name.clone(),
+                    goal: goal.clone(),
+                });
+            }
+            Request::Abandon { name } => self.goals.retain(|known| known.name != *name),
+            Request::Pause => self.is_paused = true,
+            Request::Resume => self.is_paused = false,
+        }
+    }
+}
+
+fn in_words(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Unsolvable => "no plan reaches the goals from here",
+        Verdict::NoPlan { .. } => "no plan was found",
+        Verdict::ReplanLimit => "too many plans were given up",
+        other => other.name(),
+    }
+}

@@ -1,0 +1,399 @@
+//! Runs that go on when their goal is reached: goals, facts and pauses while they run.
+//!
+//! Whatever is asked of a run comes in as an observation ([`Event::Asked`]), so that it is recorded
+//! with everything else and a replay, or a run that goes on after a crash, hears of it again.
+//!
+//! | asked or observed | what comes of it |
+//! | --- | --- |
+//! | a goal | all open goals together are the goal from then on. If the rest of the plan, begun now, reaches this, too, it is kept; else a plan is made from here |
+//! | a goal of a name that is open | it takes the place of the earlier one; a plan is made from here |
+//! | a goal is abandoned | a plan is made for the others; without others, nothing more is started |
+//! | a fact or value | believed; the plan goes on while it works with it, and else a plan is made from here |
+//! | a pause | nothing is started or planned any more; what is under way goes on, what it does is followed, and who stays silent for too long is given up. Time passes, deadlines too |
+//! | the end of a pause | the plan goes on where it still can; else a plan is made from here |
+//!
+//! Actions under way keep running through all of this: they are part of the situation in which the
+//! next plan begins ([`RunningRule`](super::RunningRule)).
+//!
+//! Where another run would be over, because the goals are reached, no plan reaches them, none was
+//! found, or too many were needed, a lasting one *rests* ([`Entry::Resting`]): it starts nothing
+//! and says why. What is under way goes on to its end. A request ends the rest; so does, while goals
+//! are open, any news from the world, at most once in [`BREATH`] seconds.
+
+use std::sync::Arc;
+
+use elbowroom_model::validate::{Settings, validate_from};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
+use elbowroom_num::Rational;
+
+use super::agenda::Todo;
+use super::intake::Remark;
+use super::{Run, Stop, Verdict};
+use crate::event::{Request, Ticket};
+use crate::executor::News;
+use crate::reason::{About, Cause, Reason};
+use crate::record::Entry;
+
+/// The name of the goal that the problem itself has.
+pub const FIRST_GOAL: &str = "problem";
+
+/// For so many seconds of the world's time no further plan is looked for after none was found,
+/// whatever is reported.
+const BREATH: i64 = 1;
+
+/// While a run is paused, news of the same fact or number are told once; looked at when there are
+/// so many.
+const MANY_NEWS: usize = 1000;
+
+/// Reads goals that are given while a run goes on.
+///
+/// The answer is the condition, or in words why it is none.
+pub trait GoalReader: Send {
+    /// Reads a goal of this task.
+    ///
+    /// # Errors
+    /// In words, when the text is no condition on what the task has.
+    fn read(&self, task: &Task, text: &str) -> Result<problem::Condition, String>;
+}
+
+impl<F: Fn(&Task, &str) -> Result<problem::Condition, String> + Send> GoalReader for F {
+    fn read(&self, task: &Task, text: &str) -> Result<problem::Condition, String> {
+        self(task, text)
+    }
+}
+
+/// What a run needs to go on when its goal is reached.
+pub(super) struct Lasting<'a> {
+    reader: Box<dyn GoalReader + 'a>,
+    /// The open goals, by name.
+    goals: Vec<(String, problem::Condition)>,
+    /// Whether the goals were ever changed.
+    has_other_goals: bool,
+    is_paused: bool,
+    /// How the goals have changed since the present plan was made.
+    change: Option<Turn>,
+    /// The plan that is executed, on the world's clock.
+    plan: Option<TimeTriggeredPlan>,
+    /// Since when the run rests.
+    rests_since: Option<Rational>,
+}
+
+/// A change of the goals.
+struct Turn {
+    reason: Reason,
+    /// Whether goals were only added, so that the plan may be right for these, too.
+    may_keep: bool,
+}
+
+impl<'a> Run<'a> {
+    /// The same run, which goes on when its goal is reached, or cannot be: it waits for other goals
+    /// ([`Event::Asked`](crate::Event::Asked)), which `reader` reads. Its end is the time limit, a world that
+    /// fails, or a request to end.
+    #[must_use]
+    pub fn lasting(mut self, reader: impl GoalReader + 'a) -> Self {
+        let goal = self.task.problem().goal.clone();
+        let goals = if goal.is_trivial() {
+            Vec::new()
+        } else {
+            vec![(FIRST_GOAL.to_owned(), goal)]
+        };
+        self.lasting = Some(Lasting {
+            reader: Box::new(reader),
+            goals,
+            has_other_goals: false,
+            is_paused: false,
+            change: None,
+            plan: None,
+            rests_since: None,
+        });
+        self
+    }
+
+    /// Takes in a request.
+    pub(super) fn asked_for(&mut self, request: &Request) -> Remark {
+        let Some(lasting) = &mut self.lasting else {
+            return Some("this run takes no requests; nothing was made of it");
+        };
+        match request {
+            Request::Pursue { name, goal } => {
+                let Ok(condition) = lasting.reader.read(&self.task, goal) else {
+                    return Some("it is no goal of this problem; nothing was made of it");
+                };
+                let known = lasting.goals.iter_mut().find(|(known, _)| known == name);
+                let is_new = known.is_none();
+                match known {
+                    Some(known) => known.1 = condition,
+                    None => lasting.goals.push((name.clone(), condition)),
+                }
+                self.turn(format!("`{name}` is to be reached"), is_new);
+                None
+            }
+            Request::Abandon { name } => {
+                let before = lasting.goals.len();
+                lasting.goals.retain(|(known, _)| known != name);
+                if lasting.goals.len() == before {
+                    return Some("no goal of that name is open");
+                }
+                self.turn(format!("`{name}` is abandoned"), false);
+                None
+            }
+            Request::Pause if lasting.is_paused => Some("it is paused already"),
+            Request::Resume if !lasting.is_paused => Some("it is not paused"),
+            Request::Pause | Request::Resume => {
+                lasting.is_paused = *request == Request::Pause;
+                None
+            }
+        }
+    }
+
+    /// The goals have changed.
+    fn turn(&mut self, what: String, may_keep: bool) {
+        self.set_goal();
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        let earlier = lasting.change.take();
+        let what = match earlier.as_ref().and_then(|turn| turn.reason.about.as_ref()) {
+            Some(earlier) => format!("{earlier}, {what}"),
+            None => what,
+        };
+        lasting.change = Some(Turn {
+            reason: Reason::new(Cause::Asked).about(About::Said(what)),
+            may_keep: may_keep && earlier.is_none_or(|earlier| earlier.may_keep),
+        });
+    }
+
+    /// All open goals together are the goal.
+    fn set_goal(&mut self) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        lasting.has_other_goals = true;
+        let mut goals: Vec<_> = lasting.goals.iter().map(|(_, goal)| goal.clone()).collect();
+        let goal = match (goals.pop(), goals.is_empty()) {
+            (None, _) => problem::Condition::TRUE,
+            (Some(only), true) => only,
+            (Some(last), false) => {
+                goals.push(last);
+                problem::Condition::And(goals)
+            }
+        };
+        self.task = Arc::new(self.task.with_goal(goal));
+        self.belief.pursue(&self.task);
+    }
+
+    /// Whether the goals are not, or no longer, those of the problem.
+    pub(super) fn has_other_goals(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.has_other_goals)
+    }
+
+    /// Whether nothing is to be started or planned for now.
+    pub(super) fn is_paused(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.is_paused)
+    }
+
+    /// Whether the goals have changed since a plan was asked for.
+    pub(super) fn is_to_turn(&self) -> bool {
+        let lasting = self.lasting.as_ref();
+        lasting.is_some_and(|lasting| lasting.change.is_some())
+    }
+
+    /// Whether the run waits, or turns to other goals, in place of asking its executor.
+    pub(super) fn attend(&mut self) -> Result<bool, Stop> {
+        let Some(lasting) = &mut self.lasting else {
+            return Ok(false);
+        };
+        if lasting.is_paused {
+            forget_repetitions(&mut self.news);
+            self.stay();
+            return Ok(true);
+        }
+        if let Some(turn) = lasting.change.take() {
+            lasting.rests_since = None;
+            self.replans = 0;
+            self.turn_to(turn)?;
+            return Ok(true);
+        }
+        if lasting.rests_since.is_none() {
+            return Ok(false);
+        }
+        if lasting.goals.is_empty() {
+            self.news.clear();
+        }
+        if self.is_rested() {
+            self.wake();
+            let reason = Reason::new(Cause::Surprise).about(About::AnyObservation);
+            self.replan(&reason)?;
+        } else {
+            self.stay();
+        }
+        Ok(true)
+    }
+
+    fn wake(&mut self) {
+        if let Some(lasting) = &mut self.lasting {
+            lasting.rests_since = None;
+        }
+    }
+
+    /// Keeps the rest of the plan, or makes another one.
+    fn turn_to(&mut self, turn: Turn) -> Result<(), Stop> {
+        let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
+        if !has_goals {
+            self.drop_plan();
+            self.rest_because(None, &[]);
+            return Ok(());
+        }
+        if turn.may_keep
+            && let Some((plan, situation, running)) = self.kept()
+            && let Ok(mission) = self.prepare(&plan, &situation, &running)
+        {
+            self.ports.recorder.record(&Entry::Kept {
+                now: &self.now,
+                reason: &turn.reason,
+            });
+            self.note_plan(&plan);
+            return self.begin_mission(&mission);
+        }
+        self.replan(&turn.reason)
+    }
+
+    /// A plan is taken up.
+    pub(super) fn note_plan(&mut self, plan: &TimeTriggeredPlan) {
+        if let Some(lasting) = &mut self.lasting {
+            lasting.plan = Some(plan.clone());
+            lasting.rests_since = None;
+        }
+    }
+
+    /// What goes on is no longer part of a plan.
+    fn drop_plan(&mut self) {
+        self.account.begin_plan(&std::collections::BTreeMap::new());
+        if let Some(lasting) = &mut self.lasting {
+            lasting.plan = None;
+        }
+    }
+
+    /// The rest of the plan, begun as soon as it can be from here, if it reaches the goal: what is
+    /// running as it is expected to go on, and what is to come at the distances that were planned.
+    fn kept(&self) -> Option<(TimeTriggeredPlan, Situation, Vec<Ticket>)> {
+        let plan = self.lasting.as_ref()?.plan.as_ref()?;
+        let is_told = |ticket: &Ticket| self.belief.running().contains_key(ticket);
+        if !self.account.open_tickets().all(|ticket| is_told(&ticket)) {
+            return None;
+        }
+        let mut left: Vec<Step> = plan.steps.clone();
+        for (_, started) in self.account.of_plan() {
+            let name = &started.action.name;
+            let same = left.iter().enumerate().filter(|(_, it)| it.action.name == *name);
+            let first = same.min_by(|(_, one), (_, other)| one.start.cmp(&other.start));
+            let index = first.map(|(index, _)| index)?;
+            left.remove(index);
+        }
+        let (situation, running) = self.situation(&Rational::ZERO);
+        let delay = left.iter().map(|step| &situation.time - &step.start).max();
+        let delay = delay.unwrap_or_default().max(Rational::ZERO);
+        for step in &mut left {
+            step.start = &step.start + &delay;
+        }
+        let expected = |it: &elbowroom_model::RunningAction| {
+            let duration = it.duration.lower.value().cloned();
+            duration.map(|duration| it.step(duration))
+        };
+        let under_way: Option<Vec<Step>> = situation.running.iter().map(expected).collect();
+        let steps = under_way?.into_iter().chain(left).collect();
+        let rest = TimeTriggeredPlan { steps };
+        let verdict = validate_from(&self.task, &situation, &rest, &Settings::default());
+        verdict.is_valid().then_some((rest, situation, running))
+    }
+
+    /// Lets time pass without asking the executor.
+    pub(super) fn stay(&mut self) {
+        let silence = self.next_silence();
+        let soon = self.lasting.as_ref().and_then(|lasting| {
+            let since = lasting.rests_since.as_ref()?;
+            let is_waiting = !lasting.is_paused && !self.news.is_empty();
+            is_waiting.then(|| since + Rational::from(BREATH))
+        });
+        let until = silence.into_iter().chain(soon).min();
+        let until = until.unwrap_or_else(|| self.settings.time_limit.clone());
+        self.agenda.push(Todo::GiveUpTheSilent);
+        self.agenda.push(Todo::Pass(until.max(self.now.clone())));
+    }
+
+    /// Whether it is time to look for a plan again.
+    fn is_rested(&self) -> bool {
+        let since = self.lasting.as_ref().and_then(|it| it.rests_since.as_ref());
+        since.is_some_and(|since| {
+            !self.news.is_empty() && self.now >= since + Rational::from(BREATH)
+        })
+    }
+
+    /// Whether the run rests with this verdict, and is not over.
+    pub(super) fn goes_on_after(&self, verdict: &Verdict) -> bool {
+        self.lasting.is_some()
+            && match verdict {
+                Verdict::GoalReached
+                | Verdict::Unsolvable
+                | Verdict::NoPlan { .. }
+                | Verdict::ReplanLimit => true,
+                Verdict::TimeLimit | Verdict::Interrupted | Verdict::WorldFailed { .. } => false,
+            }
+    }
+
+    /// Waits for a change, after the goals were reached, or because they cannot be.
+    pub(super) fn rest(&mut self, verdict: &Verdict) {
+        let dead_end = match verdict {
+            Verdict::Unsolvable if self.is_explaining => self.dead_end(),
+            _ => Vec::new(),
+        };
+        self.drop_plan();
+        self.rest_because(Some(verdict), &dead_end);
+    }
+
+    fn rest_because(&mut self, verdict: Option<&Verdict>, dead_end: &[Reason]) {
+        let Some(lasting) = &mut self.lasting else {
+            return;
+        };
+        lasting.rests_since = Some(self.now.clone());
+        let goals: Vec<String> = lasting.goals.iter().map(|(name, _)| name.clone()).collect();
+        let is_reached = verdict == Some(&Verdict::GoalReached);
+        if is_reached {
+            lasting.goals.clear();
+        }
+        // With no goals there is nothing that the world could be asked about.
+        let verdict = verdict.filter(|_| !goals.is_empty());
+        self.ports.recorder.record(&Entry::Resting {
+            now: &self.now,
+            verdict,
+            goals: &goals,
+            dead_end,
+        });
+        if is_reached {
+            self.set_goal();
+            // What led to it explains nothing any more.
+            self.history.clear();
+            self.beginning = self.belief.clone();
+        }
+        self.news.clear();
+        self.reasons.clear();
+        self.replans = 0;
+        self.progress.begin_plan();
+    }
+}
+
+/// Who stays paused for long hears of many things again and again.
+fn forget_repetitions(news: &mut Vec<News>) {
+    if news.len() < MANY_NEWS {
+        return;
+    }
+    let (mut facts, mut values) = Default::default();
+    let mut is_first = |it: &News| match it {
+        News::Fact(fact) => std::collections::BTreeSet::insert(&mut facts, *fact),
+        News::Value(fluent) => std::collections::BTreeSet::insert(&mut values, *fluent),
+        _ => true,
+    };
+    news.retain(|it| is_first(it));
+}
