@@ -436,7 +436,7 @@ fn a_goal_is_read_as_in_a_problem_and_mistakes_are_named() {
         ("(have spoon)", "spoon"),
         ("(hav cup)", "did you mean `have`"),
         ("(have cup) (have key)", "a second condition"),
-        ("(have cup", "(have cup"),
+        ("(have cup", "without a matching"),
     ] {
         let told = read_goal(&task, goal).expect_err(goal);
         assert!(told.contains(why), "{goal}: {told}");

@@ -213,7 +213,7 @@ impl<'a> Run<'a> {
         if let Some(turn) = lasting.change.take() {
             lasting.rests_since = None;
             self.replans = 0;
-            self.turn_to(turn)?;
+            self.turn_to(&turn)?;
             return Ok(true);
         }
         if lasting.rests_since.is_none() {
@@ -239,7 +239,7 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps the rest of the plan, or makes another one.
-    fn turn_to(&mut self, turn: Turn) -> Result<(), Stop> {
+    fn turn_to(&mut self, turn: &Turn) -> Result<(), Stop> {
         let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
             self.drop_plan();
