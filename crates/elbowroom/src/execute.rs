@@ -17,7 +17,7 @@ mod spoiling;
 mod vary;
 
 pub use analyst::{Analyst, WholeRegion};
-pub use execution::{Execution, execute, read_goal};
+pub use execution::{Execution, Listener, execute, read_goal};
 pub use external::External;
 pub(crate) use facts_only::as_timed;
 pub use likeliest::{Likeliest, SharedLikeliest};

@@ -124,6 +124,6 @@ pub(crate) enum CtlCommand {
     Resume,
     /// End the executive; what is under way is cancelled
     Stop,
-    /// Print the interface as an OpenAPI document
+    /// Print a description of the interface, for programs that make clients
     Openapi,
 }

@@ -52,15 +52,15 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     };
     let domain_text: NamedText = (&input::source(domain, "domain")?).into();
     let mut front = None;
-    let problem = || match &arguments.run.problem {
-        Some(problem) => Ok((&input::source(problem, "problem")?).into()),
-        None => {
-            let opened = open(arguments, &interrupt, &domain_text)?;
-            let text = opened.await_problem(&interrupt);
-            front = Some(opened);
-            let name = "the problem that was given".to_owned();
-            Ok(NamedText { name, text: text.unwrap_or_default() })
+    let problem = || {
+        if let Some(problem) = &arguments.run.problem {
+            return Ok((&input::source(problem, "problem")?).into());
         }
+        let opened = open(arguments, &interrupt, &domain_text)?;
+        let text = opened.await_problem(&interrupt).unwrap_or_default();
+        front = Some(opened);
+        let name = "the problem that was given".to_owned();
+        Ok(NamedText { name, text })
     };
     let (mut spec, world) = spec::of(&arguments.run, domain, problem)?;
     if front.is_some() && spec.problem.text.is_empty() {

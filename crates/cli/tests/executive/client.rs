@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -14,8 +14,9 @@ use crate::command::root;
 
 pub(crate) const TOKEN: &str = "a-token-of-some-length";
 
-/// How long anything may take.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// How often it is looked whether something has happened, and how many times at most: a minute.
+const GLANCE: Duration = Duration::from_millis(20);
+const MOST_GLANCES: usize = 3000;
 
 /// A folder that no other test uses.
 pub(crate) fn folder(name: &str) -> PathBuf {
@@ -113,19 +114,17 @@ impl Executive {
     /// Waits for its end.
     pub(crate) fn end(&mut self) -> Output {
         let mut child = self.child.take().expect("it runs");
-        let begun = Instant::now();
-        while begun.elapsed() < PATIENCE {
-            if child.try_wait().expect("it can be asked").is_some() {
-                return child.wait_with_output().expect("its output");
-            }
-            std::thread::sleep(Duration::from_millis(20));
+        let mut is_over = || child.try_wait().expect("it can be asked").is_some();
+        let in_time = (0..MOST_GLANCES).any(|_| {
+            std::thread::sleep(GLANCE);
+            is_over()
+        });
+        if !in_time {
+            let _ = child.kill();
         }
-        let _ = child.kill();
-        panic!("it does not end");
-    }
-
-    pub(crate) fn ctl(&self, line: &[&str]) -> Output {
-        crate::command::elbowroom(&[&["ctl"], line].concat())
+        let output = child.wait_with_output().expect("its output");
+        assert!(in_time, "it does not end: {output:?}");
+        output
     }
 
     pub(crate) fn get(&self, path: &str) -> (u16, Value) {
@@ -171,15 +170,16 @@ impl Executive {
     /// Waits until things stand like that.
     #[track_caller]
     pub(crate) fn await_state(&self, is_so: impl Fn(&Value) -> bool) -> Value {
-        let begun = Instant::now();
-        loop {
+        let mut last = Value::Null;
+        for _ in 0..MOST_GLANCES {
             let (status, state) = self.get("/v1/state");
             if status == 200 && is_so(&state) {
                 return state;
             }
-            assert!(begun.elapsed() < PATIENCE, "it stays like this: {state}");
-            std::thread::sleep(Duration::from_millis(20));
+            last = state;
+            std::thread::sleep(GLANCE);
         }
+        panic!("it stays like this: {last}");
     }
 
     pub(crate) fn trace_lines(&self) -> Vec<Value> {

@@ -11,7 +11,7 @@ use elbowroom_report::trace::line::ReportLine;
 use serde::{Deserialize, Serialize};
 
 use super::{Event, Version, Watcher};
-use crate::execute::{RunSpec, SpecError};
+use crate::execute::{Listener, RunSpec, SpecError};
 
 /// Asks for a run.
 pub struct RunRequest<'a> {
@@ -27,7 +27,7 @@ pub struct RunRequest<'a> {
     /// The recorder.
     pub recorder: Box<dyn Recorder + 'a>,
     /// Told what the run believes, whenever that may have changed.
-    pub listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>>,
+    pub listener: Option<Listener<'a>>,
 }
 
 /// The answer, and the report that it was made of.
@@ -99,7 +99,7 @@ impl<'a> RunRequest<'a> {
     /// Tells what the run believes, as [`Execution::told_to`](crate::execute::Execution::told_to).
     #[must_use]
     pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
-        let listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>> = Some(Box::new(listener));
+        let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }
     }
 

@@ -120,8 +120,11 @@ pub struct Execution<'a> {
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
     is_lasting: bool,
-    listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>>,
+    listener: Option<Listener<'a>>,
 }
+
+/// Is told what a run believes ([`Run::told_to`]).
+pub type Listener<'a> = Box<dyn FnMut(&Progression) + Send + 'a>;
 
 /// The executor of a run: a registered one, or the caller's own.
 enum Decider<'a> {
@@ -245,7 +248,7 @@ impl<'a> Execution<'a> {
 
     /// See [`Run::told_to`].
     pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
-        let listener: Option<Box<dyn FnMut(&Progression) + Send + 'a>> = Some(Box::new(listener));
+        let listener: Option<Listener<'a>> = Some(Box::new(listener));
         Self { listener, ..self }
     }
 

@@ -233,9 +233,10 @@ impl Known {
                         let why = verdict.why().map(str::to_owned).into_iter().chain(reasons);
                         let why: Vec<String> = why.collect();
                         let words = in_words(verdict);
-                        match why.is_empty() {
-                            true => format!("{words}: {goals}"),
-                            false => format!("{words}: {goals}: {}", why.join("; ")),
+                        if why.is_empty() {
+                            format!("{words}: {goals}")
+                        } else {
+                            format!("{words}: {goals}: {}", why.join("; "))
                         }
                     }
                 });

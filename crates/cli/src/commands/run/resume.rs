@@ -93,6 +93,16 @@ fn unreadable(name: &str, message: &str) -> Failure {
     Failure::new(format!("the journal {name}: {message}"), "")
 }
 
+fn leads_elsewhere(name: &str, line: usize) -> Failure {
+    Failure::new(
+        format!(
+            "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
+             told to the world"
+        ),
+        "it may be of another version of this program",
+    )
+}
+
 /// Who wants to attend a run that goes on.
 pub(in crate::commands) trait Host {
     /// Attends a run of this specification.
@@ -153,6 +163,16 @@ pub(in crate::commands) fn run(
     let past = Arc::new(Past::new(&stored));
     let views = Views::open(arguments, &spec, &task, &interrupt)?;
     let outcome = {
+        let recorder = PastRecorder {
+            past: Arc::clone(&past),
+            task: Arc::clone(&task),
+            writer: JournalWriter {
+                task: Arc::clone(&task),
+                file: &mut file,
+                kept: kept.clone(),
+                desk: attendance.desk().cloned(),
+            },
+        };
         let begun = Clock::start();
         let clock = || begun.seconds();
         let goes_on = || !interrupt.is_requested();
@@ -171,23 +191,7 @@ pub(in crate::commands) fn run(
                 present: planner,
             })
             .told_to(attendance.listener())
-            .recorded_by(views.shown(
-                attendance.witnessed(
-                    PastRecorder {
-                        past: Arc::clone(&past),
-                        task: Arc::clone(&task),
-                        writer: JournalWriter {
-                            task: Arc::clone(&task),
-                            file: &mut file,
-                            kept: kept.clone(),
-                            desk: attendance.desk().cloned(),
-                        },
-                    },
-                    &task,
-                    true,
-                ),
-                &task,
-            ));
+            .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));
         let world = Careful {
             inner: PastWorld {
                 replay: ReplayWorld::new(&stored, &task),
@@ -224,13 +228,7 @@ pub(in crate::commands) fn run(
         outcome.map_err(contradiction)?
     };
     if let Some(line) = past.difference() {
-        return Err(Failure::new(
-            format!(
-                "the journal {name} does not lead to the same decisions, from line {line} on; nothing was \
-                 told to the world"
-            ),
-            "it may be of another version of this program",
-        ));
+        return Err(leads_elsewhere(&name, line));
     }
     super::conclude(arguments, &outcome, file.trouble().as_deref(), output)
 }

@@ -32,7 +32,7 @@ impl Front {
             ("PUT", "/v1/problem") => self.problem(read(body)?),
             ("POST", "/v1/goals") => self.goal(read(body)?),
             ("DELETE", path) => self.abandon(path.trim_start_matches("/v1/goals/")),
-            ("POST", "/v1/facts") => self.fact(read(body)?),
+            ("POST", "/v1/facts") => self.fact(&read(body)?),
             ("POST", "/v1/numbers") => self.number(read(body)?),
             ("POST", "/v1/pause") => self.hand_in(vec![Ask::Request(Request::Pause)], None),
             ("POST", "/v1/resume") => self.hand_in(vec![Ask::Request(Request::Resume)], None),
@@ -63,22 +63,22 @@ impl Front {
         let help = "write a condition as it stands behind `:goal`, such as (at rover base)";
         let read = read_goal(task, &given.goal);
         read.map_err(|why| Refused::new(422, why, help))?;
-        let name = match given.name {
-            Some(name) => named(name)?,
-            None => {
-                let open = status.goals();
-                loop {
-                    let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
-                    let name = format!("goal-{number}");
-                    if !open.contains(&name) {
-                        break name;
-                    }
-                }
-            }
-        };
+        let name = given.name.map(named).transpose()?;
+        let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
         let request = Request::Pursue { name: name.clone(), goal };
         self.hand_in(vec![Ask::Request(request)], Some(name))
+    }
+
+    /// A name that no open goal has.
+    fn new_name(&self, open: &[String]) -> String {
+        loop {
+            let number = self.named.fetch_add(1, Ordering::SeqCst) + 1;
+            let name = format!("goal-{number}");
+            if !open.contains(&name) {
+                return name;
+            }
+        }
     }
 
     fn abandon(&self, name: &str) -> Result<Taken, Refused> {
@@ -96,7 +96,7 @@ impl Front {
         self.hand_in(vec![Ask::Request(request)], Some(name))
     }
 
-    fn fact(&self, given: NewFact) -> Result<Taken, Refused> {
+    fn fact(&self, given: &NewFact) -> Result<Taken, Refused> {
         let (_, task) = self.run()?;
         let help = "write it as the problem does, such as (at rover base)";
         let unknown = || {
