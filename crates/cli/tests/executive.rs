@@ -175,13 +175,14 @@ fn events_are_the_lines_of_the_trace() {
     assert!(text.trim_end().ends_with("event: over\ndata: {}"), "{text}");
 }
 
+/// Verb, path, token, body; status and words of the refusal.
+type Refused<'a> = (&'a str, &'a str, Option<&'a str>, String, u16, &'a str);
+
 #[test]
 fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
     let own = simulated("refused");
     own.await_state(|state| state["activity"] == "resting");
     let goal = json!({"goal": "(done a1)"});
-    /// Verb, path, token, body; status and words of the refusal.
-    type Refused<'a> = (&'a str, &'a str, Option<&'a str>, String, u16, &'a str);
     let tests: &[Refused<'_>] = &[
         ("POST", "/v1/goals", None, goal.to_string(), 401, "takes the executive's token"),
         ("POST", "/v1/goals", Some("wrong"), goal.to_string(), 401, "not the token"),
