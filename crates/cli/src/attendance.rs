@@ -8,8 +8,8 @@ mod world;
 
 use std::sync::Arc;
 
-use elbowroom::executive::Status;
 use elbowroom::execution::{Entry, Recorder};
+use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::report::trace::Line;
 
@@ -45,9 +45,7 @@ impl Attendance {
     }
 
     /// To be told what the run believes.
-    pub(crate) fn listener(
-        &self,
-    ) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
+    pub(crate) fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
         let status = self.0.as_ref().map(|attendants| attendants.status.clone());
         move |belief| {
             if let Some(status) = &status {

@@ -57,7 +57,10 @@ pub(crate) struct Misunderstood(pub(crate) u16, pub(crate) &'static str);
 pub(crate) fn serve(
     listener: Listener,
     clients: &Arc<AtomicUsize>,
-    handler: impl Fn(Result<Request, Misunderstood>, &mut Stream) -> io::Result<()> + Send + Sync + 'static,
+    handler: impl Fn(Result<Request, Misunderstood>, &mut Stream) -> io::Result<()>
+    + Send
+    + Sync
+    + 'static,
 ) {
     let (clients, handler) = (Arc::clone(clients), Arc::new(handler));
     thread::spawn(move || {
@@ -114,7 +117,10 @@ fn read(stream: &mut Stream) -> Result<Request, Misunderstood> {
     let mut request = head_of(&head)?;
     request.body = body;
     if request.header("transfer-encoding").is_some() {
-        return Err(Misunderstood(411, "a body needs a Content-Length; it cannot come in chunks"));
+        return Err(Misunderstood(
+            411,
+            "a body needs a Content-Length; it cannot come in chunks",
+        ));
     }
     let length = match request.header("content-length") {
         None => 0,

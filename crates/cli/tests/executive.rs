@@ -2,9 +2,9 @@
 
 #![cfg(unix)]
 
-mod command;
 #[path = "executive/client.rs"]
 mod client;
+mod command;
 #[path = "../../../testing/skipped.rs"]
 mod skipped;
 
@@ -44,21 +44,36 @@ fn an_executive_reaches_its_goal_takes_another_and_ends_when_it_is_told_to() {
     let (status, taken) = own.post("/v1/goals", &json!({"goal": "(done a3)"}));
     assert_eq!((status, &taken["name"]), (200, &json!("goal-1")), "{taken}");
     let state = own.await_state(|state| state["why"] == "reached: goal-1");
-    assert!(state["facts"].as_array().expect("facts").contains(&json!("(done a3)")), "{state}");
+    assert!(
+        state["facts"]
+            .as_array()
+            .expect("facts")
+            .contains(&json!("(done a3)")),
+        "{state}"
+    );
     assert_eq!(state["activity"], "resting");
     let (status, _) = own.post("/v1/stop", &Value::Null);
     assert_eq!(status, 200);
     let output = own.end();
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("(do r a2 a3)") || text.contains("(do s a2 a3)"), "{text}");
+    assert!(
+        text.contains("(do r a2 a3)") || text.contains("(do s a2 a3)"),
+        "{text}"
+    );
 }
 
 #[test]
 fn the_socket_and_http_answer_alike_and_ctl_asks_either() {
     let own = simulated("alike");
     own.await_state(|state| state["activity"] == "resting");
-    for path in ["/v1/state", "/v1/plan", "/v1/guarantee", "/v1/next", "/v1/openapi.json"] {
+    for path in [
+        "/v1/state",
+        "/v1/plan",
+        "/v1/guarantee",
+        "/v1/next",
+        "/v1/openapi.json",
+    ] {
         let (one, other) = (own.get(path), own.get_by_socket(path));
         assert_eq!(one.0, 200, "{path}");
         let without_time = |mut it: Value| {
@@ -73,7 +88,10 @@ fn the_socket_and_http_answer_alike_and_ctl_asks_either() {
         assert_eq!(state["activity"], "resting");
         for what in ["state", "plan", "guarantee", "next"] {
             let told = ctl(&["--to", &to, what]);
-            assert!(told.status.success() && !told.stdout.is_empty(), "{what}: {told:?}");
+            assert!(
+                told.status.success() && !told.stdout.is_empty(),
+                "{what}: {told:?}"
+            );
         }
     }
 }
@@ -120,7 +138,9 @@ fn where_no_plan_is_left_it_says_why_and_waits() {
     own.post("/v1/facts", &json!({"fact": "(open a3)", "becomes": false}));
     own.post("/v1/goals", &json!({"name": "third", "goal": "(done a3)"}));
     let state = own.await_state(|state| {
-        state["why"].as_str().is_some_and(|why| why.contains("no plan reaches the goals"))
+        state["why"]
+            .as_str()
+            .is_some_and(|why| why.contains("no plan reaches the goals"))
     });
     let why = state["why"].as_str().expect("words");
     assert!(why.contains("third") && why.contains("(done a3)"), "{why}");
@@ -134,7 +154,11 @@ fn where_no_plan_is_left_it_says_why_and_waits() {
 fn without_a_problem_it_waits_for_one_and_takes_others_afterwards() {
     let own = Executive::start(&folder("problem"), &[DOMAIN, "--realtime", "10"]);
     let (status, state) = own.get("/v1/state");
-    assert_eq!((status, &state["activity"]), (200, &json!("beginning")), "{state}");
+    assert_eq!(
+        (status, &state["activity"]),
+        (200, &json!("beginning")),
+        "{state}"
+    );
     let (status, refusal) = own.post("/v1/goals", &json!({"goal": "(done a1)"}));
     assert_eq!(status, 409, "{refusal}");
     let (status, refusal) = own.put("/v1/problem", &json!({"problem": "(define"}));
@@ -165,12 +189,22 @@ fn events_are_the_lines_of_the_trace() {
     let mut text = String::new();
     stream.read_to_string(&mut text).expect("until the end");
     let data = text.lines().filter_map(|line| line.strip_prefix("data: "));
-    let lines: Vec<Value> = data.map(|it| serde_json::from_str(it).expect("JSON")).collect();
-    let kinds: Vec<&str> = lines.iter().filter_map(|line| line["event"].as_str()).collect();
-    for kind in ["planning", "plan", "decided", "command", "passed", "observed", "resting", "over"] {
+    let lines: Vec<Value> = data
+        .map(|it| serde_json::from_str(it).expect("JSON"))
+        .collect();
+    let kinds: Vec<&str> = lines
+        .iter()
+        .filter_map(|line| line["event"].as_str())
+        .collect();
+    for kind in [
+        "planning", "plan", "decided", "command", "passed", "observed", "resting", "over",
+    ] {
         assert!(kinds.contains(&kind), "{kind}: {kinds:?}");
     }
-    let ids: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("id: ")).collect();
+    let ids: Vec<&str> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("id: "))
+        .collect();
     assert_eq!(ids.first(), Some(&"2"));
     assert!(text.trim_end().ends_with("event: over\ndata: {}"), "{text}");
 }
@@ -184,12 +218,54 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
     own.await_state(|state| state["activity"] == "resting");
     let goal = json!({"goal": "(done a1)"});
     let tests: &[Refused<'_>] = &[
-        ("POST", "/v1/goals", None, goal.to_string(), 401, "takes the executive's token"),
-        ("POST", "/v1/goals", Some("wrong"), goal.to_string(), 401, "not the token"),
-        ("POST", "/stop", None, String::new(), 401, "takes the executive's token"),
-        ("POST", "/v1/goals", Some(TOKEN), "{".to_owned(), 422, "the body cannot be read"),
-        ("POST", "/v1/goals", Some(TOKEN), "{\"aim\":1}".to_owned(), 422, "unknown field `aim`"),
-        ("POST", "/v1/goals", Some(TOKEN), "{}".to_owned(), 422, "missing field `goal`"),
+        (
+            "POST",
+            "/v1/goals",
+            None,
+            goal.to_string(),
+            401,
+            "takes the executive's token",
+        ),
+        (
+            "POST",
+            "/v1/goals",
+            Some("wrong"),
+            goal.to_string(),
+            401,
+            "not the token",
+        ),
+        (
+            "POST",
+            "/stop",
+            None,
+            String::new(),
+            401,
+            "takes the executive's token",
+        ),
+        (
+            "POST",
+            "/v1/goals",
+            Some(TOKEN),
+            "{".to_owned(),
+            422,
+            "the body cannot be read",
+        ),
+        (
+            "POST",
+            "/v1/goals",
+            Some(TOKEN),
+            "{\"aim\":1}".to_owned(),
+            422,
+            "unknown field `aim`",
+        ),
+        (
+            "POST",
+            "/v1/goals",
+            Some(TOKEN),
+            "{}".to_owned(),
+            422,
+            "missing field `goal`",
+        ),
         (
             "POST",
             "/v1/goals",
@@ -206,7 +282,14 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
             422,
             "no name for a goal",
         ),
-        ("DELETE", "/v1/goals/nobody", Some(TOKEN), String::new(), 404, "no goal of that name"),
+        (
+            "DELETE",
+            "/v1/goals/nobody",
+            Some(TOKEN),
+            String::new(),
+            404,
+            "no goal of that name",
+        ),
         (
             "POST",
             "/v1/facts",
@@ -239,10 +322,38 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
             422,
             "expected a number",
         ),
-        ("GET", "/v1/wishes", None, String::new(), 404, "nothing at this path"),
-        ("PUT", "/v1/state", Some(TOKEN), String::new(), 405, "is not for PUT, but for GET"),
-        ("GET", "/v1/pause", None, String::new(), 405, "is not for GET, but for POST"),
-        ("GET", "/v1/events?after=soon", None, String::new(), 422, "no number of a line"),
+        (
+            "GET",
+            "/v1/wishes",
+            None,
+            String::new(),
+            404,
+            "nothing at this path",
+        ),
+        (
+            "PUT",
+            "/v1/state",
+            Some(TOKEN),
+            String::new(),
+            405,
+            "is not for PUT, but for GET",
+        ),
+        (
+            "GET",
+            "/v1/pause",
+            None,
+            String::new(),
+            405,
+            "is not for GET, but for POST",
+        ),
+        (
+            "GET",
+            "/v1/events?after=soon",
+            None,
+            String::new(),
+            422,
+            "no number of a line",
+        ),
     ];
     for (verb, path, token, body, expected, words) in tests {
         let (status, refusal) = own.ask(verb, path, *token, body);
@@ -259,11 +370,18 @@ fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
         answer
     };
     let nonsense = raw(b"\x16\x03\x01\x02\r\n\r\n");
-    assert!(nonsense.contains("400") && nonsense.contains("this is not HTTP"), "{nonsense}");
+    assert!(
+        nonsense.contains("400") && nonsense.contains("this is not HTTP"),
+        "{nonsense}"
+    );
     let foreign = raw(b"GET /v1/state HTTP/1.1\r\nHost: evil.example\r\n\r\n");
     assert!(foreign.contains("403"), "{foreign}");
-    let huge = raw(b"POST /v1/goals HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\n\r\n");
-    assert!(huge.contains("413") && huge.contains("longer than 4 MB"), "{huge}");
+    let huge =
+        raw(b"POST /v1/goals HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\n\r\n");
+    assert!(
+        huge.contains("413") && huge.contains("longer than 4 MB"),
+        "{huge}"
+    );
     let chunked =
         raw(b"POST /v1/goals HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n");
     assert!(chunked.contains("411"), "{chunked}");
@@ -287,7 +405,9 @@ fn bad_clients_delay_nothing() {
     let own = Executive::start(&folder("bad"), &[DOMAIN, PROBLEM, "--realtime", "1"]);
     let mut held = Vec::new();
     for number in 0..100 {
-        let Ok(mut stream) = TcpStream::connect(own.address()) else { continue };
+        let Ok(mut stream) = TcpStream::connect(own.address()) else {
+            continue;
+        };
         let said: &[u8] = match number % 4 {
             0 => b"GET /v1/st",
             1 => b"POST /v1/goals HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000000\r\n\r\n{",
@@ -323,8 +443,18 @@ fn lines(folder: &Path, file: &str) -> Vec<String> {
 }
 
 fn with_robot(folder: &Path, journal: &str) -> Vec<String> {
-    let robot = format!("python3 crates/cli/tests/files/robot.py {}", folder.display());
-    let line = [DOMAIN, PROBLEM, "--world-process", &robot, "--journal", journal];
+    let robot = format!(
+        "python3 crates/cli/tests/files/robot.py {}",
+        folder.display()
+    );
+    let line = [
+        DOMAIN,
+        PROBLEM,
+        "--world-process",
+        &robot,
+        "--journal",
+        journal,
+    ];
     line.map(str::to_owned).to_vec()
 }
 
@@ -366,7 +496,10 @@ fn what_was_asked_survives_kill_9() {
         let count = tickets.len();
         tickets.dedup();
         assert_eq!(tickets.len(), count, "begun twice: {begun:?}");
-        assert!(lines(&place, "done").iter().any(|it| it.contains("b1 b2)")), "{begun:?}");
+        assert!(
+            lines(&place, "done").iter().any(|it| it.contains("b1 b2)")),
+            "{begun:?}"
+        );
         assert!(!begun.iter().any(|it| it.contains("a2 a3)")), "{begun:?}");
         // A journal of an executive leads to the same decisions.
         let replayed = command::elbowroom(&["run", "--replay", &journal]);
@@ -380,8 +513,14 @@ fn what_was_asked_survives_kill_9() {
 fn what_is_wrong_with_the_command_line_is_told_before_anything_is_done() {
     let nowhere = PathBuf::from("/nowhere/at/all").display().to_string();
     let tests: [(&[&str], &str); 5] = [
-        (&[DOMAIN, PROBLEM, "--token", &nowhere], "cannot read the token"),
-        (&[DOMAIN, PROBLEM, "--socket", &nowhere, "--http", "0"], "cannot listen at /nowhere"),
+        (
+            &[DOMAIN, PROBLEM, "--token", &nowhere],
+            "cannot read the token",
+        ),
+        (
+            &[DOMAIN, PROBLEM, "--socket", &nowhere, "--http", "0"],
+            "cannot listen at /nowhere",
+        ),
         (&[DOMAIN, PROBLEM, "--world", "spoiler"], "no wall clock"),
         (&[DOMAIN, PROBLEM, "--executor", "nobody"], "nobody"),
         (&[DOMAIN, PROBLEM, "--replay", &nowhere], "--replay"),
@@ -395,5 +534,8 @@ fn what_is_wrong_with_the_command_line_is_told_before_anything_is_done() {
     let nobody = command::elbowroom(&["ctl", "--to", "127.0.0.1:1", "state"]);
     let said = String::from_utf8_lossy(&nobody.stderr).into_owned();
     assert_eq!(nobody.status.code(), Some(2), "{said}");
-    assert!(said.contains("cannot ask the executive at 127.0.0.1:1"), "{said}");
+    assert!(
+        said.contains("cannot ask the executive at 127.0.0.1:1"),
+        "{said}"
+    );
 }

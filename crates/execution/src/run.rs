@@ -67,8 +67,8 @@ use crate::record::{Entry, Recorder};
 use crate::world::{World, WorldError};
 use agenda::Todo;
 use dead_end::Happened;
-use lasting::Lasting;
 use farewell::Closing;
+use lasting::Lasting;
 use progress::Progress;
 
 /// The components of a run, except for the world.

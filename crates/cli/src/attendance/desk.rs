@@ -123,7 +123,9 @@ mod tests {
     #[test]
     fn a_request_is_taken_when_it_was_fetched_and_recorded() {
         let desk = Desk::default();
-        let number = desk.hand_in(vec![Ask::Request(Request::Pause)]).expect("room");
+        let number = desk
+            .hand_in(vec![Ask::Request(Request::Pause)])
+            .expect("room");
         let soon = Duration::from_millis(1);
         desk.acknowledge();
         assert!(!desk.await_taken(number, soon), "it was not fetched");
@@ -136,7 +138,8 @@ mod tests {
     #[test]
     fn a_desk_has_a_limit() {
         let desk = Desk::default();
-        let taken = (0..2 * MOST_WAITING).filter_map(|_| desk.hand_in(vec![Ask::Request(Request::Pause)]));
+        let taken =
+            (0..2 * MOST_WAITING).filter_map(|_| desk.hand_in(vec![Ask::Request(Request::Pause)]));
         assert_eq!(taken.count(), MOST_WAITING);
     }
 }

@@ -110,8 +110,7 @@ impl<W: World> World for Attended<'_, W> {
                 passage.observations.append(&mut asked);
             }
             // Whether a clock that stands still is broken, the run decides.
-            let is_over =
-                !passage.observations.is_empty() || passage.now >= *until || !has_passed;
+            let is_over = !passage.observations.is_empty() || passage.now >= *until || !has_passed;
             if is_over || self.interrupt.is_requested() {
                 return Ok(passage);
             }

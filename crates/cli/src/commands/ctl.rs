@@ -51,15 +51,27 @@ pub(crate) fn run(arguments: &CtlArgs, output: &mut Output) -> Answer {
         }
         CtlCommand::Fact { fact, becomes } => {
             let (fact, becomes) = (fact.clone(), *becomes);
-            desk.change(output, ("POST", "/v1/facts"), Some(&NewFact { fact, becomes }))
+            desk.change(
+                output,
+                ("POST", "/v1/facts"),
+                Some(&NewFact { fact, becomes }),
+            )
         }
         CtlCommand::Number { fluent, value } => {
             let (fluent, value) = (fluent.clone(), GivenNumber(value.clone()));
-            desk.change(output, ("POST", "/v1/numbers"), Some(&NewNumber { fluent, value }))
+            desk.change(
+                output,
+                ("POST", "/v1/numbers"),
+                Some(&NewNumber { fluent, value }),
+            )
         }
         CtlCommand::Problem { file } => {
             let problem = crate::input::source(file, "problem")?.text().to_owned();
-            desk.change(output, ("PUT", "/v1/problem"), Some(&NewProblem { problem }))
+            desk.change(
+                output,
+                ("PUT", "/v1/problem"),
+                Some(&NewProblem { problem }),
+            )
         }
         CtlCommand::Pause => desk.change(output, ("POST", "/v1/pause"), NOTHING),
         CtlCommand::Resume => desk.change(output, ("POST", "/v1/resume"), NOTHING),
@@ -78,7 +90,11 @@ struct Desk<'a> {
 impl Desk<'_> {
     fn unreachable(&self, error: &std::io::Error) -> Failure {
         Failure::new(
-            format!("cannot ask the executive at {}: {}", self.arguments.to, plain(error)),
+            format!(
+                "cannot ask the executive at {}: {}",
+                self.arguments.to,
+                plain(error)
+            ),
             "`elbowroom serve` says where it listens; --to names another address",
         )
     }
@@ -116,7 +132,11 @@ impl Desk<'_> {
 
     fn unlike(&self, why: &str) -> Failure {
         Failure::new(
-            format!("what answers at {} is no executive: {}", self.arguments.to, tame(why)),
+            format!(
+                "what answers at {} is no executive: {}",
+                self.arguments.to,
+                tame(why)
+            ),
             "`elbowroom serve` says where it listens; --to names another address",
         )
     }
@@ -201,7 +221,12 @@ fn state(state: &State) -> String {
         let _ = writeln!(text, "  goal {}: {}", tame(&goal.name), tame(&goal.goal));
     }
     for running in &state.running {
-        let _ = write!(text, "  running {} since {}", running.action, nearest(&running.since.0));
+        let _ = write!(
+            text,
+            "  running {} since {}",
+            running.action,
+            nearest(&running.since.0)
+        );
         if let Some(planned) = &running.planned {
             let _ = write!(text, ", planned {}", nearest(&planned.0));
         }
@@ -223,7 +248,12 @@ fn state(state: &State) -> String {
 fn step(step: &StepNow) -> String {
     let duration = step.duration.as_ref();
     let duration = duration.map_or(String::new(), |it| format!(" [{}]", nearest(&it.0)));
-    format!("{:>10}: {}{duration} {}", nearest(&step.start.0), step.action, step.state)
+    format!(
+        "{:>10}: {}{duration} {}",
+        nearest(&step.start.0),
+        step.action,
+        step.state
+    )
 }
 
 fn plan(plan: &PlanNow) -> String {
@@ -262,7 +292,11 @@ fn guarantee(guarantee: &GuaranteeNow) -> String {
 }
 
 fn next(next: &NextNow) -> String {
-    let mut text = next.decision.as_deref().unwrap_or("nothing was decided").to_owned();
+    let mut text = next
+        .decision
+        .as_deref()
+        .unwrap_or("nothing was decided")
+        .to_owned();
     if let Some(until) = &next.until {
         let _ = write!(text, " until {}", nearest(&until.0));
     }

@@ -157,7 +157,8 @@ impl Job<'_> {
             let mut sink = |line: &str| file.write(line);
             let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
             let written = writer.header(spec);
-            written.map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
+            written
+                .map_err(|error| Failure::new(format!("cannot write the trace: {error}"), ""))?;
             let writer = self.attendance.witnessed(&mut writer, task, false);
             let mut writer = views.shown(writer, task);
             let mut writer = live::Live::new(&mut writer);

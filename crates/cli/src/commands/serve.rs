@@ -23,11 +23,11 @@ use crate::args::ServeArgs;
 use crate::attendance::Attendance;
 use crate::exit::{Answer, Exit, Failure};
 use crate::http::{self, Listener};
+use crate::input;
 use crate::interrupt::Interrupt;
 use crate::output::{self, Output};
 use crate::serve::Control;
 use crate::words::plain;
-use crate::input;
 use front::Front;
 
 /// Executes what is asked for, until it is asked to end.
@@ -48,7 +48,10 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
         return in_order(answer);
     }
     let Some(domain) = &arguments.run.domain else {
-        return Err(Failure::new("DOMAIN is missing", "give the domain, in PDDL"));
+        return Err(Failure::new(
+            "DOMAIN is missing",
+            "give the domain, in PDDL",
+        ));
     };
     let domain_text: NamedText = (&input::source(domain, "domain")?).into();
     let mut front = None;
@@ -77,7 +80,10 @@ pub(crate) fn run(arguments: &ServeArgs, output: &mut Output) -> Answer {
     let knows_one_goal = spec.executor.registered.name == "lookahead";
     if knows_one_goal || spec.executor.asks_odds() {
         return Err(Failure::new(
-            format!("`{}` reckons with one goal, and goals change here", spec.executor),
+            format!(
+                "`{}` reckons with one goal, and goals change here",
+                spec.executor
+            ),
             "choose another executor, such as guarded or live",
         ));
     }
@@ -109,7 +115,9 @@ fn in_order(answer: Answer) -> Answer {
 
 fn control(arguments: &ServeArgs, interrupt: &Interrupt) -> Result<Option<Control>, Failure> {
     let token = arguments.token.as_ref();
-    token.map(|path| Control::read(path, interrupt.clone())).transpose()
+    token
+        .map(|path| Control::read(path, interrupt.clone()))
+        .transpose()
 }
 
 /// What belongs to `elbowroom run` alone.
@@ -148,7 +156,9 @@ fn open(
         )
     };
     let listener = TcpListener::bind(address).map_err(|error| cannot(&plain(&error)))?;
-    let own = listener.local_addr().map_err(|error| cannot(&plain(&error)))?;
+    let own = listener
+        .local_addr()
+        .map_err(|error| cannot(&plain(&error)))?;
     let socket = match &arguments.socket {
         Some(path) => Some(socket(path)?),
         None => None,
@@ -206,7 +216,10 @@ fn socket(path: &Path) -> Result<Listener, Failure> {
 #[cfg(not(unix))]
 fn socket(path: &Path) -> Result<Listener, Failure> {
     Err(Failure::new(
-        format!("cannot listen at {}: this system has no such sockets", path.display()),
+        format!(
+            "cannot listen at {}: this system has no such sockets",
+            path.display()
+        ),
         "leave out --socket; --http serves the same",
     ))
 }

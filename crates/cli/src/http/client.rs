@@ -82,7 +82,10 @@ impl Answer {
 
     /// Its lines as they come, however long that takes.
     pub(crate) fn lines(self) -> impl Iterator<Item = io::Result<String>> {
-        let _ = self.body.get_ref().set_read_timeout(Duration::from_secs(u64::from(u32::MAX)));
+        let _ = self
+            .body
+            .get_ref()
+            .set_read_timeout(Duration::from_secs(u64::from(u32::MAX)));
         self.body.lines()
     }
 }
@@ -98,7 +101,9 @@ pub(crate) fn ask(
     stream.set_read_timeout(PATIENCE)?;
     stream.set_write_timeout(PATIENCE)?;
     let body = body.unwrap_or_default();
-    let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
+    let token = token.map_or(String::new(), |token| {
+        format!("Authorization: Bearer {token}\r\n")
+    });
     let request = format!(
         "{verb} {path} HTTP/1.1\r\nHost: localhost\r\n{token}Content-Type: application/json\r\n\
          Content-Length: {}\r\nConnection: close\r\n\r\n{body}",

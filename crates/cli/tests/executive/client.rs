@@ -208,7 +208,9 @@ fn said(
     token: Option<&str>,
     body: &str,
 ) -> (u16, String) {
-    let token = token.map_or(String::new(), |it| format!("Authorization: Bearer {it}\r\n"));
+    let token = token.map_or(String::new(), |it| {
+        format!("Authorization: Bearer {it}\r\n")
+    });
     let length = body.len();
     let request = format!(
         "{verb} {path} HTTP/1.1\r\nHost: localhost\r\n{token}Content-Length: {length}\r\n\r\n{body}"

@@ -66,7 +66,11 @@ pub struct RunSpec {
     pub has_plan: bool,
     /// Whether the run goes on when its goal is reached, and takes others (`elbowroom serve`); left
     /// out where it does not.
-    #[serde(default, rename = "lasting", skip_serializing_if = "std::ops::Not::not")]
+    #[serde(
+        default,
+        rename = "lasting",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
     pub is_lasting: bool,
     /// The executor.
     #[serde(with = "as_text")]

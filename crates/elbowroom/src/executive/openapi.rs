@@ -61,18 +61,29 @@ const fn change(
 /// Everything that can be asked of an executive.
 pub const METHODS: &[Method] = &[
     get("/v1/state", "How things stand", Answer::Json(State::schema)),
-    get("/v1/plan", "The plan, and what became of its actions", Answer::Json(PlanNow::schema)),
+    get(
+        "/v1/plan",
+        "The plan, and what became of its actions",
+        Answer::Json(PlanNow::schema),
+    ),
     get(
         "/v1/guarantee",
         "What is still guaranteed, and how far each quantity may deviate",
         Answer::Json(GuaranteeNow::schema),
     ),
-    get("/v1/next", "What is next, and why", Answer::Json(NextNow::schema)),
+    get(
+        "/v1/next",
+        "What is next, and why",
+        Answer::Json(NextNow::schema),
+    ),
     get(
         "/v1/events",
         "Every line of the trace from now on, as server-sent events; with `?after=N`, or the header \
          Last-Event-ID, those behind line N",
-        Answer::Other("text/event-stream", "Events named `entry`; `over` when there are no more"),
+        Answer::Other(
+            "text/event-stream",
+            "Events named `entry`; `over` when there are no more",
+        ),
     ),
     get(
         "/v1/openapi.json",
@@ -85,10 +96,25 @@ pub const METHODS: &[Method] = &[
         "A problem, for an executive that was started without one",
         Some(NewProblem::schema),
     ),
-    change("POST", "/v1/goals", "Another goal, which is to be reached, too", Some(NewGoal::schema)),
+    change(
+        "POST",
+        "/v1/goals",
+        "Another goal, which is to be reached, too",
+        Some(NewGoal::schema),
+    ),
     change("DELETE", "/v1/goals/{name}", "That goal is abandoned", None),
-    change("POST", "/v1/facts", "A fact is so from now on", Some(NewFact::schema)),
-    change("POST", "/v1/numbers", "A number is so from now on", Some(NewNumber::schema)),
+    change(
+        "POST",
+        "/v1/facts",
+        "A fact is so from now on",
+        Some(NewFact::schema),
+    ),
+    change(
+        "POST",
+        "/v1/numbers",
+        "A number is so from now on",
+        Some(NewNumber::schema),
+    ),
     change(
         "POST",
         "/v1/pause",
@@ -96,7 +122,12 @@ pub const METHODS: &[Method] = &[
         None,
     ),
     change("POST", "/v1/resume", "The end of a pause", None),
-    change("POST", "/v1/stop", "The executive ends: what is under way is cancelled", None),
+    change(
+        "POST",
+        "/v1/stop",
+        "The executive ends: what is under way is cancelled",
+        None,
+    ),
 ];
 
 /// The interface as a document of `OpenAPI` 3.1.
@@ -106,10 +137,14 @@ pub fn openapi() -> Value {
     let mut paths = Map::new();
     for method in METHODS {
         let (kind, answer) = match &method.answer {
-            Answer::Json(schema) => ("application/json", json!({ "schema": schema(&mut schemas) })),
-            Answer::Other(kind, about) => {
-                (*kind, json!({ "schema": { "type": "string", "description": about } }))
-            }
+            Answer::Json(schema) => (
+                "application/json",
+                json!({ "schema": schema(&mut schemas) }),
+            ),
+            Answer::Other(kind, about) => (
+                *kind,
+                json!({ "schema": { "type": "string", "description": about } }),
+            ),
         };
         let mut content = Map::new();
         content.insert(kind.to_owned(), answer);
@@ -198,7 +233,12 @@ mod tests {
         for method in METHODS {
             let operation = &document["paths"][method.path][method.verb.to_lowercase()];
             assert!(operation.is_object(), "{}", method.path);
-            assert_eq!(operation["security"].is_array(), method.verb != "GET", "{}", method.path);
+            assert_eq!(
+                operation["security"].is_array(),
+                method.verb != "GET",
+                "{}",
+                method.path
+            );
         }
     }
 

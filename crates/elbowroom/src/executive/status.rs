@@ -244,7 +244,10 @@ impl Known {
             Entry::Over(report) => {
                 self.is_over = true;
                 self.now.clone_from(&report.time);
-                let why = report.verdict.why().map_or(String::new(), |why| format!(": {why}"));
+                let why = report
+                    .verdict
+                    .why()
+                    .map_or(String::new(), |why| format!(": {why}"));
                 self.rest = Some(format!("{}{why}", report.verdict.name().replace('-', " ")));
             }
         }
@@ -290,7 +293,10 @@ impl Known {
 
     fn decide(&mut self, now: &Rational, decided: &Decided) {
         if let Some(promise) = decided.reason.promise
-            && self.promise.as_ref().is_none_or(|(known, _)| *known != promise)
+            && self
+                .promise
+                .as_ref()
+                .is_none_or(|(known, _)| *known != promise)
         {
             self.promise = Some((promise, now.clone()));
         }
@@ -335,7 +341,10 @@ impl Known {
     fn end(&mut self, ticket: u64, how: &str) {
         self.running.remove(&ticket);
         self.started.remove(&ticket);
-        let own = self.steps.iter_mut().filter(|step| step.ticket == Some(ticket));
+        let own = self
+            .steps
+            .iter_mut()
+            .filter(|step| step.ticket == Some(ticket));
         for step in own.filter(|step| step.state == RUNNING) {
             how.clone_into(&mut step.state);
         }

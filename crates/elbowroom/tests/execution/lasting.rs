@@ -53,24 +53,40 @@ impl World for Scripted {
         };
         let measured = Vec::new;
         match command {
-            Command::Start { ticket, duration, .. } => {
+            Command::Start {
+                ticket, duration, ..
+            } => {
                 let ticket = *ticket;
-                let started = Event::Started { ticket, measured: measured() };
+                let started = Event::Started {
+                    ticket,
+                    measured: measured(),
+                };
                 tell(now.clone(), started);
                 if let Some(duration) = duration {
                     let ending = Ending::Succeeded;
-                    let ended = Event::Ended { ticket, ending, measured: measured() };
+                    let ended = Event::Ended {
+                        ticket,
+                        ending,
+                        measured: measured(),
+                    };
                     tell(now + duration, ended);
                 }
             }
             Command::Cancel { ticket } => {
                 let about = *ticket;
-                self.coming.retain(|it| {
-                    !matches!(it.event, Event::Ended { ticket, .. } if ticket == about)
-                });
+                self.coming.retain(
+                    |it| !matches!(it.event, Event::Ended { ticket, .. } if ticket == about),
+                );
                 let (ticket, ending) = (about, Ending::Cancelled);
-                let event = Event::Ended { ticket, ending, measured: measured() };
-                self.coming.push(Observation { time: now.clone(), event });
+                let event = Event::Ended {
+                    ticket,
+                    ending,
+                    measured: measured(),
+                };
+                self.coming.push(Observation {
+                    time: now.clone(),
+                    event,
+                });
             }
         }
         Ok(())
@@ -86,7 +102,10 @@ impl World for Scripted {
         }
         let now = self.now.clone();
         let due = self.coming.extract_if(.., |it| it.time <= now).collect();
-        Ok(Passage { now: self.now.clone(), observations: due })
+        Ok(Passage {
+            now: self.now.clone(),
+            observations: due,
+        })
     }
 }
 
@@ -96,7 +115,10 @@ struct Notes(Arc<Mutex<Vec<String>>>);
 
 impl Notes {
     fn note(&self, note: String) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(note);
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(note);
     }
 }
 
@@ -104,21 +126,38 @@ impl Recorder for Notes {
     fn record(&mut self, entry: &Entry<'_>) {
         let at = |time: &Rational| time.to_decimal(1);
         match entry {
-            Entry::Command { now, command: Command::Start { action, .. }, .. } => {
+            Entry::Command {
+                now,
+                command: Command::Start { action, .. },
+                ..
+            } => {
                 self.note(format!("{}: start {}", at(now), action.name));
             }
-            Entry::Command { now, command: Command::Cancel { .. }, .. } => {
+            Entry::Command {
+                now,
+                command: Command::Cancel { .. },
+                ..
+            } => {
                 self.note(format!("{}: cancel", at(now)));
             }
             Entry::Planning { now, reason, .. } => {
                 self.note(format!("{}: plan, because {}", at(now), reason));
             }
             Entry::Kept { now, .. } => self.note(format!("{}: the plan is kept", at(now))),
-            Entry::Resting { now, verdict, goals, .. } => {
+            Entry::Resting {
+                now,
+                verdict,
+                goals,
+                ..
+            } => {
                 let verdict = verdict.map_or("no goals", Verdict::name);
                 self.note(format!("{}: rest: {verdict} {}", at(now), goals.join(" ")));
             }
-            Entry::Taken { remark: Some(remark), now, .. } => {
+            Entry::Taken {
+                remark: Some(remark),
+                now,
+                ..
+            } => {
                 self.note(format!("{}: {remark}", at(now)));
             }
             _ => {}
@@ -133,7 +172,10 @@ impl Planner for Counting {
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) += 1;
         let answer = Embedded::default().plan(task, situation);
-        PlannerAnswer { seconds: None, ..answer }
+        PlannerAnswer {
+            seconds: None,
+            ..answer
+        }
     }
 }
 
@@ -165,9 +207,17 @@ fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) ->
         .explaining()
         .lasting(true)
         .run_in(&mut world);
-    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let notes = notes
+        .0
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone();
     let plans = *plans.lock().unwrap_or_else(PoisonError::into_inner);
-    Told { notes, plans, report }
+    Told {
+        notes,
+        plans,
+        report,
+    }
 }
 
 fn pursue(name: &str, goal: &str) -> Event {
@@ -219,16 +269,35 @@ fn a_goal_is_reached_and_the_run_waits_for_the_next_one() {
 fn without_a_goal_nothing_is_done_until_one_is_given() {
     let task = task("", "(and)");
     let told = run(&task, 60, vec![(30, pursue("cup", "(have cup)"))]);
-    assert_has(&told, &["0: rest: no goals", "30: start (fetch r cup)", "rest: goal-reached cup"]);
+    assert_has(
+        &told,
+        &[
+            "0: rest: no goals",
+            "30: start (fetch r cup)",
+            "rest: goal-reached cup",
+        ],
+    );
     assert_eq!(told.plans, 1);
 }
 
 #[test]
 fn a_goal_that_the_rest_of_the_plan_reaches_too_costs_no_new_plan() {
     let task = task("", "(and (have book) (have cup))");
-    let told = run(&task, 60, vec![(5, pursue("again", "(or (have cup) (have key))"))]);
-    assert_has(&told, &["5: the plan is kept", "rest: goal-reached problem again"]);
-    assert_eq!((told.plans, told.report.starts), (1, 2), "{:#?}", told.notes);
+    let told = run(
+        &task,
+        60,
+        vec![(5, pursue("again", "(or (have cup) (have key))"))],
+    );
+    assert_has(
+        &told,
+        &["5: the plan is kept", "rest: goal-reached problem again"],
+    );
+    assert_eq!(
+        (told.plans, told.report.starts),
+        (1, 2),
+        "{:#?}",
+        told.notes
+    );
 }
 
 #[test]
@@ -260,16 +329,29 @@ fn of_several_goals_the_others_are_pursued_when_one_is_abandoned() {
         (3, abandon("cup")),
     ];
     let told = run(&task, 100, script);
-    assert_has(&told, &["start (fetch r key)", "rest: goal-reached problem key"]);
+    assert_has(
+        &told,
+        &["start (fetch r key)", "rest: goal-reached problem key"],
+    );
     assert!(!has(&told, "start (fetch r cup)"), "{:#?}", told.notes);
 }
 
 #[test]
 fn a_goal_of_the_same_name_takes_the_place_of_the_earlier_one() {
     let task = task("", "(and)");
-    let script = vec![(1, pursue("it", "(have cup)")), (30, pursue("it", "(have key)"))];
+    let script = vec![
+        (1, pursue("it", "(have cup)")),
+        (30, pursue("it", "(have key)")),
+    ];
     let told = run(&task, 100, script);
-    assert_has(&told, &["rest: goal-reached it", "start (fetch r key)", "rest: goal-reached it"]);
+    assert_has(
+        &told,
+        &[
+            "rest: goal-reached it",
+            "start (fetch r key)",
+            "rest: goal-reached it",
+        ],
+    );
     let script = vec![
         (1, pursue("a", "(have book)")),
         (2, pursue("it", "(have cup)")),
@@ -286,7 +368,10 @@ fn a_changed_fact_that_the_plan_can_bear_changes_nothing_and_another_makes_a_new
     let told = run(&task, 60, vec![(5, fact(&task, "(here key)", false))]);
     assert_eq!(told.plans, 1, "{:#?}", told.notes);
     // Somebody has brought the cup already, and taken it from where it was.
-    let gone = [fact(&task, "(here cup)", false), fact(&task, "(have cup)", true)];
+    let gone = [
+        fact(&task, "(here cup)", false),
+        fact(&task, "(have cup)", true),
+    ];
     let told = run(&task, 60, gone.into_iter().map(|it| (5_i64, it)).collect());
     assert_has(&told, &["rest: goal-reached problem"]);
     assert_eq!(told.report.starts, 1, "{:#?}", told.notes);
@@ -296,7 +381,10 @@ fn a_changed_fact_that_the_plan_can_bear_changes_nothing_and_another_makes_a_new
 fn a_changed_number_counts_for_what_comes_next() {
     let task = task("", "(and (have book) (have cup))");
     let fluent = task.fluent_named("(charge)").expect("a correct test");
-    let value = |value: i64| Event::Value { fluent, value: Rational::from(value) };
+    let value = |value: i64| Event::Value {
+        fluent,
+        value: Rational::from(value),
+    };
     let told = run(&task, 100, vec![(5, value(0)), (50, value(3))]);
     assert_has(
         &told,
@@ -345,7 +433,14 @@ fn news_end_a_rest_but_not_more_often_than_once_a_second() {
     // Something else flickers a hundred times in two seconds.
     script.extend((0..100).map(|n| at(Rational::new(1000 + n, 50), "(here key)", n % 2 == 1)));
     let told = run(&task, 60, script);
-    assert_has(&told, &["rest: unsolvable-from-here", "30: plan", "rest: goal-reached problem"]);
+    assert_has(
+        &told,
+        &[
+            "rest: unsolvable-from-here",
+            "30: plan",
+            "rest: goal-reached problem",
+        ],
+    );
     assert!(told.plans <= 8, "{} plans: {:#?}", told.plans, told.notes);
 }
 
@@ -363,7 +458,12 @@ fn in_a_pause_nothing_is_started_and_what_runs_goes_on() {
         let meanwhile = |it: &Rational| *it >= Rational::from(from) && *it < Rational::from(to);
         steps.filter(meanwhile).count()
     };
-    assert_eq!((starts(0, 5), starts(5, 50), starts(50, 100)), (1, 0, 2), "{:#?}", told.notes);
+    assert_eq!(
+        (starts(0, 5), starts(5, 50), starts(50, 100)),
+        (1, 0, 2),
+        "{:#?}",
+        told.notes
+    );
     assert_eq!(told.report.executed[0].ending, Some(Ending::Succeeded));
     assert_has(&told, &["50: plan", "rest: goal-reached problem key"]);
 }
@@ -379,7 +479,12 @@ fn after_a_pause_across_a_deadline_the_run_says_that_it_is_too_late() {
     let told = run(&task, 100, script);
     assert_has(
         &told,
-        &["50: plan", "rest: unsolvable-from-here problem", "60: plan", "rest: goal-reached"],
+        &[
+            "50: plan",
+            "rest: unsolvable-from-here problem",
+            "60: plan",
+            "rest: goal-reached",
+        ],
     );
 }
 
@@ -417,16 +522,29 @@ fn a_run_that_ends_with_its_goal_takes_no_requests() {
         is_to_end: Arc::default(),
     };
     let notes = Notes::default();
-    let report = Execution::of(&task).recorded_by(notes.clone()).run_in(&mut world);
+    let report = Execution::of(&task)
+        .recorded_by(notes.clone())
+        .run_in(&mut world);
     assert_eq!(report.verdict, Verdict::GoalReached);
-    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-    assert!(notes.iter().any(|it| it.contains("takes no requests")), "{notes:?}");
+    let notes = notes
+        .0
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone();
+    assert!(
+        notes.iter().any(|it| it.contains("takes no requests")),
+        "{notes:?}"
+    );
 }
 
 #[test]
 fn a_goal_is_read_as_in_a_problem_and_mistakes_are_named() {
     let task = task("", "(have book)");
-    for goal in ["(have cup)", "(and (have cup) (not (here key)))", "(>= (charge) 3)"] {
+    for goal in [
+        "(have cup)",
+        "(and (have cup) (not (here key)))",
+        "(>= (charge) 3)",
+    ] {
         assert!(read_goal(&task, goal).is_ok(), "{goal}");
     }
     let forall = "(forall (?x - item) (have ?x))";
@@ -452,7 +570,9 @@ fn whatever_is_asked_the_run_stays_in_order() {
     for seed in 0..60_u64 {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut below = |limit: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 33) % limit
         };
         let items = ["book", "cup", "key"];
@@ -500,7 +620,11 @@ fn whatever_is_asked_the_run_stays_in_order() {
         for (index, one) in spans.iter().enumerate() {
             for other in &spans[index + 1..] {
                 let overlap = one.0 == other.0 && one.1 < other.2 && other.1 < one.2;
-                assert!(!overlap, "{seed}: one robot does two things: {:#?}", told.notes);
+                assert!(
+                    !overlap,
+                    "{seed}: one robot does two things: {:#?}",
+                    told.notes
+                );
             }
         }
     }
@@ -515,13 +639,22 @@ fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
         fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
             let answer = Embedded::default().plan(task, situation).answer;
             assert!(matches!(answer, PlanAnswer::Plan(_)));
-            PlannerAnswer { answer, seconds: Some(Rational::from(5)) }
+            PlannerAnswer {
+                answer,
+                seconds: Some(Rational::from(5)),
+            }
         }
     }
     let task = task("", "(and)");
     let is_to_end = Arc::new(AtomicBool::new(false));
-    let script = [(10, pursue("it", "(have cup)")), (12, pursue("it", "(have key)"))];
-    let coming = script.map(|(time, event)| Observation { time: Rational::from(time), event });
+    let script = [
+        (10, pursue("it", "(have cup)")),
+        (12, pursue("it", "(have key)")),
+    ];
+    let coming = script.map(|(time, event)| Observation {
+        time: Rational::from(time),
+        event,
+    });
     let mut world = Scripted {
         now: Rational::ZERO,
         coming: coming.into(),
@@ -535,6 +668,10 @@ fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
         .ending_when(move || is_to_end.load(Ordering::SeqCst))
         .lasting(true)
         .run_in(&mut world);
-    let names: Vec<_> = report.executed.iter().map(|it| it.step.action.name.as_str()).collect();
+    let names: Vec<_> = report
+        .executed
+        .iter()
+        .map(|it| it.step.action.name.as_str())
+        .collect();
     assert_eq!(names, ["(fetch r key)"]);
 }

@@ -287,7 +287,10 @@ impl<'a> Run<'a> {
         let mut left: Vec<Step> = plan.steps.clone();
         for (_, started) in self.account.of_plan() {
             let name = &started.action.name;
-            let same = left.iter().enumerate().filter(|(_, it)| it.action.name == *name);
+            let same = left
+                .iter()
+                .enumerate()
+                .filter(|(_, it)| it.action.name == *name);
             let first = same.min_by(|(_, one), (_, other)| one.start.cmp(&other.start));
             let index = first.map(|(index, _)| index)?;
             left.remove(index);

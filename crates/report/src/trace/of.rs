@@ -2,8 +2,8 @@
 
 use elbowroom_execution::run::{ExecutedStep, Report, Verdict};
 use elbowroom_execution::{
-    Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned, Reason,
-    Request,
+    Command, Decision, Ending, Entry, Event, Measured, Mission, Observation, Order, Planned,
+    Reason, Request,
 };
 use elbowroom_model::{Situation, Task, TimeTriggeredPlan};
 use elbowroom_num::{Interval, Rational};
@@ -12,9 +12,10 @@ use indexmap::IndexMap;
 
 use super::line::{
     BoundLine, CommandLine, ConstraintLine, DecidedLine, DecisionLine, ExecutedLine, GivenLine,
-    InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line, LookedLine, NetworkLine, ObservationLine,
-    ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine, PlanningLine,
-    ReasonLine, ReportLine, RestingLine, RunningLine, SituationLine, StepLine, WindowLine,
+    InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line, LookedLine, NetworkLine,
+    ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine,
+    PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine, SituationLine, StepLine,
+    WindowLine,
 };
 use crate::exact::Exact;
 

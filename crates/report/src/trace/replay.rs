@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use elbowroom_execution::{
-    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder, World, WorldError,
+    Command, Entry, Event, Observation, Passage, PlanAnswer, Planner, PlannerAnswer, Recorder,
+    World, WorldError,
 };
 use elbowroom_model::ground::{FactId, FluentId};
 use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};

@@ -38,7 +38,10 @@ impl Front {
             ("POST", "/v1/resume") => self.hand_in(vec![Ask::Request(Request::Resume)], None),
             _ => {
                 self.stop();
-                Ok(Taken { taken: true, name: None })
+                Ok(Taken {
+                    taken: true,
+                    name: None,
+                })
             }
         }
     }
@@ -47,7 +50,11 @@ impl Front {
     fn hand_in(&self, asks: Vec<Ask>, name: Option<String>) -> Result<Taken, Refused> {
         let (status, _) = self.run()?;
         if status.state().activity == Activity::Over {
-            return Err(Refused::new(409, "the executive has ended", "start another one"));
+            return Err(Refused::new(
+                409,
+                "the executive has ended",
+                "start another one",
+            ));
         }
         let full = || {
             let help = "wait until it has taken some in; `elbowroom ctl state` says what it does";
@@ -66,7 +73,10 @@ impl Front {
         let name = given.name.map(named).transpose()?;
         let name = name.unwrap_or_else(|| self.new_name(&status.goals()));
         let goal = given.goal.trim().to_owned();
-        let request = Request::Pursue { name: name.clone(), goal };
+        let request = Request::Pursue {
+            name: name.clone(),
+            goal,
+        };
         self.hand_in(vec![Ask::Request(request)], Some(name))
     }
 
@@ -115,8 +125,15 @@ impl Front {
     fn number(&self, given: NewNumber) -> Result<Taken, Refused> {
         let (_, task) = self.run()?;
         let unknown = || {
-            let error = format!("the problem has no fluent `{}`", given.fluent.escape_debug());
-            Refused::new(422, error, "write it as the problem does, such as (charge rover)")
+            let error = format!(
+                "the problem has no fluent `{}`",
+                given.fluent.escape_debug()
+            );
+            Refused::new(
+                422,
+                error,
+                "write it as the problem does, such as (charge rover)",
+            )
         };
         let fluent = task.fluent_named(&given.fluent).ok_or_else(unknown)?;
         let (fluent, value) = (task.fluent_name(fluent), given.value.0);
@@ -134,7 +151,10 @@ impl Front {
         })?;
         let Ok((status, task)) = self.run() else {
             self.set_problem(given.problem)?;
-            return Ok(Taken { taken: true, name: None });
+            return Ok(Taken {
+                taken: true,
+                name: None,
+            });
         };
         let state = status.state();
         check_further(&problem, task, &state)?;
@@ -173,7 +193,10 @@ fn turned(new: &Task, task: &Task, state: &State) -> Vec<Ask> {
     let mut asks = Vec::new();
     let named = |fact: &_| new.fact_name(*fact);
     let facts: BTreeSet<String> = new.initial().facts.iter().map(named).collect();
-    let is_derived = |fact: &str| task.fact_named(fact).is_none_or(|fact| task.is_derived(fact));
+    let is_derived = |fact: &str| {
+        task.fact_named(fact)
+            .is_none_or(|fact| task.is_derived(fact))
+    };
     let gone = state.facts.iter().filter(|fact| !facts.contains(*fact));
     for fact in gone.filter(|fact| !is_derived(fact)) {
         let (fact, becomes) = (fact.clone(), false);

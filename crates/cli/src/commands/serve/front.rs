@@ -87,7 +87,9 @@ impl Front {
     pub(super) fn run(&self) -> Result<&(Status, Task), Refused> {
         let waiting = "the executive has no problem yet";
         let help = "give it one: `elbowroom ctl problem FILE`, or PUT /v1/problem";
-        self.run.get().ok_or_else(|| Refused::new(409, waiting, help))
+        self.run
+            .get()
+            .ok_or_else(|| Refused::new(409, waiting, help))
     }
 
     /// The run is over: clients have a moment to hear of it.
@@ -110,7 +112,11 @@ impl Front {
         let mut problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner);
         if problem.is_some() {
             let help = "ask again in a moment; `elbowroom ctl state` says how things stand";
-            return Err(Refused::new(409, "another problem has just been given", help));
+            return Err(Refused::new(
+                409,
+                "another problem has just been given",
+                help,
+            ));
         }
         *problem = Some(text);
         self.has_problem.notify_all();
@@ -228,7 +234,9 @@ fn first_line(request: &Request) -> Result<Option<usize>, Refused> {
 
 /// Whether there is such a request.
 fn is_known(verb: &str, path: &str) -> bool {
-    METHODS.iter().any(|method| verb == method.verb && is_path(path, method.path))
+    METHODS
+        .iter()
+        .any(|method| verb == method.verb && is_path(path, method.path))
 }
 
 fn is_path(path: &str, pattern: &str) -> bool {
