@@ -1,6 +1,8 @@
 //! What was true while a plan was executed, and which values numbers had: what the executor
 //! believed, worked out again from what was reported.
 
+mod limits;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -13,6 +15,7 @@ use elbowroom::report::line::ObservationLine;
 use elbowroom::report::short::nearest;
 
 use crate::document::{Change, SeriesLine, Texts};
+use limits::{Allowed, Limits};
 
 /// At most so many points are kept of one number, so that a long run's page stays small.
 const MOST_POINTS: usize = 20_000;
@@ -29,6 +32,8 @@ pub(crate) struct Belief<'t> {
     changes: Vec<Change>,
     /// The numbers so far: time and value.
     numbers: BTreeMap<FluentId, Vec<(Rational, Rational)>>,
+    /// Which numbers were allowed.
+    limits: Limits,
 }
 
 impl<'t> Belief<'t> {
@@ -42,6 +47,7 @@ impl<'t> Belief<'t> {
             values: Vec::new(),
             changes: Vec::new(),
             numbers: BTreeMap::new(),
+            limits: Limits::default(),
         };
         belief.note(texts);
         belief
@@ -82,8 +88,10 @@ impl<'t> Belief<'t> {
         };
         self.advance(&time.0, texts);
         let _ = self.progression.arrive(&time.0);
-        let planned = planned.cloned().unwrap_or_default();
         let measured = self.measured(measured.iter());
+        self.limits
+            .started(Ticket(ticket), &action, planned, &self.progression);
+        let planned = planned.cloned().unwrap_or_default();
         let _ = self
             .progression
             .start(Ticket(ticket), &Arc::new(action), &planned, &measured);
@@ -103,7 +111,10 @@ impl<'t> Belief<'t> {
                 self.advance(&time.0, texts);
                 let _ = self.progression.arrive(&time.0);
                 let measured = self.measured(measured.iter());
-                if outcome == "succeeded" {
+                let has_succeeded = outcome == "succeeded";
+                self.limits
+                    .ended(Ticket(*ticket), has_succeeded, &self.progression);
+                if has_succeeded {
                     let _ = self.progression.end(Ticket(*ticket), &measured);
                 } else {
                     self.progression.stop(Ticket(*ticket));
@@ -148,8 +159,17 @@ impl<'t> Belief<'t> {
             let first = points.first().map(|(_, value)| value);
             points.iter().any(|(_, value)| Some(value) != first)
         });
-        let lines = changed.map(|(fluent, points)| line(self.task.fluent_name(fluent), &points));
-        (self.changes, lines.collect())
+        let mut limits = self.limits.finish(&self.progression);
+        let lines = changed.map(|(fluent, points)| {
+            let own = limits.remove(&fluent).unwrap_or_default();
+            SeriesLine {
+                closest: limits::closest(&own, &points),
+                limits: own.iter().map(Allowed::limit).collect(),
+                ..line(self.task.fluent_name(fluent), &points)
+            }
+        });
+        let lines = lines.collect();
+        (self.changes, lines)
     }
 
     fn measured<'m>(
@@ -237,6 +257,8 @@ fn line(name: String, points: &[(Rational, Rational)]) -> SeriesLine {
             .iter()
             .map(|(time, value)| (time.to_f64(), value.to_f64()))
             .collect(),
+        limits: Vec::new(),
+        closest: None,
     }
 }
 

@@ -294,6 +294,25 @@ pub struct SeriesLine {
     pub points: Vec<(f64, f64)>,
     /// Its first, least, greatest and last value.
     pub words: String,
+    /// Which values conditions allowed.
+    pub limits: Vec<Limit>,
+    /// Where it came closest to a limit, in words; `None` if there are no limits.
+    pub closest: Option<String>,
+}
+
+/// A limit of a number.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// Since when.
+    pub from: f64,
+    /// Until when; equal to `from` for a moment.
+    pub to: f64,
+    /// The limit.
+    pub value: f64,
+    /// -1: the number is not to be below it; 1: not above; 0: neither.
+    pub side: i8,
+    /// The limit in words: `>= 20 during (drive rover depot shelf)`.
+    pub words: String,
 }
 
 /// Quantities to change. Whether the plan works with the values chosen is worked out on the page,

@@ -28,20 +28,30 @@ function interval(rate) {
 function seriesView(section) {
   const cursors = [];
   const lines = section.lines.map((line) => {
-    const values = line.points.map(([, value]) => value);
+    const values = [...line.points.map(([, value]) => value), ...line.limits.map((limit) => limit.value)];
     const [low, high] = [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
     const range = high - low || 1;
     const x = (time) => 2 + (time / section.end) * 396, y = (value) => 64 - ((value - low) / range) * 56;
     const path = [...line.points, [section.end, values.at(-1)]].map(([time, value], index) => `${index ? "L" : "M"}${x(time).toFixed(2)} ${y(value).toFixed(2)}`).join("");
     const cursor = shape("line", { class: "cursor", x1: -1, x2: -1, y1: 0, y2: 72, "vector-effect": "non-scaling-stroke" });
+    // A limit is a line with the side that was not allowed hatched; a moment is as wide as can be seen.
+    const limits = line.limits.map((limit) => {
+        const [from, to] = [Math.max(2, x(limit.from)), Math.min(398, x(limit.to))];
+        const [left, right] = to - from < 4 ? [from - 2, from + 2] : [from, to];
+        return shape("g", {}, shape("title", {}, limit.words),
+          limit.side ? shape("rect", { class: "forbidden", x: left, width: right - left, y: limit.side > 0 ? y(limit.value) - 5 : y(limit.value), height: 5 }) : null,
+          shape("line", { class: "limit", x1: left, x2: right, y1: y(limit.value), y2: y(limit.value), "vector-effect": "non-scaling-stroke" }));
+    });
     cursors.push((time) => { cursor.setAttribute("x1", x(time)); cursor.setAttribute("x2", x(time)); });
     return element("div", { class: "curve-box" },
       element("h3", {}, words(line.name)),
       shape("svg", { viewBox: "0 0 400 72", height: 72, preserveAspectRatio: "none", role: "img", "aria-label": `${line.name} over time: ${line.words}` },
         shape("line", { class: "grid", x1: 0, x2: 400, y1: 64, y2: 64, "vector-effect": "non-scaling-stroke" }),
         shape("line", { class: "grid", x1: 0, x2: 400, y1: 8, y2: 8, "vector-effect": "non-scaling-stroke" }),
+        ...limits,
         shape("path", { class: "curve", d: path, "vector-effect": "non-scaling-stroke" }), cursor),
-      element("p", { class: "note" }, line.words));
+      element("p", { class: "note" }, line.words),
+      line.closest ? element("p", { class: "note", "data-closest": true }, line.closest) : null);
   });
   const node = element("section", {}, element("h2", {}, section.heading), ...lines);
   return { node, at: (time) => cursors.forEach((move) => move(time)) };

@@ -142,6 +142,18 @@ test("a run is shown beside its plan, and any moment of it can be looked at", as
   await close(tab);
 });
 
+test("numbers over time are drawn with what conditions allowed", async () => {
+  run("run", ...pddl("battery"), "--trace", file("battery.jsonl"));
+  const tab = await open(page("battery.html", file("battery.jsonl")));
+  const curves = tab.locator(".curve-box", { has: tab.locator("h3", { hasText: "charge" }) });
+  assert.ok(await curves.count() > 0);
+  assert.ok(await curves.first().locator("line.limit").count() > 0);
+  const closest = await curves.first().locator("[data-closest]").textContent();
+  // All went as planned: no limit was broken.
+  assert.match(closest, /^Closest to a limit at [0-9.]+: [0-9.]+ away from [<>]=? [0-9.]+ (at the start of|during|at the end of) \(/);
+  await close(tab);
+});
+
 test("a table is filtered by what is typed", async () => {
   const tab = await open(file("run.html"));
   const rows = rowsOf(tab, "What happened, and why");
@@ -273,7 +285,7 @@ test("hostile names and texts are shown as text", async () => {
 });
 
 test("no page is wider than a telephone, and none has what axe objects to", async () => {
-  for (const name of ["envelope", "region", "run", "experiment", "hostile"]) {
+  for (const name of ["envelope", "region", "run", "battery", "experiment", "hostile"]) {
     for (const width of [1280, 400]) {
       for (const colorScheme of ["light", "dark"]) {
         const tab = await open(file(`${name}.html`), { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });

@@ -1,0 +1,351 @@
+//! Which numbers the conditions of actions allowed, and when.
+
+use std::collections::BTreeMap;
+
+use elbowroom::execution::{Progression, Ticket};
+use elbowroom::model::expression::Comparison;
+use elbowroom::model::ground::{Action, Body, Condition, Expression, FluentId};
+use elbowroom::num::Rational;
+use elbowroom::report::short::nearest;
+
+use crate::document::Limit;
+
+/// More limits of one number than can be told apart.
+const MOST_LIMITS: usize = 2_000;
+
+/// The limits of numbers during a run.
+#[derive(Default)]
+pub(super) struct Limits {
+    /// By number, as far as they are over.
+    of: BTreeMap<FluentId, Vec<Allowed>>,
+    /// The actions under way: their names, since when, and what has to hold all through and at
+    /// the end.
+    running: BTreeMap<Ticket, Running>,
+}
+
+struct Running {
+    name: String,
+    since: Rational,
+    over_all: Vec<(FluentId, Bound)>,
+    at_end: Condition,
+}
+
+/// What was allowed, from when to when.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Allowed {
+    from: Rational,
+    to: Rational,
+    bound: Bound,
+    /// `during (drive rover depot shelf)`.
+    when: String,
+    /// What the number was, at a moment; it may change at that moment.
+    value: Option<Rational>,
+}
+
+/// Time and value of a number, in order of time; it changes evenly between them, and at once where
+/// two have the same time.
+type Points = [(Rational, Rational)];
+
+/// A bound of a number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Bound {
+    value: Rational,
+    comparison: Comparison,
+}
+
+impl Limits {
+    /// An action starts, in this state.
+    pub(super) fn started(
+        &mut self,
+        ticket: Ticket,
+        action: &Action,
+        planned: Option<&Rational>,
+        state: &Progression,
+    ) {
+        let at = state.time().clone();
+        let name = action.name.clone();
+        let body = match &action.body {
+            Body::Instantaneous(snap) => {
+                return self.moment(format!("at {name}"), &snap.condition, None, state);
+            }
+            Body::Durative(body) => body,
+        };
+        self.moment(
+            format!("at the start of {name}"),
+            &body.start.condition,
+            planned,
+            state,
+        );
+        self.running.insert(
+            ticket,
+            Running {
+                name,
+                since: at,
+                over_all: bounds(&body.over_all, planned, state),
+                at_end: body.end.condition.clone(),
+            },
+        );
+    }
+
+    /// An action has ended in this state, with success or without.
+    pub(super) fn ended(&mut self, ticket: Ticket, has_succeeded: bool, state: &Progression) {
+        let Some(running) = self.running.remove(&ticket) else {
+            return;
+        };
+        for (fluent, bound) in running.over_all {
+            let allowed = Allowed {
+                from: running.since.clone(),
+                to: state.time().clone(),
+                bound,
+                when: format!("during {}", running.name),
+                value: None,
+            };
+            self.add(fluent, allowed);
+        }
+        if has_succeeded {
+            let when = format!("at the end of {}", running.name);
+            let took = state.time() - &running.since;
+            self.moment(when, &running.at_end, Some(&took), state);
+        }
+    }
+
+    /// All limits by number; of what is under way, until now.
+    pub(super) fn finish(mut self, state: &Progression) -> BTreeMap<FluentId, Vec<Allowed>> {
+        let tickets: Vec<Ticket> = self.running.keys().copied().collect();
+        for ticket in tickets {
+            self.ended(ticket, false, state);
+        }
+        self.of
+    }
+
+    fn moment(
+        &mut self,
+        when: String,
+        condition: &Condition,
+        duration: Option<&Rational>,
+        state: &Progression,
+    ) {
+        for (fluent, bound) in bounds(condition, duration, state) {
+            let allowed = Allowed {
+                from: state.time().clone(),
+                to: state.time().clone(),
+                bound,
+                when: when.clone(),
+                value: state.value(fluent).cloned(),
+            };
+            self.add(fluent, allowed);
+        }
+    }
+
+    fn add(&mut self, fluent: FluentId, allowed: Allowed) {
+        let own = self.of.entry(fluent).or_default();
+        if own.len() < MOST_LIMITS {
+            own.push(allowed);
+        }
+    }
+}
+
+impl Allowed {
+    /// For drawing.
+    pub(super) fn limit(&self) -> Limit {
+        Limit {
+            from: self.from.to_f64(),
+            to: self.to.to_f64(),
+            value: self.bound.value.to_f64(),
+            side: self.bound.side(),
+            words: self.words(),
+        }
+    }
+
+    fn words(&self) -> String {
+        let symbol = self.bound.comparison.symbol();
+        format!("{symbol} {} {}", nearest(&self.bound.value), self.when)
+    }
+
+    /// How far the number is from the limit where it is closest, and when.
+    fn room(&self, points: &Points) -> Option<(Rational, Rational)> {
+        let room = |value: &Rational| match self.bound.side() {
+            0 => None,
+            -1 => Some(value - &self.bound.value),
+            _ => Some(&self.bound.value - value),
+        };
+        if let Some(value) = &self.value {
+            return Some((room(value)?, self.from.clone()));
+        }
+        // Just after its beginning, just before its end, and wherever it turns in between.
+        let after = points.partition_point(|(time, _)| *time <= self.from);
+        let before = points.partition_point(|(time, _)| *time < self.to);
+        let mut values = Vec::new();
+        values.push((self.from.clone(), between(points, after, &self.from)?));
+        values.push((self.to.clone(), between(points, before, &self.to)?));
+        if after < before {
+            values.extend_from_slice(&points[after..before]);
+        }
+        let rooms = values
+            .iter()
+            .map(|(time, value)| Some((room(value)?, time.clone())));
+        rooms.collect::<Option<Vec<_>>>()?.into_iter().min()
+    }
+}
+
+/// The value at a time between the points before this position and from it on.
+fn between(points: &Points, position: usize, time: &Rational) -> Option<Rational> {
+    let before = position
+        .checked_sub(1)
+        .and_then(|before| points.get(before));
+    let (Some((from, low)), Some((to, high))) = (before, points.get(position)) else {
+        return before
+            .or(points.get(position))
+            .map(|(_, value)| value.clone());
+    };
+    let share = (time - from).checked_div(&(to - from));
+    Some(low + (high - low) * share.unwrap_or_default())
+}
+
+/// Where a number comes closest to a limit, in words.
+pub(super) fn closest(limits: &[Allowed], points: &Points) -> Option<String> {
+    let rooms = limits
+        .iter()
+        .filter_map(|own| Some((own.room(points)?, own)));
+    let ((room, time), own) = rooms.min_by(|(a, _), (b, _)| a.cmp(b))?;
+    let (time, words) = (nearest(&time), own.words());
+    Some(if room.is_negative() {
+        format!(
+            "Beyond a limit at {time}: by {}, and it had to be {words}.",
+            nearest(&room.abs())
+        )
+    } else {
+        format!(
+            "Closest to a limit at {time}: {} away from {words}.",
+            nearest(&room)
+        )
+    })
+}
+
+impl Bound {
+    /// -1: a least value; 1: a greatest one; 0: the only one.
+    fn side(&self) -> i8 {
+        match self.comparison {
+            Comparison::AtLeast | Comparison::Greater => -1,
+            Comparison::Equal => 0,
+            Comparison::AtMost | Comparison::Less => 1,
+        }
+    }
+}
+
+/// What a condition says of each number, the others having their present values. Comparisons in
+/// which the number occurs otherwise than once and linearly are left out, and so is what need not
+/// hold because something else may.
+fn bounds(
+    condition: &Condition,
+    duration: Option<&Rational>,
+    state: &Progression,
+) -> Vec<(FluentId, Bound)> {
+    let mut found = Vec::new();
+    for part in condition.conjuncts() {
+        let Condition::Compare(comparison, left, right) = part else {
+            continue;
+        };
+        let mut fluents = Vec::new();
+        for side in [left, right] {
+            side.visit_fluents(&mut |fluent| fluents.push(fluent));
+        }
+        fluents.sort_unstable();
+        fluents.dedup();
+        for fluent in fluents {
+            // The difference of both sides as a function of the number.
+            let at = |value: i64| {
+                let value = Rational::from(value);
+                let mut leaf = |leaf: &Expression| match leaf {
+                    Expression::Fluent(own) if *own == fluent => Some(value.clone()),
+                    Expression::Fluent(own) => state.value(*own).cloned(),
+                    Expression::Duration => duration.cloned(),
+                    _ => None,
+                };
+                Some(left.evaluate(&mut leaf)? - right.evaluate(&mut leaf)?)
+            };
+            let (Some(zero), Some(one), Some(two)) = (at(0), at(1), at(2)) else {
+                continue;
+            };
+            let slope = &one - &zero;
+            if &two - &one != slope {
+                continue;
+            }
+            let Some(value) = (-&zero).checked_div(&slope) else {
+                continue;
+            };
+            let comparison = if slope.is_negative() {
+                mirrored(*comparison)
+            } else {
+                *comparison
+            };
+            found.push((fluent, Bound { value, comparison }));
+        }
+    }
+    found
+}
+
+fn mirrored(comparison: Comparison) -> Comparison {
+    match comparison {
+        Comparison::Less => Comparison::Greater,
+        Comparison::AtMost => Comparison::AtLeast,
+        Comparison::Equal => Comparison::Equal,
+        Comparison::AtLeast => Comparison::AtMost,
+        Comparison::Greater => Comparison::Less,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(value: i64) -> Rational {
+        Rational::from(value)
+    }
+
+    fn allowed(from: i64, to: i64, comparison: Comparison, value: i64) -> Allowed {
+        Allowed {
+            from: number(from),
+            to: number(to),
+            bound: Bound {
+                value: number(value),
+                comparison,
+            },
+            when: "during (fly)".to_owned(),
+            value: None,
+        }
+    }
+
+    #[test]
+    fn a_number_is_closest_to_a_limit_where_it_turns_or_where_the_limit_begins_or_ends() {
+        // It falls from 10 to 4 until 3, is filled up to 12 at once, and falls to 0 until 9.
+        let points = [(0, 10), (3, 4), (3, 12), (9, 0)].map(|(a, b)| (number(a), number(b)));
+        let room = |limit: Allowed| limit.room(&points).expect("a room");
+        let least = |from, to| allowed(from, to, Comparison::AtLeast, 2);
+        assert_eq!(
+            room(least(0, 3)),
+            (number(2), number(3)),
+            "just before it is filled"
+        );
+        assert_eq!(
+            room(least(3, 6)),
+            (number(4), number(6)),
+            "just after it was filled"
+        );
+        assert_eq!(room(least(0, 9)), (number(-2), number(9)));
+        assert_eq!(room(least(1, 2)), (number(4), number(2)));
+        let most = allowed(0, 9, Comparison::AtMost, 20);
+        assert_eq!(room(most), (number(8), number(3)));
+        assert_eq!(allowed(0, 9, Comparison::Equal, 1).room(&points), None);
+        let words = closest(&[least(3, 6), least(0, 3)], &points).expect("limits");
+        assert_eq!(
+            words,
+            "Closest to a limit at 3: 2 away from >= 2 during (fly)."
+        );
+        let words = closest(&[least(0, 9)], &points).expect("limits");
+        assert_eq!(
+            words,
+            "Beyond a limit at 9: by 2, and it had to be >= 2 during (fly)."
+        );
+    }
+}
