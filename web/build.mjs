@@ -10,6 +10,7 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
+import { chapters } from "./tutorial.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "..");
@@ -29,7 +30,7 @@ const examples = readdirSync(join(root, "cases")).sort().map((name) => {
     const path = join(root, "cases", name, part);
     return existsSync(path) ? readFileSync(path, "utf8") : "";
   };
-  return { name, domain: text("domain.pddl"), problem: text("problem.pddl"), plan: text("plan.plan"), world: text("world.toml") };
+  return { name, domain: text("domain.pddl"), problem: text("problem.pddl"), plan: text("plan.plan"), world: text("world.toml"), likelihoods: text("likelihoods.toml") };
 });
 
 // Modules that only exist in the build.
@@ -49,6 +50,7 @@ const bundle = async (entry, plugins = []) => {
 const worker = await bundle("worker.ts");
 const script = await bundle("main.ts", [
   given("worker", `export default ${JSON.stringify(worker)};`),
+  given("tutorial", `export default ${JSON.stringify(chapters(root))};`),
   given("examples", `export default ${JSON.stringify(examples)};`),
 ]);
 

@@ -4,7 +4,9 @@ import examples from "given:examples";
 import { Editor, type Finding } from "./editor";
 import { Engine, Stopped, Trouble } from "./engine";
 import type { Reply } from "./module";
+import { members, WrongOption } from "./options";
 import { packed, unpacked } from "./share";
+import { tutorial, type Trial } from "./tutorial";
 
 const by = <T extends HTMLElement>(id: string): T => {
   const found = document.getElementById(id);
@@ -15,7 +17,7 @@ const status = by("status"), findings = by("findings");
 let frame = by<HTMLIFrameElement>("page");
 const stop = by<HTMLButtonElement>("stop"), save = by<HTMLButtonElement>("save");
 const example = by<HTMLSelectElement>("example");
-const choices = { guarantee: by<HTMLSelectElement>("guarantee"), executor: by<HTMLSelectElement>("executor"), seed: by<HTMLInputElement>("seed") };
+const choices = { guarantee: by<HTMLSelectElement>("guarantee"), executor: by<HTMLSelectElement>("executor"), seed: by<HTMLInputElement>("seed"), options: by<HTMLInputElement>("options") };
 const askers = [...document.querySelectorAll<HTMLButtonElement>("button[data-ask]")];
 
 const editors = [
@@ -23,12 +25,13 @@ const editors = [
   new Editor("problem.pddl", "Problem, in PDDL", "pddl", edited),
   new Editor("plan.plan", "Plan: start: (action arguments) [duration]", "pddl", edited),
   new Editor("world.toml", "World, in TOML; without one, everything goes as planned", "toml", edited),
+  new Editor("likelihoods.toml", "Likelihoods, in TOML: what executors believe that go by them", "toml", edited),
 ] as const;
-const [domain, problem, plan, world] = editors;
+const [domain, problem, plan, world, likelihoods] = editors;
 const [panels, tabs] = [by("editors"), by("tabs")];
 const buttons = editors.map((editor, index) => {
   const tab = document.createElement("button");
-  const name = ["Domain", "Problem", "Plan", "World"][index] ?? "";
+  const name = ["Domain", "Problem", "Plan", "World", "Likelihoods"][index] ?? "";
   Object.assign(tab, { type: "button", textContent: name, id: `tab-${index}` });
   tab.setAttribute("role", "tab");
   tab.setAttribute("aria-controls", `panel-${index}`);
@@ -163,17 +166,26 @@ async function check(isQuiet: boolean): Promise<void> {
 async function act(what: string): Promise<void> {
   if (what === "check") return check(false);
   if (what === "envelope" && !plan.text.trim()) return say("There is no plan: write one, or have one found.", "bad");
+  let more: Record<string, unknown>;
+  try {
+    more = members(what, choices.options.value);
+  } catch (error) {
+    if (!(error instanceof WrongOption)) throw error;
+    return say(error.message, "bad");
+  }
   say("Working…", "plain");
   showPage(undefined);
   const options: Record<string, Record<string, unknown>> = {
     plan: { ...texts(), first: true },
-    envelope: { ...withPlan(), guarantee: choices.guarantee.value },
+    // The region is that of one guarantee, and says more with its boxes.
+    envelope: { ...withPlan(), ...(more.method === "exact" ? { volume: true } : { guarantee: choices.guarantee.value }) },
     run: {
       ...withPlan(), guarantee: choices.guarantee.value, executor: choices.executor.value, seed: Math.max(0, Math.trunc(Number(choices.seed.value) || 0)),
       ...(world.text.trim() ? { world: text(world) } : {}),
+      ...(likelihoods.text.trim() ? { likelihoods: text(likelihoods) } : {}),
     },
   };
-  const found = await ask({ ask: what, ...options[what] });
+  const found = await ask({ ask: what, ...options[what], ...more });
   if (!found) return;
   const { answer, reply, milliseconds } = found;
   mark(answer);
@@ -181,7 +193,8 @@ async function act(what: string): Promise<void> {
   const tone = reply.exit === 0 ? "good" : reply.exit === 1 ? "bad" : "plain";
   const words: Record<string, string> = {
     plan: answer.plan && answer.answer === "plan" ? `A plan was found in ${took(milliseconds)}; it stands in the editor.` : `No plan: ${answer.reason ?? ""}`,
-    envelope: answer.answer === "envelope" ? `The envelope was found in ${took(milliseconds)}.` : "There is no envelope; the page says why.",
+    envelope: { envelope: `The envelope was found in ${took(milliseconds)}.`, region: `The region was found in ${took(milliseconds)}.`,
+      inside: "The plan works in all of the box.", outside: "The plan does not work in all of the box; the page says why." }[answer.answer ?? ""] ?? "There is no envelope; the page says why.",
     run: reply.exit === 0 ? `The goal was reached. The run took ${took(milliseconds)}.` : "The goal was not reached; the page says why.",
   };
   say(words[what] ?? "", tone);
@@ -200,10 +213,31 @@ function edited(): void {
   waiting = setTimeout(() => { void check(true); }, 400);
 }
 
+function fill(texts: (typeof examples)[number]): void {
+  [domain.text, problem.text, plan.text, world.text, likelihoods.text] = [texts.domain, texts.problem, texts.plan, texts.world, texts.likelihoods];
+}
+
+/** A command of the tutorial, with the texts that it is about. */
+async function attempt(trial: Trial): Promise<void> {
+  const chosen = examples.find((it) => it.name === trial.example);
+  if (chosen) fill({ ...chosen, world: trial.world, likelihoods: trial.likelihoods });
+  // What has a choice of its own is chosen there.
+  let line = trial.options;
+  for (const name of ["guarantee", "executor", "seed"] as const) {
+    line = line.replace(new RegExp(`--${name} (\\S+)`), (_, value: string) => { choices[name].value = value; return ""; });
+  }
+  choices.options.value = line.trim();
+  example.value = "";
+  clearTimeout(waiting);
+  await act(trial.ask);
+  status.scrollIntoView({ block: "nearest" });
+}
+
 function open(name: string): void {
   const chosen = examples.find((it) => it.name === name);
   if (!chosen) return;
-  [domain.text, problem.text, plan.text, world.text] = [chosen.domain, chosen.problem, chosen.plan, chosen.world];
+  fill(chosen);
+  choices.options.value = "";
   showPage(undefined);
   void check(true);
 }
@@ -249,6 +283,8 @@ for (const button of askers) button.addEventListener("click", () => { clearTimeo
 example.append(new Option("own texts", ""), ...examples.map(({ name }) => new Option(name, name)));
 example.addEventListener("change", () => open(example.value));
 
+tutorial(by<HTMLSelectElement>("chapter"), by("text"), (trial) => { void attempt(trial); });
+
 async function begin(): Promise<void> {
   show(2);
   const isShared = await restore();
@@ -274,7 +310,7 @@ async function begin(): Promise<void> {
   } else {
     const words = status.textContent ?? "";
     example.value = "delivery";
-    [domain.text, problem.text, plan.text, world.text] = (({ domain, problem, plan, world }) => [domain, problem, plan, world] as const)(examples.find((it) => it.name === "delivery") ?? examples[0]!);
+    fill(examples.find((it) => it.name === "delivery") ?? examples[0]!);
     say(words, "bad");
   }
   document.documentElement.dataset.ready = "true";

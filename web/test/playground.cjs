@@ -78,6 +78,64 @@ test("a plan is found, written into the editor, and is valid", async () => {
   await close(tab);
 });
 
+test("the commands of the tutorial can be tried, and answer as they do in a terminal", async () => {
+  const tab = await open(playground);
+  await says(tab, "Valid");
+  await tab.locator("#tutorial summary").click();
+  const chapters = await tab.locator("#chapter option").count();
+  assert.equal(chapters, 5);
+  let tried = 0;
+  for (let chapter = 0; chapter < chapters; chapter++) {
+    await tab.locator("#chapter").selectOption(String(chapter));
+    // No line that only documentation tests need.
+    assert.doesNotMatch(await tab.locator("#text").textContent(), /^# fn main/m);
+    const buttons = tab.locator("#text button[data-try]");
+    for (let index = 0; index < await buttons.count(); index++) {
+      const command = await buttons.nth(index).evaluate((it) => it.closest("p").previousElementSibling.textContent);
+      await tab.evaluate(() => { document.getElementById("status").textContent = "not yet"; });
+      await buttons.nth(index).click();
+      await tab.waitForFunction(() => !/^(not yet|Working)/.test(document.getElementById("status").textContent), null, { timeout: 60_000 });
+      const words = await status(tab).textContent();
+      const expected = /--contains/.test(command) && await tab.locator("#options").inputValue() ? /works? in all of the box/ : /Valid|was found|goal was/;
+      assert.match(words, expected, `${command}: ${words}`);
+      tried += 1;
+    }
+  }
+  assert.ok(tried >= 9, `${tried}`);
+  // The last but one chapter ended with a run in a world that the tutorial describes.
+  assert.match(await editor(tab, "world").inputValue(), /relative = true/);
+  assert.match(await tab.locator("#panel-4 textarea").inputValue(), /elbowroom-likelihoods/);
+  await close(tab);
+});
+
+test("options are those of the command line", async () => {
+  const tab = await open(playground);
+  await says(tab, "Valid");
+  await tab.locator("#options").fill('--method best --vary "duration drive"');
+  await press(tab, "Envelope");
+  await says(tab, "The envelope was found");
+  const frame = await answer(tab);
+  const { parameters } = JSON.parse(run("envelope", ...pddl("delivery"), plan, "--method", "best", "--vary", "duration drive", "--json"));
+  const table = frame.locator("section", { has: frame.locator("h2", { hasText: "How far each quantity may deviate" }) });
+  const cells = await cellsOf(table.locator("tbody tr"));
+  assert.deepEqual(cells.map((row) => row[0]), parameters.map((it) => it.name));
+  for (const [index, it] of parameters.entries()) assert.ok(it.upper.decimal - Number(cells[index][4]) < 0.001);
+  await tab.locator("#options").fill("--method exact");
+  await press(tab, "Envelope");
+  await says(tab, "The region was found");
+  const region = await answer(tab);
+  const { pieces } = JSON.parse(run("envelope", ...pddl("delivery"), plan, "--method", "exact", "--json"));
+  const rows = region.locator("section", { has: region.locator("h2", { hasText: "What the values satisfy" }) }).locator("tbody tr");
+  assert.deepEqual((await cellsOf(rows)).map((row) => row[0]), pieces[0].rows.map((row) => row.text));
+  await tab.locator("#options").fill("--metod best");
+  await press(tab, "Envelope");
+  await says(tab, "has no option `--metod`");
+  await tab.locator("#options").fill("--vary");
+  await press(tab, "Envelope");
+  await says(tab, "needs a value");
+  await close(tab);
+});
+
 test("a run with a seed is the run of the command, and its page goes through time", async () => {
   for (const seed of [1, 4]) {
     // The page of an earlier answer would be ready at once.

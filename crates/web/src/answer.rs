@@ -6,9 +6,10 @@ use std::time::Duration;
 use elbowroom::answers::check::{CheckAnswer, CheckFinding, CheckRequest, PlanChecked, check};
 use elbowroom::answers::envelope::{EnvelopeFinding, EnvelopeRequest, Search, envelope};
 use elbowroom::answers::plan::{PlanFinding, PlanRequest, plan};
+use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
 use elbowroom::answers::run::{RunRequest, simulate};
 use elbowroom::answers::stn::{StnFinding, StnRequest, stn};
-use elbowroom::envelope::BestSettings;
+use elbowroom::envelope::{BestSettings, Guarantee};
 use elbowroom::execute::{RunSpec, SpecError};
 use elbowroom::execution::executors::EXECUTORS;
 use elbowroom::execution::run::Verdict;
@@ -23,7 +24,7 @@ use elbowroom::{AnyPlan, PlanKind};
 use serde_json::json;
 
 use crate::question::{
-    CheckQuestion, EnvelopeQuestion, PageQuestion, PlanQuestion, Question, RunQuestion,
+    CheckQuestion, EnvelopeQuestion, Method, PageQuestion, PlanQuestion, Question, RunQuestion,
     StnQuestion, Text,
 };
 use crate::reply::{Failure, Reply, document};
@@ -212,7 +213,7 @@ fn widened(
     let request = EnvelopeRequest {
         name: question.plan.name.clone(),
         vary,
-        guarantee: question.guarantee,
+        guarantee: question.guarantee.unwrap_or_default(),
         enforce: question.enforce,
         contains: question.contains.clone(),
         search: Search {
@@ -223,7 +224,7 @@ fn widened(
             precision: precision.unwrap_or(search.precision),
             growth: question.growth,
             sharpen: question.sharpen,
-            method: question.method,
+            method: question.method.into(),
             most_checks: search.most_checks,
             best: BestSettings {
                 objective: question.objective,
@@ -233,6 +234,9 @@ fn widened(
         },
         ..EnvelopeRequest::new(&Arc::new(read.task), plan)
     };
+    if question.method == Method::Exact {
+        return delimited(question, &request, &read.warnings, &mut watch);
+    }
     let outcome = envelope(&request, &mut watch).map_err(Failure::new)?;
     Ok(Reply {
         exit: match &outcome.answer.finding {
@@ -241,6 +245,35 @@ fn widened(
             EnvelopeFinding::None { .. } => LIMIT,
         },
         document: document(&outcome.answer, &read.warnings)?,
+        ..Reply::default()
+    })
+}
+
+/// The whole region.
+fn delimited(
+    question: &EnvelopeQuestion,
+    request: &EnvelopeRequest,
+    warnings: &[Diagnostic],
+    watch: &mut Watch<'_>,
+) -> Result<Reply, Failure> {
+    if question.guarantee.is_some_and(|own| own != Guarantee::Weak) {
+        return Err(Failure::new(
+            "the region is that of the weak guarantee; the others are about boxes",
+        ));
+    }
+    let settings = RegionSettings {
+        with_boxes: question.volume,
+        with_volume: question.volume,
+        seed: question.seed,
+    };
+    let outcome = region(request, &settings, watch).map_err(Failure::new)?;
+    Ok(Reply {
+        exit: match &outcome.answer.finding {
+            RegionFinding::Region { pieces, .. } if !pieces.is_empty() => YES,
+            RegionFinding::None { .. } => LIMIT,
+            _ => NO,
+        },
+        document: document(&outcome.answer, warnings)?,
         ..Reply::default()
     })
 }

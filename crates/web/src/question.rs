@@ -1,6 +1,6 @@
 //! What can be asked. The members are named as the options of the command, and mean the same.
 
-use elbowroom::envelope::{Growth, Guarantee, Method, Objective};
+use elbowroom::envelope::{self, Growth, Guarantee, Objective};
 use elbowroom::execute::NamedText;
 use elbowroom::text::Source;
 use serde::Deserialize;
@@ -112,7 +112,7 @@ pub struct EnvelopeQuestion {
     pub controllable: Vec<String>,
     /// What holds inside the envelope.
     #[serde(default)]
-    pub guarantee: Guarantee,
+    pub guarantee: Option<Guarantee>,
     /// Whether the dispatcher enforces conditions that bound the difference of two times.
     #[serde(default)]
     pub enforce: bool,
@@ -122,6 +122,13 @@ pub struct EnvelopeQuestion {
     /// The algorithm.
     #[serde(default)]
     pub method: Method,
+    /// With [`Method::Exact`]: whether the answer has the region's volume, and boxes with their
+    /// shares of it.
+    #[serde(default)]
+    pub volume: bool,
+    /// The seed of what is sampled for that.
+    #[serde(default)]
+    pub seed: u64,
     /// What the best box is the greatest of.
     #[serde(default)]
     pub objective: Objective,
@@ -174,6 +181,29 @@ pub struct RunQuestion {
     /// As for a [check](CheckQuestion::epsilon).
     #[serde(default)]
     pub epsilon: Option<String>,
+}
+
+/// The algorithm of an envelope.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Incremental rectangular robustification.
+    #[default]
+    Irr,
+    /// The largest box.
+    Best,
+    /// No box, but the whole region.
+    Exact,
+}
+
+impl From<Method> for envelope::Method {
+    /// The whole region is found without looking for a box.
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Irr | Method::Exact => Self::Irr,
+            Method::Best => Self::Best,
+        }
+    }
 }
 
 /// Asks for the page about an answer or a trace.

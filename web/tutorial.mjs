@@ -1,0 +1,74 @@
+// The chapters of the tutorial as HTML, with buttons for the commands that the playground can try.
+
+import { readFileSync, readdirSync } from "node:fs";
+import { join } from "node:path";
+import { Marked } from "marked";
+
+const escaped = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("\"", "&quot;");
+const ASKS = ["check", "plan", "envelope", "run"];
+// Options that only concern files of the command line.
+const FILES = { "--trace": 1, "-o": 1, "--plan": 1 };
+// Options for which there is something else here.
+const ELSEWHERE = ["--planner", "--world-process", "--replay", "--json"];
+
+const words = (line) => [...line.matchAll(/"([^"]*)"|(\S+)/g)].map((match) => match[1] ?? match[2]);
+const quoted = (word) => (/\s/.test(word) ? `"${word}"` : word);
+
+// A command as something to try; null if the playground cannot.
+function trial(line, state) {
+  const [program, ask, ...rest] = words(line);
+  if (program !== "elbowroom" || !ASKS.includes(ask)) return null;
+  const options = [], found = { ask, example: null, world: "", likelihoods: "" };
+  while (rest.length) {
+    const word = rest.shift();
+    const [, name] = /^cases\/([a-z-]+)\//.exec(word) ?? [];
+    if (ELSEWHERE.includes(word)) return null;
+    if (name) found.example = name;
+    else if (word in FILES) rest.shift();
+    else if (word === "--world" || word === "--likelihoods") {
+      const kind = word.slice(2);
+      rest.shift();
+      if (!state[kind]) return null;
+      found[kind] = state[kind];
+    } else if (word.startsWith("--")) {
+      options.push(word);
+      if (rest.length && !rest[0].startsWith("--")) options.push(quoted(rest.shift()));
+    } else if (!/\.plan$/.test(word)) return null;
+  }
+  return found.example || ask === "check" ? { ...found, options: options.join(" ") } : null;
+}
+
+export function chapters(root) {
+  const folders = ["crates/elbowroom/docs/tutorial", "crates/laboratory/docs/tutorial"];
+  const files = folders.flatMap((folder) => readdirSync(join(root, folder)).sort().map((name) => join(root, folder, name)));
+  const state = {};
+  return files.map((file) => {
+    const trials = [];
+    const marked = new Marked({
+      renderer: {
+        // There is nothing to go to from a page that stands by itself.
+        link({ tokens }) { return this.parser.parseInline(tokens); },
+        code({ text, lang }) {
+          const [, format] = /^format = "elbowroom-(world|likelihoods)"/.exec(text) ?? [];
+          if (format) state[format] = `${text}\n`;
+          // Lines that documentation tests need, and nobody reads.
+          const shown = lang === "rust" ? text.split("\n").filter((line) => !/^# |^#$/.test(line)).join("\n") : text;
+          const commands = lang === "text" ? text.replaceAll("\\\n", " ").split("\n").filter((line) => line.startsWith("elbowroom ")) : [];
+          const buttons = commands.flatMap((line) => {
+            const found = trial(line, state);
+            if (!found) return [];
+            trials.push({ ...found, command: line.replace(/\s+/g, " ") });
+            const about = commands.length > 1 ? `: ${line.replace(/\s+/g, " ").slice(0, 70)}…` : "";
+            return [`<button type="button" data-try="${trials.length - 1}">Try it${escaped(about)}</button>`];
+          });
+          return `<pre tabindex="0"><code>${escaped(shown)}</code></pre>${buttons.length ? `<p>${buttons.join(" ")}</p>` : ""}\n`;
+        },
+      },
+    });
+    const text = readFileSync(file, "utf8");
+    const [, title] = /^# (.*)$/m.exec(text);
+    // The title is in the list of chapters, and the page has one of its own.
+    const html = marked.parse(text.replace(/^# .*$/m, "")).replaceAll(/<(\/?)h2/g, "<$1h3");
+    return { title, html, trials };
+  });
+}
