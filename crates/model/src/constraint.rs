@@ -150,6 +150,12 @@ pub struct SoftConstraint {
 }
 
 impl Constraints {
+    /// Whether the states before the task's beginning count, and are not known: what is left of a
+    /// plan in mid-execution.
+    pub fn is_past_lost(&self) -> bool {
+        self.is_past_lost
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.hard.is_empty() && self.soft.is_empty()

@@ -17,6 +17,8 @@
 //!   a condition must not become true either.
 //! - The goal is read in the end, after all timed initials too, so it needs no constraint of its
 //!   own: what writes a fact or fluent last does so in every schedule.
+//! - What changes the facts that a constraint on the plan's course reads keeps its order, and
+//!   bounds on the times of such changes are bounds between happenings.
 //! - A duration obeys its domain rather than the planner's number; where the domain's bounds
 //!   depend on values that depend on the schedule, it stays as it was.
 //!
@@ -26,6 +28,7 @@
 //! constraints have a reason of their own ([`Reason::Side`](crate::Reason::Side)), and are given
 //! up there as far as nothing needs them.
 
+mod course;
 pub(crate) mod durations;
 mod implied;
 mod order;
@@ -59,6 +62,12 @@ pub struct Deordered {
 /// A plan cannot be deordered, because it is not valid, or because what makes it so is not heeded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DeorderError {
+    /// The plan does not keep a constraint on its course.
+    #[error("the plan does not keep the constraint {constraint}")]
+    Broken {
+        /// As PDDL writes it.
+        constraint: String,
+    },
     /// Orders and bounds do not respect this part of the problem.
     #[error("no network can be made of the plan: networks do not respect {feature} yet")]
     Unsupported {
@@ -93,11 +102,9 @@ pub enum DeorderError {
 ///
 /// # Errors
 /// When the plan is not valid, as far as that shows here; ask the judge first. When the problem
-/// has constraints that orders and bounds do not respect ([`Task::only_judged`]).
+/// has constraints that orders and bounds do not respect: on numbers, on derived facts, on what
+/// conditional effects change.
 pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, DeorderError> {
-    if let Some(feature) = task.only_judged() {
-        return Err(DeorderError::Unsupported { feature });
-    }
     let Labelled {
         plan: mut stn_plan,
         instances,
@@ -122,6 +129,8 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
         .constraints
         .extend(durations::constraints(task, &stn_plan, &times));
     stn_plan.constraints.extend(order.into_constraints());
+    let course = course::constraints(task, &stn_plan, &footprints, &times)?;
+    stn_plan.constraints.extend(course);
     let sides: Vec<_> = sides.into_constraints().collect();
     let mut kept = stn_plan.clone();
     kept.constraints.extend(sides.iter().cloned());

@@ -134,6 +134,8 @@ pub enum Reason {
     /// The same, where the condition compares numbers and the happening increases or decreases
     /// one: whether anything needs this depends on the numbers.
     Side,
+    /// A constraint on the course of the plan keeps turns in their order, or bounds their times.
+    Course,
     /// Kept at, or near, what it is in the original plan, because of numeric conditions.
     Pinned,
 }

@@ -14,12 +14,14 @@
 //!    times that are not settled form a small network (`network`).
 //! 3. `relaxed` estimates how far the goal is.
 //! 4. `extract` turns the choices into a plan with times, and shows it to the judge.
-//! 5. `run` shares the time out among searches: first for any plan, then for better ones.
+//! 5. `course` turns constraints on the course of a plan into conditions and goals first.
+//! 6. `run` shares the time out among searches: first for any plan, then for better ones.
 
 mod answer;
 mod apply;
 mod bound;
 mod compile;
+mod course;
 mod expressions;
 mod extract;
 mod formula;
@@ -67,13 +69,20 @@ pub fn plan(
     settings: &Settings,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Answer {
-    let mut progress = Progress::default();
-    if let Some(feature) = task.only_judged() {
-        return Answer::Unsupported(Unsupported {
-            feature: feature.to_owned(),
-            place: format!("problem {}", task.problem().name),
-        });
+    if course::concerns(task, situation, settings) {
+        return course::plan(task, situation, settings, observe);
     }
+    search_for_plans(task, situation, settings, observe)
+}
+
+/// As [`plan`], of a task without constraints on the course of its plans.
+fn search_for_plans(
+    task: &Task,
+    situation: &Situation,
+    settings: &Settings,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
+    let mut progress = Progress::default();
     if observe(&progress).is_break() {
         return none_found(Stopped::Interrupted, progress.counts);
     }

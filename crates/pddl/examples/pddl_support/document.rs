@@ -52,7 +52,7 @@ const SUPPORTED: &[(&str, &str)] = &[
         "Constraints on the course",
         "`:constraints` of domain and problem (PDDL 3): `at end`, `always`, `sometime`, `within`, \
          `at-most-once`, `sometime-after`, `sometime-before`, `always-within`, `hold-during`, \
-         `hold-after`, under `and`, `forall` and `preference`; the judge alone heeds them so far",
+         `hold-after`, under `and`, `forall` and `preference`",
     ),
     (
         "Preferences",
@@ -90,6 +90,10 @@ states that a plan goes through.
   number without a value is violated.
 - A plan that breaks a constraint is invalid, and the judge says since when and why. In \
   mid-execution, what has been so far is not known: the judge says that it cannot tell.
+- The embedded planner finds plans under most of them \
+  ([how](planners-embedded.md#constraints-on-the-course)). Networks and envelopes respect those on facts: what changes them keeps its order, and \
+  deadlines become bounds. Whatever does not heed constraints refuses them by name: runs and other \
+  plans in mid-execution, STN plan files, odds.
 
 ";
 

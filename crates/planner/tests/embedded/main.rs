@@ -9,6 +9,7 @@
 
 mod cancellation;
 mod concurrency;
+mod course;
 mod features;
 mod metric;
 mod portfolio;

@@ -1,0 +1,253 @@
+//! Constraints on the course of a plan, as conditions of actions and goals.
+//!
+//! A problem with constraints becomes one without them, of which the plans are made that keep them
+//! (Baier & McIlraith, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala,
+//! ICAPS 2021, do such things for sequential plans; here happenings overlap):
+//!
+//! - `always`: what would make the last literal of a clause false needs another one to be true.
+//! - `sometime`, `within`: an *observer*, an action that takes no time, sees that the condition
+//!   holds, before its deadline; the goal asks for what it has seen.
+//! - `sometime-before`: always, unless the other condition has been seen.
+//! - `at-most-once`: what ends it says so, and then nothing can begin it.
+//! - `at end`: a part of the goal.
+//!
+//! Observers are left out of the plan, and the judge sees it under the constraints as they are. The
+//! observers' plans are a little fewer: what they see lasts for ε, and a step that changes several
+//! literals of a clause at once is judged by the state before. So nothing is proved this way.
+
+mod clauses;
+mod rewriting;
+
+use std::ops::ControlFlow;
+
+use elbowroom_model::problem::{Expression, Problem};
+use elbowroom_model::validate::{self, Verdict, validate};
+use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan};
+
+use super::answer::{Answer, Counts, Found, Objective, Progress, Proof, Settings, Stopped};
+use super::compile::Unsupported;
+
+/// Why a problem has no form without constraints.
+enum Obstacle {
+    /// What is not supported.
+    Feature(&'static str),
+    /// A constraint that is broken from the beginning.
+    Broken(String),
+}
+
+/// How many states are evaluated for each preference that is tried.
+const TRIAL: u64 = 20_000;
+
+/// Whether plans of a task are looked for here.
+pub(super) fn concerns(task: &Task, situation: &Situation, settings: &Settings) -> bool {
+    let constraints = task.constraints();
+    let is_improving = !settings.first_plan_only
+        && settings.objective == Objective::Metric
+        && *situation == Situation::initial(task)
+        && counts_violations(task);
+    !constraints.hard.is_empty() || is_improving && !constraints.soft.is_empty()
+}
+
+fn counts_violations(task: &Task) -> bool {
+    let mut counts = false;
+    if let Some(metric) = &task.problem().metric {
+        metric.expression.visit_leaves(&mut |leaf| {
+            counts |= matches!(leaf, Expression::Violations(_));
+        });
+    }
+    counts
+}
+
+/// As [`plan`](super::plan), of a task with constraints.
+///
+/// Where the metric counts violated preferences, they are tried one after the other once there is a
+/// plan: each is demanded, beside those that paid, for some states. The rest of the time goes into
+/// plans under all that paid.
+pub(super) fn plan(
+    task: &Task,
+    situation: &Situation,
+    settings: &Settings,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Answer {
+    if *situation != Situation::initial(task) || task.constraints().is_past_lost() {
+        return unsupported(task, "trajectory constraints in mid-execution");
+    }
+    let mut search = Search {
+        task,
+        settings,
+        observe,
+        best: None,
+        is_interrupted: false,
+    };
+    let is_improving = !settings.first_plan_only && counts_violations(task);
+    let mut demanded = Vec::new();
+    if is_improving {
+        let first = match search.under(&demanded, None, true) {
+            Ok(answer) => answer,
+            Err(answer) => return answer,
+        };
+        if search.best.is_none() || search.is_interrupted {
+            return search.answer(first);
+        }
+        for soft in 0..task.constraints().soft.len() {
+            demanded.push(soft);
+            let before = search.best.as_ref().map(|best| best.value.clone());
+            let tried = search.under(&demanded, Some(TRIAL), true);
+            let after = search.best.as_ref().map(|best| best.value.clone());
+            if tried.is_err() || after == before {
+                demanded.pop();
+            }
+            if search.is_interrupted {
+                break;
+            }
+        }
+        if search.is_interrupted {
+            return search.answer(first);
+        }
+    }
+    match search.under(&demanded, None, settings.first_plan_only) {
+        Ok(answer) => search.answer(answer),
+        Err(answer) => answer,
+    }
+}
+
+/// A search for plans of the task, in several problems without constraints.
+struct Search<'a> {
+    task: &'a Task,
+    settings: &'a Settings,
+    observe: &'a mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    best: Option<Found>,
+    is_interrupted: bool,
+}
+
+impl Search<'_> {
+    /// Looks for plans that keep these preferences, too; the answer is about the problem without
+    /// constraints. `Err` if there is no such problem: the answer, then, about the task.
+    fn under(
+        &mut self,
+        demanded: &[usize],
+        most_states: Option<u64>,
+        first_plan_only: bool,
+    ) -> Result<Answer, Answer> {
+        let free = match rewriting::without_constraints(self.task, demanded) {
+            Ok(problem) => free_task(self.task, problem),
+            Err(Obstacle::Feature(feature)) => return Err(unsupported(self.task, feature)),
+            Err(Obstacle::Broken(constraint)) => {
+                let reason = format!("the constraint {constraint} is broken from the beginning");
+                return Err(Answer::Unsolvable {
+                    proof: Proof::Unreachable(vec![reason]),
+                    counts: Counts::default(),
+                });
+            }
+        };
+        let settings = Settings {
+            first_plan_only,
+            ..self.settings.clone()
+        };
+        let begin = Situation::initial(&free);
+        let answer = super::search_for_plans(&free, &begin, &settings, &mut |progress| {
+            let is_over = most_states.is_some_and(|most| progress.counts.evaluated > most);
+            match self.look(progress) {
+                ControlFlow::Continue(()) if !is_over => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            }
+        });
+        Ok(answer)
+    }
+
+    /// Takes over what a search reports.
+    fn look(&mut self, progress: &Progress) -> ControlFlow<()> {
+        let found = progress.plan.as_ref();
+        let found = found.and_then(|found| judged(self.task, self.settings, &found.plan));
+        let worth = |found: &Found| (found.value.clone(), found.makespan.clone());
+        let best = &self.best;
+        let better =
+            found.filter(|found| best.as_ref().is_none_or(|best| worth(found) < worth(best)));
+        let report = Progress {
+            plan: better.clone(),
+            best: better
+                .as_ref()
+                .or(best.as_ref())
+                .map(|found| found.value.clone()),
+            ..progress.clone()
+        };
+        if better.is_some() {
+            self.best = better;
+        }
+        let flow = (self.observe)(&report);
+        self.is_interrupted |= flow.is_break();
+        flow
+    }
+
+    /// The answer about the task, after the last one about a problem without constraints.
+    fn answer(self, last: Answer) -> Answer {
+        let (stopped, counts) = match &last {
+            Answer::Plan {
+                stopped, counts, ..
+            }
+            | Answer::NoneFound { stopped, counts } => (*stopped, *counts),
+            Answer::Unsolvable { counts, .. } => (Stopped::Exhausted, *counts),
+            Answer::Unsupported(_) if self.best.is_none() => return last,
+            Answer::Unsupported(_) => (Stopped::Exhausted, Counts::default()),
+        };
+        let stopped = match stopped {
+            _ if self.is_interrupted => Stopped::Interrupted,
+            Stopped::FirstPlan if self.best.is_none() => Stopped::Exhausted,
+            stopped => stopped,
+        };
+        match self.best {
+            Some(found) => Answer::Plan {
+                found,
+                stopped,
+                counts,
+            },
+            None => Answer::NoneFound { stopped, counts },
+        }
+    }
+}
+
+fn free_task(task: &Task, problem: Problem) -> Task {
+    Task::new(problem).with_epsilon(task.epsilon().clone())
+}
+
+fn unsupported(task: &Task, feature: &str) -> Answer {
+    Answer::Unsupported(Unsupported {
+        feature: feature.to_owned(),
+        place: format!("problem {}", task.problem().name),
+    })
+}
+
+/// The plan without observers, if the judge accepts it.
+fn judged(task: &Task, settings: &Settings, plan: &TimeTriggeredPlan) -> Option<Found> {
+    let own = plan
+        .steps
+        .iter()
+        .filter(|step| step.action.schema.index() < task.problem().schemas.len());
+    let steps = own.map(|step| {
+        let action = task.instantiate(step.action.schema, &step.action.arguments);
+        Some(Step {
+            start: step.start.clone(),
+            action: action.ok()?,
+            duration: step.duration.clone(),
+        })
+    });
+    let plan = TimeTriggeredPlan {
+        steps: steps.collect::<Option<_>>()?,
+    };
+    let Verdict::Valid(report) = validate(task, &plan, &validate::Settings::default()) else {
+        return None;
+    };
+    let metric = report.metric(task);
+    let is_maximized = task.problem().metric.as_ref().is_some_and(|m| m.maximize);
+    let value = match (&metric, settings.objective) {
+        (Some(metric), Objective::Metric) if is_maximized => -metric,
+        (Some(metric), Objective::Metric) => metric.clone(),
+        _ => report.makespan.clone(),
+    };
+    Some(Found {
+        plan,
+        makespan: report.makespan,
+        metric,
+        value,
+    })
+}
