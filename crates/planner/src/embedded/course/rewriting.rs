@@ -4,14 +4,14 @@ use std::collections::BTreeSet;
 
 use elbowroom_model::ground;
 use elbowroom_model::problem::{
-    Atom, Body, Change, Condition, Constraint, Effect, Guard, ObjectId, Predicate, PredicateId,
-    Problem, Schema, Term, TimedChange, TimedInitial,
+    Atom, Body, Change, Condition, Effect, Guard, ObjectId, Predicate, PredicateId, Problem,
+    Schema, Term, TimedChange, TimedInitial,
 };
 use elbowroom_model::{Modal, Task};
 use elbowroom_num::Rational;
 
-use super::Obstacle;
 use super::clauses::{Literal, clauses, lifted};
+use super::{Obstacle, counts_violations};
 
 /// Most clauses that always hold.
 const MOST_CLAUSES: usize = 5_000;
@@ -41,9 +41,13 @@ struct Rewriting<'a> {
 /// constraints) among those that are kept.
 pub(super) fn without_constraints(task: &Task, demanded: &[usize]) -> Result<Problem, Obstacle> {
     let mut problem = task.problem().clone();
-    let constraints = std::mem::take(&mut problem.constraints);
-    problem.constraints = constraints.iter().filter_map(soft).collect();
+    // What is violated of the preferences, the judge counts in the task itself.
+    problem.constraints.clear();
+    problem.action_preferences.clear();
     problem.domain_constraints = 0;
+    if counts_violations(task) {
+        problem.metric = None;
+    }
     let mut rewriting = Rewriting {
         task,
         goals: vec![problem.goal.clone()],
@@ -59,21 +63,6 @@ pub(super) fn without_constraints(task: &Task, demanded: &[usize]) -> Result<Pro
         rewriting.modal(modal)?;
     }
     rewriting.finish()
-}
-
-/// The preferences of a constraint.
-fn soft(constraint: &Constraint) -> Option<Constraint> {
-    match constraint {
-        Constraint::Modal(_) => None,
-        Constraint::Preference(..) => Some(constraint.clone()),
-        Constraint::And(parts) => {
-            let parts: Vec<_> = parts.iter().filter_map(soft).collect();
-            (!parts.is_empty()).then_some(Constraint::And(parts))
-        }
-        Constraint::Forall(variables, part) => {
-            Some(Constraint::Forall(variables.clone(), Box::new(soft(part)?)))
-        }
-    }
 }
 
 impl Rewriting<'_> {
