@@ -48,6 +48,8 @@ export function chapters(root) {
       renderer: {
         // There is nothing to go to from a page that stands by itself.
         link({ tokens }) { return this.parser.parseInline(tokens); },
+        // The playground shows the real thing.
+        image() { return ""; },
         code({ text, lang }) {
           const [, format] = /^format = "elbowroom-(world|likelihoods)"/.exec(text) ?? [];
           if (format) state[format] = `${text}\n`;

@@ -25,18 +25,20 @@ pub(crate) struct Attendance(Option<Attendants>);
 #[derive(Clone)]
 struct Attendants {
     desk: Desk,
-    status: Status,
-    board: Board,
+    /// Where they ask, if not at the page alone.
+    asked: Option<(Status, Board)>,
 }
 
 impl Attendance {
     /// By those who hand in requests at `desk`, and ask `status` and `board`.
     pub(crate) fn by(desk: Desk, status: Status, board: Board) -> Self {
-        Self(Some(Attendants {
-            desk,
-            status,
-            board,
-        }))
+        let asked = Some((status, board));
+        Self(Some(Attendants { desk, asked }))
+    }
+
+    /// By those who only hand in requests.
+    pub(crate) fn at(desk: Desk) -> Self {
+        Self(Some(Attendants { desk, asked: None }))
     }
 
     /// Where requests wait.
@@ -46,7 +48,8 @@ impl Attendance {
 
     /// To be told what the run believes.
     pub(crate) fn listener(&self) -> impl FnMut(&elbowroom::execution::Progression) + Send + use<> {
-        let status = self.0.as_ref().map(|attendants| attendants.status.clone());
+        let asked = self.0.as_ref().and_then(|it| it.asked.as_ref());
+        let status = asked.map(|(status, _)| status.clone());
         move |belief| {
             if let Some(status) = &status {
                 status.believe(belief);
@@ -83,9 +86,11 @@ impl<R: Recorder> Recorder for Witnessed<R> {
     fn record(&mut self, entry: &Entry<'_>) {
         self.inner.record(entry);
         if let Some(attendants) = &self.attendants {
-            attendants.status.record(entry);
-            let line = Line::of(&self.task, entry);
-            attendants.board.add(&format!("{}\n", line.text()));
+            if let Some((status, board)) = &attendants.asked {
+                status.record(entry);
+                let line = Line::of(&self.task, entry);
+                board.add(&format!("{}\n", line.text()));
+            }
             if !self.written_ahead && matches!(entry, Entry::Passed { .. }) {
                 attendants.desk.acknowledge();
             }

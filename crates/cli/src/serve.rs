@@ -12,8 +12,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use elbowroom::execution::run::FIRST_GOAL;
 use tiny_http::{Header, Method, Request, Response, Server};
 
+use crate::attendance::{Ask, Desk};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
@@ -302,6 +304,7 @@ pub(crate) fn start(
     address: Address,
     board: Board,
     control: Option<Control>,
+    desk: Option<Desk>,
 ) -> Result<(), Failure> {
     let failure = |why: &dyn fmt::Display| {
         Failure::new(
@@ -312,7 +315,7 @@ pub(crate) fn start(
     let server = Server::http(address.0).map_err(|error| failure(&error))?;
     let own = server.server_addr().to_ip().unwrap_or(address.0);
     let with_token = if control.is_some() {
-        "; with #token=TOKEN at its end, the run can be stopped there"
+        "; with #token=TOKEN at its end, the run can be paused, cancelled and stopped there"
     } else {
         ""
     };
@@ -320,6 +323,7 @@ pub(crate) fn start(
     let doorman = Arc::new(Doorman {
         board,
         control,
+        desk,
         own,
     });
     thread::spawn(move || {
@@ -333,6 +337,7 @@ pub(crate) fn start(
 struct Doorman {
     board: Board,
     control: Option<Control>,
+    desk: Option<Desk>,
     own: SocketAddr,
 }
 
@@ -367,11 +372,11 @@ impl Doorman {
                 Err(why) => request.respond(plain_text(500, &format!("{why}\n"))),
             },
             (Method::Get, "/events") => self.tell(request.into_writer()),
-            (Method::Post, "/stop") => {
-                let answer = self.stop(&request);
+            (Method::Post, "/stop" | "/pause" | "/resume" | "/cancel") => {
+                let answer = self.change(path, &request);
                 request.respond(answer)
             }
-            (_, "/" | "/document" | "/events" | "/stop") => {
+            (_, "/" | "/document" | "/events" | "/stop" | "/pause" | "/resume" | "/cancel") => {
                 request.respond(plain_text(405, "not this way\n"))
             }
             _ => request.respond(plain_text(404, "there is only one page here: /\n")),
@@ -390,17 +395,44 @@ impl Doorman {
             .is_some_and(|header| is_local_name(header.value.as_str()))
     }
 
-    fn stop(&self, request: &Request) -> Response<io::Cursor<Vec<u8>>> {
-        match &self.control {
-            None => plain_text(
-                403,
-                "this page is for looking only: run it with --control FILE\n",
-            ),
-            Some(control) if !control.allows(request) => plain_text(401, "this is not the token\n"),
-            Some(control) => {
-                control.interrupt.request();
-                plain_text(202, "The run is being stopped.\n")
+    fn change(&self, path: &str, request: &Request) -> Response<io::Cursor<Vec<u8>>> {
+        let control = match &self.control {
+            None => {
+                return plain_text(
+                    403,
+                    "this page is for looking only: run it with --control FILE\n",
+                );
             }
+            Some(control) if !control.allows(request) => {
+                return plain_text(401, "this is not the token\n");
+            }
+            Some(control) => control,
+        };
+        if path == "/stop" {
+            control.interrupt.request();
+            return plain_text(202, "The run is being stopped.\n");
+        }
+        let (ask, words) = match path {
+            "/pause" => (
+                elbowroom::execution::Request::Pause,
+                "Nothing more is started; what is under way goes on.\n",
+            ),
+            "/resume" => (elbowroom::execution::Request::Resume, "The run goes on.\n"),
+            _ => (
+                elbowroom::execution::Request::Abandon {
+                    name: FIRST_GOAL.to_owned(),
+                },
+                "Nothing more is started; the run is over when what is under way has ended.\n",
+            ),
+        };
+        let handed = self
+            .desk
+            .as_ref()
+            .map(|desk| desk.hand_in(vec![Ask::Request(ask)]));
+        match handed {
+            Some(Some(_)) => plain_text(202, words),
+            Some(None) => plain_text(503, "too many requests wait for the run\n"),
+            None => plain_text(409, "this run takes no requests but /stop\n"),
         }
     }
 

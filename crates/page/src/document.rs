@@ -20,6 +20,9 @@ pub struct Document {
     pub sections: Vec<Section>,
     /// Texts that occur often; see [`Text`].
     pub texts: Vec<String>,
+    /// Whether this is a run that is paused.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_paused: bool,
     /// Pages that rows of tables lead to ([`Table::opens`]).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub more: Vec<Document>,

@@ -203,6 +203,7 @@ fn document(
         facts,
         sections,
         texts: Vec::new(),
+        is_paused: false,
         more: Vec::new(),
     }
 }

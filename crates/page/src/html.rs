@@ -138,6 +138,7 @@ mod tests {
             facts: Vec::new(),
             sections: Vec::new(),
             texts: Vec::new(),
+            is_paused: false,
             more: Vec::new(),
         };
         let page = html(&document);

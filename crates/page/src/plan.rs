@@ -99,6 +99,7 @@ pub(crate) fn envelope(answer: &EnvelopeAnswer) -> Document {
         facts,
         sections,
         texts: texts.into_texts(),
+        is_paused: false,
         more: Vec::new(),
     }
 }
@@ -151,6 +152,7 @@ pub(crate) fn found(answer: &PlanAnswer) -> Document {
         facts,
         sections,
         texts: texts.into_texts(),
+        is_paused: false,
         more: Vec::new(),
     }
 }

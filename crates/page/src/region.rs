@@ -72,6 +72,7 @@ pub(crate) fn region(answer: &RegionAnswer) -> Document {
         facts,
         sections,
         texts: texts.into_texts(),
+        is_paused: false,
         more: Vec::new(),
     }
 }

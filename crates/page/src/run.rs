@@ -13,7 +13,7 @@ use elbowroom::execute::RunSpec;
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
 use elbowroom::pddl;
-use elbowroom::report::line::{ReasonLine, ReportLine};
+use elbowroom::report::line::{ObservationLine, ReasonLine, ReportLine};
 use elbowroom::report::short::nearest;
 use elbowroom::report::trace::{Line, Stored};
 
@@ -45,7 +45,17 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
     let (mut bars, mut guarantees, mut log) =
         (Bars::default(), Guarantees::default(), Log::default());
     let mut report = None;
+    let mut is_paused = false;
     for line in &stored.lines {
+        if let Line::Observed(observed) = line
+            && observed.remark.is_none()
+        {
+            match observed.observation {
+                ObservationLine::Pause { .. } => is_paused = true,
+                ObservationLine::Resume { .. } => is_paused = false,
+                _ => {}
+            }
+        }
         if let (Some(belief), Line::Observed(observed)) = (&mut belief, line)
             && observed.remark.is_none()
         {
@@ -114,6 +124,10 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
                         "The trace ends at {} before the run was over.",
                         nearest(&now)
                     ),
+                    Record::Growing if is_paused => format!(
+                        "The run is paused: nothing more is started. It is at {}.",
+                        nearest(&now)
+                    ),
                     Record::Growing => format!("The run goes on; it is at {}.", nearest(&now)),
                 },
             },
@@ -121,6 +135,7 @@ pub(crate) fn trace(name: &str, stored: &Stored, spec: &RunSpec, record: Record)
         facts,
         sections,
         texts: texts.into_texts(),
+        is_paused,
         more: Vec::new(),
     }
 }
@@ -143,6 +158,7 @@ pub(crate) fn outcome(answer: &RunAnswer) -> Document {
         ],
         sections,
         texts: Vec::new(),
+        is_paused: false,
         more: Vec::new(),
     }
 }

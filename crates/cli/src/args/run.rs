@@ -142,7 +142,7 @@ pub(crate) struct RunArgs {
     )]
     #[arg(conflicts_with = "replay")]
     pub(crate) serve: Option<Address>,
-    /// Let those who know the token in this file stop the run on that page
+    /// Let those who know the token in this file pause, cancel and stop the run on that page
     #[arg(long, value_name = "FILE", requires = "serve")]
     pub(crate) control: Option<PathBuf>,
     /// Go on with the run of a journal, whose program has died: the world is asked what became of

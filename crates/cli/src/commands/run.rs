@@ -28,7 +28,7 @@ use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 
 use crate::args::RunArgs;
-use crate::attendance::{Attendance, Attended};
+use crate::attendance::{Attendance, Attended, Desk};
 use crate::clock::Clock;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         return replay::run(path, arguments.json, output);
     }
     if let Some(path) = &arguments.resume {
-        return resume::run(path, arguments, &resume::Alone, output);
+        return resume::run(path, arguments, &resume::Alone(arguments), output);
     }
     let (Some(domain), Some(problem)) = (&arguments.domain, &arguments.problem) else {
         return Err(Failure::new(
@@ -58,9 +58,10 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         ));
     };
     let problem = || Ok((&input::source(problem, "problem")?).into());
-    let (spec, world) = spec::of(arguments, domain, problem)?;
+    let (mut spec, world) = spec::of(arguments, domain, problem)?;
+    spec.is_attended = arguments.control.is_some();
     let (task, first) = checked(arguments, &spec, world.as_ref(), output)?;
-    let attendance = Attendance::default();
+    let attendance = attendance(arguments);
     let interrupt = Interrupt::listen();
     let job = Job {
         spec: &spec,
@@ -70,6 +71,14 @@ pub(crate) fn run(arguments: &RunArgs, output: &mut Output) -> Answer {
         attendance: &attendance,
     };
     job.execute(arguments, output)
+}
+
+/// Those who may ask something of a run on its page, if anybody may.
+pub(super) fn attendance(arguments: &RunArgs) -> Attendance {
+    match &arguments.control {
+        Some(_) => Attendance::at(Desk::default()),
+        None => Attendance::default(),
+    }
 }
 
 /// The problem of a specification, and the plan to begin with. What is wrong with a file is told
@@ -152,7 +161,7 @@ impl Job<'_> {
         }
         let (spec, task, interrupt) = (self.spec, self.task, self.interrupt);
         let mut file = TraceFile::open(arguments.trace.as_deref())?;
-        let views = Views::open(arguments, spec, task, interrupt)?;
+        let views = Views::open(arguments, spec, task, interrupt, self.attendance)?;
         let outcome = {
             let mut sink = |line: &str| file.write(line);
             let mut writer = trace::TraceWriter::new(Arc::clone(task), &mut sink);
@@ -233,7 +242,7 @@ impl Job<'_> {
         };
         let kept = Kept::default();
         let interrupt = self.interrupt;
-        let views = Views::open(arguments, self.spec, self.task, interrupt)?;
+        let views = Views::open(arguments, self.spec, self.task, interrupt, self.attendance)?;
         let world = process::ProcessWorld::start(command, self.task, manners, interrupt.clone())?;
         let world = Careful {
             inner: world,

@@ -120,6 +120,7 @@ pub struct Execution<'a> {
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
     is_lasting: bool,
+    is_attended: bool,
     listener: Option<Listener<'a>>,
 }
 
@@ -151,6 +152,7 @@ impl<'a> Execution<'a> {
             is_to_end: Box::new(|| false),
             is_explaining: false,
             is_lasting: false,
+            is_attended: false,
             listener: None,
         }
     }
@@ -246,6 +248,14 @@ impl<'a> Execution<'a> {
         Self { is_lasting, ..self }
     }
 
+    /// Can be paused, and its goal abandoned, while it runs: see [`Run::attended`].
+    pub fn attended(self, is_attended: bool) -> Self {
+        Self {
+            is_attended,
+            ..self
+        }
+    }
+
     /// See [`Run::told_to`].
     pub fn told_to(self, listener: impl FnMut(&Progression) + Send + 'a) -> Self {
         let listener: Option<Listener<'a>> = Some(Box::new(listener));
@@ -281,6 +291,8 @@ impl<'a> Execution<'a> {
             Run::new(self.task, self.plan, self.settings, ports).ending_when(self.is_to_end);
         if self.is_lasting {
             run = run.lasting(read_goal);
+        } else if self.is_attended {
+            run = run.attended();
         }
         if let Some(listener) = self.listener {
             run = run.told_to(listener);

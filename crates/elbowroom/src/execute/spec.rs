@@ -72,6 +72,14 @@ pub struct RunSpec {
         skip_serializing_if = "std::ops::Not::not"
     )]
     pub is_lasting: bool,
+    /// Whether the run can be paused and its goal abandoned (`elbowroom run --control`); left out
+    /// where it cannot.
+    #[serde(
+        default,
+        rename = "attended",
+        skip_serializing_if = "std::ops::Not::not"
+    )]
+    pub is_attended: bool,
     /// The executor.
     #[serde(with = "as_text")]
     pub executor: ExecutorSpec,
@@ -163,6 +171,7 @@ impl RunSpec {
             likelihoods: None,
             has_plan: false,
             is_lasting: false,
+            is_attended: false,
             executor: ExecutorSpec::default(),
             seed: 0,
             planner_states: planner.most_states,

@@ -76,6 +76,11 @@ pub(super) struct Lasting<'a> {
     plan: Option<TimeTriggeredPlan>,
     /// Since when the run rests.
     rests_since: Option<Rational>,
+    /// Whether the run is over where others are: it only takes pauses, and that its goal is
+    /// abandoned.
+    ends: bool,
+    /// Whether that was done, so that the run is over as soon as nothing is under way.
+    is_given_up: bool,
 }
 
 /// A change of the goals.
@@ -105,8 +110,23 @@ impl<'a> Run<'a> {
             change: None,
             plan: None,
             rests_since: None,
+            ends: false,
+            is_given_up: false,
         });
         self
+    }
+
+    /// The same run, which can be paused, and whose goal can be abandoned: then nothing more is
+    /// started, and it is over ([`Verdict::Interrupted`]) when what is under way has ended. Other
+    /// goals it does not take.
+    #[must_use]
+    pub fn attended(self) -> Self {
+        let reads_none = |_: &Task, _: &str| Err("this run has one goal".to_owned());
+        let mut run = self.lasting(reads_none);
+        if let Some(lasting) = &mut run.lasting {
+            lasting.ends = true;
+        }
+        run
     }
 
     /// Takes in a request.
@@ -115,6 +135,9 @@ impl<'a> Run<'a> {
             return Some("this run takes no requests; nothing was made of it");
         };
         match request {
+            Request::Pursue { .. } if lasting.ends => {
+                Some("this run takes no other goals; nothing was made of it")
+            }
             Request::Pursue { name, goal } => {
                 let Ok(condition) = lasting.reader.read(&self.task, goal) else {
                     return Some("it is no goal of this problem; nothing was made of it");
@@ -210,6 +233,14 @@ impl<'a> Run<'a> {
             self.stay();
             return Ok(true);
         }
+        if lasting.is_given_up {
+            if self.account.open_tickets().next().is_none() {
+                return Err(Stop::Over(Verdict::Interrupted));
+            }
+            self.news.clear();
+            self.stay();
+            return Ok(true);
+        }
         if let Some(turn) = lasting.change.take() {
             lasting.rests_since = None;
             self.replans = 0;
@@ -243,7 +274,10 @@ impl<'a> Run<'a> {
         let has_goals = self.lasting.as_ref().is_some_and(|it| !it.goals.is_empty());
         if !has_goals {
             self.drop_plan();
-            self.rest_because(None, &[]);
+            match &mut self.lasting {
+                Some(lasting) if lasting.ends => lasting.is_given_up = true,
+                _ => self.rest_because(None, &[]),
+            }
             return Ok(());
         }
         if turn.may_keep
@@ -336,7 +370,7 @@ impl<'a> Run<'a> {
 
     /// Whether the run rests with this verdict, and is not over.
     pub(super) fn goes_on_after(&self, verdict: &Verdict) -> bool {
-        self.lasting.is_some()
+        self.lasting.as_ref().is_some_and(|lasting| !lasting.ends)
             && match verdict {
                 Verdict::GoalReached
                 | Verdict::Unsolvable

@@ -43,13 +43,24 @@ function liveView(update) {
   const status = element("p", { class: "note", role: "status" }, "The page is not connected yet.");
   const following = element("input", { type: "checkbox", checked: true, onchange: () => { if (following.checked) refresh(); } });
   const token = new URLSearchParams(location.hash.slice(1)).get("token");
-  const stop = token && element("button", { type: "button", onclick: async () => {
-    stop.disabled = true;
-    const answer = await fetch("stop", { method: "POST", headers: { authorization: `Bearer ${token}` } }).catch(() => null);
+  // What is asked of the run; whether it was taken in comes back with its next document.
+  async function ask(what, button) {
+    button.disabled = true;
+    const answer = await fetch(what, { method: "POST", headers: { authorization: `Bearer ${token}` } }).catch(() => null);
     const text = answer ? await answer.text() : "the program does not answer";
-    if (!isOver) status.textContent = text.trim();
-    stop.disabled = answer?.ok ?? false;
-  } }, "stop the run");
+    let words = text.trim();
+    try { words = JSON.parse(text).error ?? words; } catch { /* It was no JSON. */ }
+    if (!isOver) status.textContent = words;
+    button.disabled = answer?.ok ? what === "stop" || what === "cancel" : false;
+  }
+  const button = (words, title, onclick) => element("button", { type: "button", title, onclick }, words);
+  const pause = token && button("pause", "Nothing more is started; what is under way goes on", () => ask(data.is_paused ? "resume" : "pause", pause));
+  const cancel = token && button("cancel", "Nothing more is started, and the goal is given up; what is under way ends by itself", () => ask("cancel", cancel));
+  const stop = token && button("stop the run", "What is under way is cancelled, and the run ends", () => ask("stop", stop));
+  const follow = (newer) => {
+    update(newer);
+    if (pause) pause.textContent = newer.is_paused ? "go on" : "pause";
+  };
   let isStale = false, isBusy = false, isOver = false;
 
   async function refresh() {
@@ -60,7 +71,7 @@ function liveView(update) {
       const answer = await fetch("document").catch(() => null);
       const newer = answer?.ok && (await answer.json());
       await released;
-      if (newer && !isOver) update(newer);
+      if (newer && !isOver) follow(newer);
       await new Promise((done) => setTimeout(done, OFTEN));
     }
     isBusy = false;
@@ -78,11 +89,12 @@ function liveView(update) {
     update(JSON.parse(event.data));
     status.textContent = "The run is over.";
     following.disabled = true;
-    stop?.remove();
+    for (const own of [pause, cancel, stop]) own?.remove();
   });
   events.addEventListener("error", () => {
     if (!isOver) status.textContent = "The program that runs this does not answer: below is what was heard last.";
   });
   events.addEventListener("open", () => { status.textContent = "The run goes on."; });
-  return element("div", { class: "controls", id: "live" }, status, element("label", {}, following, "follow"), stop);
+  if (pause && data.is_paused) pause.textContent = "go on";
+  return element("div", { class: "controls", id: "live" }, status, element("label", {}, following, "follow"), pause, cancel, stop);
 }

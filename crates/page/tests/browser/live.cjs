@@ -93,6 +93,52 @@ test("only who knows the token may stop the run", async () => {
   await close(tab);
 });
 
+test("a paused run starts nothing, and goes on when it is told to; its trace replays", async () => {
+  const { address, over } = served(4, "--control", file("token"), "--trace", file("paused.jsonl"));
+  const tab = await watched(await address, `#token=${TOKEN}`);
+  const time = () => tab.evaluate(() => Number(document.getElementById("time").max));
+  await tab.getByRole("button", { name: "pause" }).click();
+  await tab.waitForFunction(() => document.getElementById("verdict").textContent.startsWith("The run is paused"), null, { timeout: 20_000 });
+  await tab.getByRole("button", { name: "go on" }).waitFor();
+  // What is under way ends; then nothing is, however long one waits.
+  const starts = () => fs.readFileSync(file("paused.jsonl"), "utf8").split("\n").filter((line) => line.includes('"event":"command"')).length;
+  await tab.waitForTimeout(4500);
+  const [before, then] = [starts(), await time()];
+  await tab.waitForTimeout(1500);
+  assert.equal(starts(), before);
+  assert.ok(before < 5, `${before} commands`);
+  // Somebody who comes now sees that it is paused.
+  const late = await watched(await address, `#token=${TOKEN}`);
+  await late.getByRole("button", { name: "go on" }).waitFor();
+  await late.getByRole("button", { name: "go on" }).click();
+  await close(late);
+  await tab.waitForFunction(() => document.getElementById("verdict").textContent.startsWith("The goal was reached"), null, { timeout: 40_000 });
+  assert.equal((await over).code, 0);
+  assert.ok(await time() > then);
+  assert.equal(await tab.getByRole("button", { name: /pause|go on|cancel/ }).count(), 0);
+  const replay = JSON.parse(run("run", "--json", "--replay", file("paused.jsonl")));
+  assert.deepEqual([replay.agrees, replay.complete], [true, true]);
+  await close(tab);
+});
+
+test("a run whose goal is given up starts nothing more, and is over when what is under way has ended", async () => {
+  const { address, over } = served(4, "--control", file("token"), "--trace", file("cancelled.jsonl"));
+  const tab = await watched(await address, `#token=${TOKEN}`);
+  await tab.waitForFunction(() => document.querySelectorAll("section tbody tr").length > 2);
+  await tab.getByRole("button", { name: "cancel" }).click();
+  const { code } = await over;
+  assert.equal(code, 130);
+  const lines = fs.readFileSync(file("cancelled.jsonl"), "utf8").trim().split("\n").map((line) => JSON.parse(line));
+  const asked = lines.findIndex((line) => line.observation?.type === "abandon");
+  assert.ok(asked > 0);
+  assert.ok(lines.slice(asked).every((line) => line.event !== "command"));
+  const end = lines.at(-1);
+  assert.equal(end.verdict, "interrupted");
+  // What had begun has ended by itself.
+  assert.ok(end.executed.length > 0 && end.executed.every((it) => it.outcome === "succeeded"), JSON.stringify(end.executed));
+  await close(tab);
+});
+
 test("without a token nobody may, and a page of another host may not read it", async () => {
   const { child, address, over } = served(1);
   const base = await address;

@@ -118,9 +118,9 @@ pub(in crate::commands) trait Host {
 }
 
 /// Nobody.
-pub(in crate::commands) struct Alone;
+pub(in crate::commands) struct Alone<'a>(pub(in crate::commands) &'a RunArgs);
 
-impl Host for Alone {
+impl Host for Alone<'_> {
     fn attend(&self, spec: &RunSpec, _: &Arc<Task>, _: &Interrupt) -> Result<Attendance, Failure> {
         if spec.is_lasting {
             return Err(Failure::new(
@@ -128,7 +128,16 @@ impl Host for Alone {
                 "go on with `elbowroom serve --resume`",
             ));
         }
-        Ok(Attendance::default())
+        if spec.is_attended && self.0.control.is_none() {
+            return Err(Failure::new(
+                "this run can be paused from its page, and may be",
+                "give --serve and --control again",
+            ));
+        }
+        Ok(match spec.is_attended {
+            true => super::attendance(self.0),
+            false => Attendance::default(),
+        })
     }
 }
 
@@ -161,7 +170,7 @@ pub(in crate::commands) fn run(
     let attendance = host.attend(&spec, &task, &interrupt)?;
     let kept = Kept::default();
     let past = Arc::new(Past::new(&stored));
-    let views = Views::open(arguments, &spec, &task, &interrupt)?;
+    let views = Views::open(arguments, &spec, &task, &interrupt, &attendance)?;
     let outcome = {
         let recorder = PastRecorder {
             past: Arc::clone(&past),

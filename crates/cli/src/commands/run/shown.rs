@@ -10,6 +10,7 @@ use elbowroom::report::trace::{Line, TraceWriter};
 use elbowroom_page::PageError;
 
 use crate::args::RunArgs;
+use crate::attendance::Attendance;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;
@@ -45,6 +46,7 @@ impl<'a> Views<'a> {
         spec: &RunSpec,
         task: &Arc<Task>,
         interrupt: &Interrupt,
+        attendance: &Attendance,
     ) -> Result<Self, Failure> {
         let files = [&arguments.perfetto, &arguments.mcap];
         if arguments.serve.is_none() && files.iter().all(|file| file.is_none()) {
@@ -63,7 +65,7 @@ impl<'a> Views<'a> {
                 Some(path) => Some(Control::read(path, interrupt.clone())?),
                 None => None,
             };
-            serve::start(address, board.clone(), control)?;
+            serve::start(address, board.clone(), control, attendance.desk().cloned())?;
         }
         let board = Some(board);
         Ok(Self { arguments, board })

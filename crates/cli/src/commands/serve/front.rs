@@ -173,6 +173,28 @@ impl Front {
                 self.stop();
                 respond(stream, 202, TEXT, "The executive is being stopped.\n")
             }
+            // What the page's other buttons ask.
+            ("POST", path @ ("/pause" | "/resume")) => {
+                self.allow(request)?;
+                self.change("POST", &format!("/v1{path}"), b"")?;
+                let words = match path {
+                    "/pause" => "Nothing more is started; what is under way goes on.\n",
+                    _ => "It goes on.\n",
+                };
+                respond(stream, 202, TEXT, words)
+            }
+            ("POST", "/cancel") => {
+                self.allow(request)?;
+                for name in self.run()?.0.goals() {
+                    self.change("DELETE", &format!("/v1/goals/{name}"), b"")?;
+                }
+                respond(
+                    stream,
+                    202,
+                    TEXT,
+                    "All goals are abandoned; nothing more is started.\n",
+                )
+            }
             ("GET", "/v1/openapi.json") => respond(stream, 200, JSON, &text(&openapi())),
             ("GET", "/v1/state") => respond(stream, 200, JSON, &text(&self.state())),
             ("GET", "/v1/plan") => respond(stream, 200, JSON, &text(&self.run()?.0.plan())),

@@ -230,6 +230,7 @@ impl RunSpec {
             .by(self.executor.clone())
             .with_settings(self.settings())
             .lasting(self.is_lasting)
+            .attended(self.is_attended)
             .with_envelopes(self.envelopes())
             .with_likelihoods(self.likelihoods(task)?)
             .with_odds(odds)
