@@ -383,3 +383,48 @@ fn a_run_that_is_killed_leaves_its_trace() {
     assert!(text.contains("cut short"), "{text}");
     fs::remove_file(trace).expect("the trace is there");
 }
+
+/// A run in which walking takes so long; the plan reckons with 15 seconds at most.
+fn walking(seconds: &str) -> (String, Option<i32>) {
+    let world = format!("python3 crates/cli/tests/files/late/world.py {seconds}");
+    let files = ["domain.pddl", "problem.pddl", "plan.plan"];
+    let files = files.map(|file| format!("crates/cli/tests/files/late/{file}"));
+    let mut run = vec!["run"];
+    run.extend(files.iter().map(String::as_str));
+    run.extend(["--world-process", &world]);
+    let output = elbowroom(&run);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    (text, output.status.code())
+}
+
+/// The guess that walking takes a quarter longer made the run unsolvable at 15 seconds.
+#[test]
+fn what_is_late_and_may_still_end_in_time_is_waited_for() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let (text, code) = walking("15.5");
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("(walk) [15.5]"), "{text}");
+    assert!(text.contains("(climb) [10]"), "{text}");
+    assert!(!text.contains("slide"), "{text}");
+}
+
+/// It is given up when no plan can bear that it goes on, about 16 seconds after its start, and not after
+/// minutes of silence.
+#[test]
+fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("there is no python3");
+        return;
+    }
+    let (text, code) = walking("1000");
+    assert_eq!(code, Some(0), "{text}");
+    let walked = text.lines().find_map(|line| line.split_once("(walk) [")?.1.split_once(']'));
+    let (seconds, outcome) = walked.expect("walking is what was done first");
+    let seconds: f64 = seconds.parse().expect("a number");
+    assert!((15.0..17.0).contains(&seconds), "{text}");
+    assert_eq!(outcome, " cancelled", "{text}");
+    assert!(text.contains("(slide) [3]"), "{text}");
+}

@@ -9,17 +9,29 @@ pub trait Planner: Send {
     ///
     /// The plan's facts and fluents are those of `task`, whose table may grow for that.
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned;
+
+    /// A plan from there will be asked for soon, unless things go otherwise. Whoever can work aside
+    /// begins with it, and has it ready when it is asked for. Answers do not depend on it.
+    fn expect(&mut self, _task: &Task, _situation: &Situation) {}
 }
 
 impl<P: Planner + ?Sized> Planner for &mut P {
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
         (**self).plan(task, situation)
     }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        (**self).expect(task, situation);
+    }
 }
 
 impl<P: Planner + ?Sized> Planner for Box<P> {
     fn plan(&mut self, task: &Task, situation: &Situation) -> Planned {
         (**self).plan(task, situation)
+    }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        (**self).expect(task, situation);
     }
 }
 

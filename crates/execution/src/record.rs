@@ -3,7 +3,7 @@
 use elbowroom_model::{Situation, TimeTriggeredPlan};
 use elbowroom_num::Rational;
 
-use crate::event::{Command, Observation};
+use crate::event::{Command, Observation, Ticket};
 use crate::executor::{Decided, Mission, Planned};
 use crate::reason::Reason;
 use crate::run::{Report, Verdict};
@@ -98,6 +98,17 @@ pub enum Entry<'a> {
         why_not: Option<&'a str>,
         /// Whether it is certain that there is none.
         is_unsolvable: bool,
+    },
+    /// An action has used most of the time that the plan can bear.
+    Warning {
+        /// The time.
+        now: &'a Rational,
+        /// Its start.
+        ticket: Ticket,
+        /// Its name.
+        action: &'a str,
+        /// From when on a new plan is needed if it has not ended.
+        until: &'a Rational,
     },
     /// The goals have changed, and the rest of the running plan reaches these, too: it is gone on
     /// with, and taken up anew.

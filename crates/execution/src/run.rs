@@ -20,7 +20,7 @@
 //! | feedback | a sign of life: silence counts from then on |
 //! | a report that cannot be understood, or names what the problem does not have | nothing; the record has it |
 //! | answers without end while the clock stands still, or creeps | the world is broken ([`Verdict::WorldFailed`]) |
-//! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed |
+//! | no report at all | when the action should have ended [`Patience`] ago, and the plan does not allow it to run any longer, it is given up: it is cancelled and counts as failed. Where the room of what is under way is watched ([`RunSettings::watches_room`]), so is what no plan can bear any longer |
 //! | a fact or value other than believed | believed; the executor is told, and plays the rest of its plan through |
 //!
 //! A run may also outlast its goal ([`Run::lasting`]): goals are given and abandoned while it goes
@@ -42,6 +42,7 @@ mod handover;
 mod intake;
 mod lasting;
 mod progress;
+mod room;
 mod settings;
 
 use std::sync::Arc;
@@ -105,6 +106,8 @@ pub struct Run<'a> {
     /// Asked whether to end.
     is_to_end: Box<dyn Fn() -> bool + Send + 'a>,
     is_explaining: bool,
+    /// Where a plan will be needed if what is late does not end, as the planner was told.
+    foreseen: Option<(Situation, Vec<Ticket>)>,
     /// What was believed before the first event of the history.
     beginning: Progression,
     /// Told what is believed, whenever something was taken in.
@@ -158,6 +161,7 @@ impl<'a> Run<'a> {
             beginning: belief.clone(),
             listener: Box::new(|_| {}),
             lasting: None,
+            foreseen: None,
             belief,
             account: Account::default(),
             steps: 0,
@@ -283,7 +287,9 @@ impl<'a> Run<'a> {
         // More of what happens now may still come in; if not, some condition has failed.
         let breaking =
             (!self.belief.breaking().is_empty()).then(|| &self.now + self.task.epsilon());
-        let until = until.into_iter().chain(silence).chain(breaking).min();
+        let warning = self.warn();
+        let until = until.into_iter().chain(silence).chain(breaking);
+        let until = until.chain(warning).min();
         let Some(until) = until.map(|until| until.max(self.now.clone())) else {
             // Nothing is running, nothing is due, and the plan is not done.
             return self.replan(&Reason::new(Cause::Late).about(About::Nothing));

@@ -29,6 +29,8 @@ pub enum Line {
     Planning(PlanningLine),
     /// A plan has been made, or not.
     Planned(PlannedLine),
+    /// An action has used most of the time that the plan can bear.
+    Warning(WarningLine),
     /// The goals have changed, and the rest of the plan is kept.
     Kept(KeptLine),
     /// A lasting run waits for a change.
@@ -434,6 +436,22 @@ pub struct PlannedLine {
     pub is_unsolvable: bool,
 }
 
+/// An action has used most of the time that the plan can bear.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WarningLine {
+    /// The time.
+    pub now: Exact,
+    /// Its start.
+    pub ticket: u64,
+    /// Its name.
+    pub action: String,
+    /// From when on a new plan is needed if it has not ended.
+    pub until: Exact,
+    /// The same in words.
+    pub words: String,
+}
+
 /// The goals have changed, and the rest of the running plan reaches these, too.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -530,6 +548,7 @@ impl Line {
             Observed(&'a ObservedLine),
             Planning(&'a PlanningLine),
             Planned(&'a PlannedLine),
+            Warning(&'a WarningLine),
             Kept(&'a KeptLine),
             Resting(&'a RestingLine),
             Interrupted(&'a InterruptedLine),
@@ -548,6 +567,7 @@ impl Line {
             Self::Observed(line) => Named::Observed(line),
             Self::Planning(line) => Named::Planning(line),
             Self::Planned(line) => Named::Planned(line),
+            Self::Warning(line) => Named::Warning(line),
             Self::Kept(line) => Named::Kept(line),
             Self::Resting(line) => Named::Resting(line),
             Self::Interrupted(line) => Named::Interrupted(line),

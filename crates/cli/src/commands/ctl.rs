@@ -230,6 +230,9 @@ fn state(state: &State) -> String {
         if let Some(planned) = &running.planned {
             let _ = write!(text, ", planned {}", nearest(&planned.0));
         }
+        if let Some(needed) = &running.needed {
+            let _ = write!(text, "; if it goes on, a new plan is needed at {}", nearest(&needed.0));
+        }
         if let Some(note) = &running.note {
             let _ = write!(text, ": {}", tame(note));
         }

@@ -1,5 +1,6 @@
 //! `elbowroom run`: execute a plan in a world.
 
+mod ahead;
 mod journaled;
 pub(super) mod live;
 pub(super) mod process;
@@ -20,7 +21,7 @@ use elbowroom::answers::run::{RunOutcome, run as execute};
 use elbowroom::answers::{Halt, RunRequest, Watcher};
 use elbowroom::execute::{RunSpec, SpecError, check_vary};
 use elbowroom::execution::run::Verdict;
-use elbowroom::execution::{Recorder, World};
+use elbowroom::execution::{Planner, Recorder, World};
 use elbowroom::model::{Task, TimeTriggeredPlan};
 use elbowroom::num::Rational;
 use elbowroom::report::trace;
@@ -37,6 +38,7 @@ use crate::journal::JournalFile;
 use crate::output::{self, Output};
 use crate::stopwatch::Stopwatch;
 use crate::words::tame;
+use ahead::Ahead;
 use journaled::{Careful, JournalWriter, Kept};
 use realtime::{Pace, PacedPlanner, Realtime};
 use shown::Views;
@@ -208,8 +210,15 @@ impl Job<'_> {
         world: &mut dyn World,
         recorder: &mut dyn Recorder,
     ) -> Result<RunOutcome, SpecError> {
+        let begun = Clock::start();
+        let clock = || begun.seconds();
+        let goes_on = || !self.interrupt.is_requested();
+        let model = self.spec.model(self.task.problem());
+        let model = model.map_err(SpecError::World)?;
+        let planner = self.spec.planner_for(model.as_ref(), &clock, &goes_on)?;
         let request = RunRequest::new(self.spec, self.task)
             .beginning_with(self.first)
+            .planned_by(Ahead::new(planner, self.spec, self.interrupt))
             .told_to(self.attendance.listener())
             .recorded_by(recorder);
         execute(request, world, &mut Stopwatch::start(self.interrupt))
@@ -259,8 +268,14 @@ impl Job<'_> {
             };
             let writer = self.attendance.witnessed(writer, self.task, true);
             let mut writer = views.shown(writer, self.task);
+            let begun = Clock::start();
+            let clock = || begun.seconds();
+            let goes_on = || !interrupt.is_requested();
+            let planner = self.spec.planner_for(None, &clock, &goes_on);
+            let planner = planner.map_err(contradiction)?;
             let request = RunRequest::new(self.spec, self.task)
                 .beginning_with(self.first)
+                .planned_by(Ahead::new(planner, self.spec, interrupt))
                 .told_to(self.attendance.listener())
                 .recorded_by(live::Live::new(&mut writer));
             let mut watch = Attentive {
@@ -289,6 +304,7 @@ impl Job<'_> {
         let clock = || begun.seconds();
         let goes_on = || !self.interrupt.is_requested();
         let planner = spec.planner_for(Some(&model), &clock, &goes_on)?;
+        let planner: Box<dyn Planner> = Box::new(Ahead::new(planner, spec, self.interrupt));
         let world = Realtime {
             inner: world.as_mut(),
             pace: &pace,

@@ -195,6 +195,8 @@ impl RunSpec {
             planning_time: self.planning_time.clone(),
             most_replans: self.max_replans,
             time_limit: self.time_limit.clone(),
+            // In a simulation without a clock nobody can be warned.
+            watches_room: self.world_process.is_some() || self.realtime.is_some(),
             ..RunSettings::default()
         }
     }

@@ -120,6 +120,8 @@ documents! {
         pub since: Exact,
         /// How long it was planned to take.
         pub planned: Option<Exact>,
+        /// From when on a new plan is needed if it has not ended, once that is near.
+        pub needed: Option<Exact>,
         /// The part that is done, from 0 to 1, if the world has said so.
         pub completion: Option<Exact>,
         /// What the world has said last about it.

@@ -208,6 +208,11 @@ impl Known {
                 self.why = Some(reason.to_string());
             }
             Entry::Planned { .. } => self.is_planning = false,
+            Entry::Warning { ticket, until, .. } => {
+                if let Some(running) = self.running.get_mut(&ticket.0) {
+                    running.needed = Some(Exact((*until).clone()));
+                }
+            }
             Entry::Kept { .. } | Entry::Interrupted { .. } => {}
             Entry::Resting {
                 now,
@@ -289,6 +294,9 @@ impl Known {
             })
             .collect();
         self.promise = None;
+        for running in self.running.values_mut() {
+            running.needed = None;
+        }
     }
 
     fn decide(&mut self, now: &Rational, decided: &Decided) {
@@ -332,6 +340,7 @@ impl Known {
             action: action.name.clone(),
             since: Exact(now.clone()),
             planned: duration.clone().map(Exact),
+            needed: None,
             completion: None,
             note: None,
         };

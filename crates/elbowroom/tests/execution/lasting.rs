@@ -39,22 +39,27 @@ fn task(init: &str, goal: &str) -> Arc<Task> {
 
 /// A world in which actions take as long as planned, and in which a script says what else is seen
 /// and asked. At its end, the run is asked to end.
-struct Scripted {
-    now: Rational,
-    coming: Vec<Observation>,
-    end: Rational,
-    is_to_end: Arc<AtomicBool>,
+pub(crate) struct Scripted {
+    pub(crate) now: Rational,
+    pub(crate) coming: Vec<Observation>,
+    pub(crate) end: Rational,
+    pub(crate) is_to_end: Arc<AtomicBool>,
+    /// An action that takes so long, however long it was planned to.
+    pub(crate) slow: Option<(&'static str, Rational)>,
+    /// What is seen when something was cancelled.
+    pub(crate) on_cancel: Option<Event>,
 }
 
 impl World for Scripted {
     fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
-        let mut tell = |time: Rational, event: Event| {
-            self.coming.push(Observation { time, event });
-        };
+        let coming = &mut self.coming;
+        let mut tell = |time: Rational, event: Event| coming.push(Observation { time, event });
         let measured = Vec::new;
         match command {
             Command::Start {
-                ticket, duration, ..
+                ticket,
+                action,
+                duration,
             } => {
                 let ticket = *ticket;
                 let started = Event::Started {
@@ -63,10 +68,11 @@ impl World for Scripted {
                 };
                 tell(now.clone(), started);
                 if let Some(duration) = duration {
-                    let ending = Ending::Succeeded;
+                    let slow = self.slow.as_ref().filter(|(name, _)| *name == action.name);
+                    let duration = slow.map_or(duration, |(_, duration)| duration);
                     let ended = Event::Ended {
                         ticket,
-                        ending,
+                        ending: Ending::Succeeded,
                         measured: measured(),
                     };
                     tell(now + duration, ended);
@@ -74,19 +80,20 @@ impl World for Scripted {
             }
             Command::Cancel { ticket } => {
                 let about = *ticket;
-                self.coming.retain(
+                coming.retain(
                     |it| !matches!(it.event, Event::Ended { ticket, .. } if ticket == about),
                 );
-                let (ticket, ending) = (about, Ending::Cancelled);
-                let event = Event::Ended {
-                    ticket,
-                    ending,
+                let ended = Event::Ended {
+                    ticket: about,
+                    ending: Ending::Cancelled,
                     measured: measured(),
                 };
-                self.coming.push(Observation {
-                    time: now.clone(),
+                let time = now.clone();
+                let seen = self.on_cancel.clone().into_iter().chain([ended]);
+                coming.extend(seen.map(|event| Observation {
+                    time: time.clone(),
                     event,
-                });
+                }));
             }
         }
         Ok(())
@@ -111,7 +118,7 @@ impl World for Scripted {
 
 /// What is said of each entry that matters here.
 #[derive(Clone, Default)]
-struct Notes(Arc<Mutex<Vec<String>>>);
+pub(crate) struct Notes(pub(crate) Arc<Mutex<Vec<String>>>);
 
 impl Notes {
     fn note(&self, note: String) {
@@ -152,6 +159,11 @@ impl Recorder for Notes {
             } => {
                 let verdict = verdict.map_or("no goals", Verdict::name);
                 self.note(format!("{}: rest: {verdict} {}", at(now), goals.join(" ")));
+            }
+            Entry::Warning {
+                now, action, until, ..
+            } => {
+                self.note(format!("{}: {action} must end by {}", at(now), at(until)));
             }
             Entry::Taken {
                 remark: Some(remark),
@@ -197,6 +209,8 @@ fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) ->
         coming: script.collect(),
         end: Rational::from(end),
         is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
     };
     let (notes, plans) = (Notes::default(), Arc::new(Mutex::new(0)));
     let report = Execution::of(task)
@@ -520,6 +534,8 @@ fn a_run_that_ends_with_its_goal_takes_no_requests() {
         }],
         end: Rational::from(60),
         is_to_end: Arc::default(),
+        slow: None,
+        on_cancel: None,
     };
     let notes = Notes::default();
     let report = Execution::of(&task)
@@ -660,6 +676,8 @@ fn a_plan_that_was_made_for_goals_that_have_changed_since_is_not_begun() {
         coming: coming.into(),
         end: Rational::from(60),
         is_to_end: Arc::clone(&is_to_end),
+        slow: None,
+        on_cancel: None,
     };
     let notes = Notes::default();
     let report = Execution::of(&task)

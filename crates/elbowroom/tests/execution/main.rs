@@ -7,6 +7,7 @@ mod esterel;
 mod guarantee;
 mod handover;
 mod lasting;
+mod late;
 mod likelier;
 mod literal;
 mod lookahead;

@@ -37,6 +37,8 @@ pub(super) struct Opened {
     heard: Option<Rational>,
     pub(super) ended: Option<(Rational, Ending)>,
     cancelled: Option<Rational>,
+    /// Until when the plan could bear it when that was warned of.
+    pub(super) warned: Option<Rational>,
     pub(super) measured: [Vec<Measured>; 2],
 }
 
@@ -77,6 +79,7 @@ impl Account {
             heard: None,
             ended: None,
             cancelled: None,
+            warned: None,
             measured: [Vec::new(), Vec::new()],
         });
         self.steps.insert(order.step, ticket);
@@ -136,6 +139,10 @@ impl Account {
         let heard = &mut self.entries[index(ticket)].heard;
         let latest = heard.take().into_iter().chain([time.clone()]).max();
         *heard = latest;
+    }
+
+    pub(super) fn note_warning(&mut self, ticket: Ticket, until: &Rational) {
+        self.entries[index(ticket)].warned = Some(until.clone());
     }
 
     pub(super) fn is_cancelled(&self, ticket: Ticket) -> bool {

@@ -12,6 +12,25 @@ use crate::planning::PlanAnswer;
 use crate::reason::Reason;
 use crate::record::Entry;
 
+/// When something will end that should have ended.
+#[derive(Clone, Copy)]
+pub(super) enum Guess {
+    /// After a quarter of the time that it has taken. Who guesses "any moment now" again and again
+    /// plans again and again.
+    AQuarterLonger,
+    /// As soon as it can: if there is no plan even then, there is none with it.
+    AnyMoment,
+}
+
+/// An answer of the planner, and to what.
+struct Attempt {
+    answer: PlanAnswer,
+    situation: Situation,
+    running: Vec<Ticket>,
+    /// When the time has passed that planning took.
+    ready: Rational,
+}
+
 impl Run<'_> {
     /// Brings what is running to where a new plan can begin: see [`RunningRule`].
     pub(super) fn settle(&mut self) {
@@ -75,7 +94,43 @@ impl Run<'_> {
         if self.go_without_plan(reason) {
             return Ok(());
         }
-        let (situation, running) = self.situation(&self.allowance);
+        let mut attempt = self.attempt(reason, Guess::AQuarterLonger)?;
+        let overdue = self.overdue();
+        let has_none = |attempt: &Attempt| !matches!(attempt.answer, PlanAnswer::Plan(_));
+        if self.settings.watches_room && has_none(&attempt) && !overdue.is_empty() {
+            // What is overdue may still end in time.
+            attempt = self.attempt(reason, Guess::AnyMoment)?;
+            if has_none(&attempt) {
+                // No plan can bear that it goes on: it has failed, and the next one does without.
+                self.agenda.push(Todo::Plan(reason.clone()));
+                self.agenda.push(Todo::Settle(Some(overdue.clone())));
+                let overdue = overdue.into_iter().rev();
+                self.agenda.extend(overdue.map(Todo::Cancel));
+                return Ok(());
+            }
+        }
+        let plan = match attempt.answer {
+            PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
+            PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
+            PlanAnswer::Plan(plan) => plan,
+        };
+        // What ends from now on is no step of the plan that was given up, and not yet one of the
+        // new plan: what it changes is news, and the new plan is told of its end.
+        self.account.begin_plan(&BTreeMap::new());
+        self.agenda.push(Todo::Adopt(Box::new(Made {
+            plan,
+            situation: attempt.situation,
+            running: attempt.running,
+            ready: attempt.ready,
+        })));
+        Ok(())
+    }
+
+    /// Asks the planner once.
+    fn attempt(&mut self, reason: &Reason, guess: Guess) -> Result<Attempt, Stop> {
+        let foreseen = self.as_foreseen(guess);
+        let (situation, running) =
+            foreseen.unwrap_or_else(|| self.situation(&self.allowance, guess));
         self.ports.recorder.record(&Entry::Planning {
             now: &self.now,
             reason,
@@ -104,21 +159,12 @@ impl Run<'_> {
             is_unsolvable: planned.answer == PlanAnswer::Unsolvable,
         });
         self.heed()?;
-        let plan = match planned.answer {
-            PlanAnswer::Unsolvable => return Err(Stop::Over(Verdict::Unsolvable)),
-            PlanAnswer::NotFound { why } => return Err(Stop::Over(Verdict::NoPlan { why })),
-            PlanAnswer::Plan(plan) => plan,
-        };
-        // What ends from now on is no step of the plan that was given up, and not yet one of the
-        // new plan: what it changes is news, and the new plan is told of its end.
-        self.account.begin_plan(&BTreeMap::new());
-        self.agenda.push(Todo::Adopt(Box::new(Made {
-            plan,
+        Ok(Attempt {
+            answer: planned.answer,
             situation,
             running,
             ready,
-        })));
-        Ok(())
+        })
     }
 
     /// Takes up a plan, as soon as the time is over that it took to make it.
@@ -140,7 +186,11 @@ impl Run<'_> {
 
     /// Where things will stand when the new plan can begin: after the time that planning is
     /// expected to take, and ε after whatever happens last before that.
-    pub(super) fn situation(&self, allowance: &Rational) -> (Situation, Vec<Ticket>) {
+    pub(super) fn situation(
+        &self,
+        allowance: &Rational,
+        guess: Guess,
+    ) -> (Situation, Vec<Ticket>) {
         let epsilon = self.task.epsilon();
         let mut time = &self.now + allowance;
         // Another goal makes another problem, which is written anew for planners that read files.
@@ -150,6 +200,16 @@ impl Run<'_> {
         if time.is_zero() {
             return (Situation::initial(&self.task), Vec::new());
         }
+        self.situation_at(time, guess)
+    }
+
+    /// The same at this time, or ε after the timed initials that come just before it.
+    pub(super) fn situation_at(
+        &self,
+        mut time: Rational,
+        guess: Guess,
+    ) -> (Situation, Vec<Ticket>) {
+        let epsilon = self.task.epsilon();
         let mut state = self.belief.clone();
         loop {
             let _ = state.advance(&time);
@@ -165,11 +225,10 @@ impl Run<'_> {
             .values()
             .map(|underway| {
                 let elapsed = &time - &underway.start;
-                // Who guesses "any moment now" again and again plans again and again.
-                let expected = if underway.planned > elapsed {
-                    underway.planned.clone()
-                } else {
-                    elapsed * Rational::new(5, 4)
+                let expected = match guess {
+                    _ if underway.planned > elapsed => underway.planned.clone(),
+                    Guess::AQuarterLonger => elapsed * Rational::new(5, 4),
+                    Guess::AnyMoment => elapsed + epsilon,
                 };
                 state.running_action(underway, Interval::point(expected))
             })

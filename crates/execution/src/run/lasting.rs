@@ -27,6 +27,7 @@ use elbowroom_model::{Situation, Step, Task, TimeTriggeredPlan, problem};
 use elbowroom_num::Rational;
 
 use super::agenda::Todo;
+use super::handover::Guess;
 use super::intake::Remark;
 use super::{Run, Stop, Verdict};
 use crate::event::{Request, Ticket};
@@ -201,6 +202,7 @@ impl<'a> Run<'a> {
                 problem::Condition::And(goals)
             }
         };
+        self.foreseen = None;
         self.task = Arc::new(self.task.with_goal(goal));
         self.belief.pursue(&self.task);
     }
@@ -329,7 +331,7 @@ impl<'a> Run<'a> {
             let index = first.map(|(index, _)| index)?;
             left.remove(index);
         }
-        let (situation, running) = self.situation(&Rational::ZERO);
+        let (situation, running) = self.situation(&Rational::ZERO, Guess::AQuarterLonger);
         let delay = left.iter().map(|step| &situation.time - &step.start).max();
         let delay = delay.unwrap_or_default().max(Rational::ZERO);
         for step in &mut left {

@@ -19,6 +19,11 @@ pub struct RunSettings {
     pub most_replans: usize,
     /// The rule by which an action without reports is given up.
     pub patience: Patience,
+    /// Whether the room of what is under way is watched. Then there is a warning before a late
+    /// action makes a new plan necessary ([`Entry::Warning`](crate::Entry::Warning)), and an action
+    /// that no plan can bear any longer has failed: it is cancelled, and the next plan does without.
+    /// Otherwise, that no plan can bear it is the end of the run.
+    pub watches_room: bool,
     /// The time limit of the run, by the world's clock.
     pub time_limit: Rational,
 }
@@ -32,6 +37,7 @@ impl Default for RunSettings {
             planning_time: PlanningTime::Measured,
             most_replans: 10,
             patience: Patience::default(),
+            watches_room: false,
             time_limit: Rational::from(1_000_000),
         }
     }
@@ -46,7 +52,9 @@ pub enum RunningRule {
     Await,
     /// They go on, and the plan goes on with them: it takes them to last as long as they were
     /// planned to, or, if they are overdue, a quarter longer than so far. Those whose over-all
-    /// condition has failed are cancelled: no plan can go on with them.
+    /// condition has failed are cancelled: no plan can go on with them. So are, where their room is
+    /// watched ([`RunSettings::watches_room`]), overdue ones with which no plan is found, even if
+    /// they end at once.
     #[default]
     Keep,
 }

@@ -151,6 +151,8 @@ impl Experiment {
             planning_time,
             most_replans,
             patience: Patience { factor, at_least },
+            // Worlds of experiments have no clock.
+            watches_room: _,
             time_limit,
         } = settings;
         let texts = |texts: &mut dyn Iterator<Item = String>| texts.collect::<Vec<_>>();

@@ -76,6 +76,10 @@ impl Log {
                 let why = planned.why_not.clone().unwrap_or_default();
                 self.add(&planned.now.0, "planning", what, String::new(), why);
             }
+            Line::Warning(line) => {
+                let what = line.words.clone();
+                self.add(&line.now.0, "warning", what, String::new(), String::new());
+            }
             Line::Kept(kept) => {
                 let why = kept.reason.words.clone();
                 let what = "the rest of the plan is kept".to_owned();

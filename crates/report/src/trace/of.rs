@@ -15,7 +15,7 @@ use super::line::{
     InstanceLine, InterruptedLine, IntervalLine, KeptLine, Line, LookedLine, NetworkLine,
     ObservationLine, ObservedLine, OrderLine, ParameterLine, PassedLine, PlanLine, PlannedLine,
     PlanningLine, ReasonLine, ReportLine, RestingLine, RunningLine, SituationLine, StepLine,
-    WindowLine,
+    WarningLine, WindowLine,
 };
 use crate::exact::Exact;
 
@@ -87,6 +87,21 @@ impl Line {
                 plan: plan.map(steps),
                 why_not: why_not.map(str::to_owned),
                 is_unsolvable,
+            }),
+            Entry::Warning {
+                now,
+                ticket,
+                action,
+                until,
+            } => Self::Warning(WarningLine {
+                now: exact(now),
+                ticket: ticket.0,
+                action: action.to_owned(),
+                until: exact(until),
+                words: format!(
+                    "{action} has used its room: {} s until a new plan is needed",
+                    (until - now).to_decimal(3)
+                ),
             }),
             Entry::Kept { now, reason } => Self::Kept(KeptLine {
                 now: exact(now),

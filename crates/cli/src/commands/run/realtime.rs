@@ -140,6 +140,10 @@ pub(super) struct PacedPlanner<'a> {
 }
 
 impl Planner for PacedPlanner<'_> {
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        self.inner.expect(task, situation);
+    }
+
     fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
         let clock = Clock::start();
         let mut answer = self.inner.plan(task, situation);

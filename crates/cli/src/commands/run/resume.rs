@@ -22,6 +22,7 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::{Line, ReplayPlanner, ReplayWorld, Stored};
 
+use super::ahead::Ahead;
 use super::journaled::{Careful, JournalWriter, Kept};
 use super::process::{Manners, ProcessWorld};
 use super::shown::Views;
@@ -197,7 +198,7 @@ pub(in crate::commands) fn run(
                     .filter(|line| matches!(line, Line::Planned(_)))
                     .count(),
                 past: ReplayPlanner::new(&stored),
-                present: planner,
+                present: Box::new(Ahead::new(planner, &spec, &interrupt)),
             })
             .told_to(attendance.listener())
             .recorded_by(views.shown(attendance.witnessed(recorder, &task, true), &task));

@@ -101,6 +101,12 @@ impl Planner for PastPlanner<'_> {
             None => self.present.plan(task, situation),
         }
     }
+
+    fn expect(&mut self, task: &Task, situation: &Situation) {
+        if self.left == 0 {
+            self.present.expect(task, situation);
+        }
+    }
 }
 
 /// Ends the run where it was asked to end, and when it is asked to now, or cannot be written down.

@@ -1,0 +1,433 @@
+//! What users of plan executors complain about, one test for each row of `docs/complaints.md`: a small
+//! scenario like that of the thread, and what happens here.
+
+mod command;
+
+use std::fs;
+use std::sync::Arc;
+
+use command::{elbowroom, root};
+use elbowroom::execute::Execution;
+use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execution::{
+    Cause, Command, Ending, Event, Observation, Passage, Request, Ticket, World, WorldError,
+};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::pddl::{self, Source};
+
+const MATCH: [&str; 2] = ["cases/match/domain.pddl", "cases/match/problem.pddl"];
+const DELIVERY: [&str; 2] = ["cases/delivery/domain.pddl", "cases/delivery/problem.pddl"];
+const PLAN: &str = "cases/delivery/plan.plan";
+
+/// Two robots that fetch things, in ten seconds each.
+const ERRANDS: &str = "(define (domain errands) (:requirements :durative-actions :typing)
+    (:types robot item)
+    (:predicates (free ?r - robot) (here ?x - item) (have ?x - item))
+    (:durative-action fetch :parameters (?r - robot ?x - item) :duration (= ?duration 10)
+      :condition (and (at start (free ?r)) (at start (here ?x)))
+      :effect (and (at start (not (free ?r))) (at end (free ?r)) (at end (have ?x)))))";
+
+fn errands(goal: &str) -> Arc<Task> {
+    let problem = format!(
+        "(define (problem day) (:domain errands) (:objects r s - robot book cup - item)
+           (:init (free r) (free s) (here book) (here cup)) (:goal {goal}))"
+    );
+    task(ERRANDS, &problem)
+}
+
+fn task(domain: &str, problem: &str) -> Arc<Task> {
+    let source = |text: &str| Source::new("test", text);
+    let read = pddl::read_problem(&source(domain), &source(problem));
+    Arc::new(Task::new(read.expect("a correct test").0))
+}
+
+/// A world in which actions take as long as they were planned to, but for its faults.
+#[derive(Default)]
+struct Toy {
+    now: Rational,
+    coming: Vec<Observation>,
+    /// What is reported of a start, by its number: nothing, a failure, …
+    fault: Option<fn(u64) -> Fault>,
+    /// What is seen when an action has ended.
+    seen: Vec<Event>,
+    /// What was told to start and has neither ended nor was cancelled.
+    open: Vec<Ticket>,
+}
+
+enum Fault {
+    None,
+    Silent,
+    Fails,
+    Lasts(i64),
+}
+
+impl World for Toy {
+    fn command(&mut self, now: &Rational, command: &Command) -> Result<(), WorldError> {
+        let at = |time: Rational, event: Event| Observation { time, event };
+        let measured = Vec::new;
+        match command {
+            Command::Start {
+                ticket, duration, ..
+            } => {
+                let ticket = *ticket;
+                self.open.push(ticket);
+                let fault = self.fault.map_or(Fault::None, |fault| fault(ticket.0));
+                let (duration, ending) = match fault {
+                    Fault::Silent => return Ok(()),
+                    Fault::None => (duration.clone(), Ending::Succeeded),
+                    Fault::Lasts(seconds) => (Some(seconds.into()), Ending::Succeeded),
+                    Fault::Fails => {
+                        let why = "the gripper slips".to_owned();
+                        (duration.clone(), Ending::Failed { why })
+                    }
+                };
+                let started = Event::Started {
+                    ticket,
+                    measured: measured(),
+                };
+                self.coming.push(at(now.clone(), started));
+                let end = now + duration.unwrap_or_default();
+                let ended = Event::Ended {
+                    ticket,
+                    ending,
+                    measured: measured(),
+                };
+                self.coming.push(at(end.clone(), ended));
+                let seen = self.seen.drain(..).map(|event| at(end.clone(), event));
+                self.coming.extend(seen);
+            }
+            Command::Cancel { ticket } => {
+                let about = *ticket;
+                self.open.retain(|open| *open != about);
+                self.coming.retain(
+                    |it| !matches!(it.event, Event::Ended { ticket, .. } if ticket == about),
+                );
+                let ended = Event::Ended {
+                    ticket: about,
+                    ending: Ending::Cancelled,
+                    measured: measured(),
+                };
+                self.coming.push(at(now.clone(), ended));
+            }
+        }
+        Ok(())
+    }
+
+    fn wait(&mut self, until: &Rational) -> Result<Passage, WorldError> {
+        let next = self.coming.iter().map(|it| it.time.clone()).min();
+        let now = next.into_iter().chain([until.clone()]).min();
+        self.now = now.unwrap_or_default().max(self.now.clone());
+        let now = self.now.clone();
+        let observations: Vec<_> = self.coming.extract_if(.., |it| it.time <= now).collect();
+        for observation in &observations {
+            if let Event::Ended { ticket, .. } = observation.event {
+                self.open.retain(|open| *open != ticket);
+            }
+        }
+        Ok(Passage { now, observations })
+    }
+}
+
+fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
+    let settings = RunSettings {
+        watches_room: true,
+        time_limit: Rational::from(100_000),
+        ..RunSettings::default()
+    };
+    Execution::of(task).with_settings(settings).explaining().run_in(world)
+}
+
+fn causes(report: &Report) -> Vec<Cause> {
+    report.reasons.iter().map(|reason| reason.cause).collect()
+}
+
+fn json(arguments: &[&str]) -> serde_json::Value {
+    let done = elbowroom(arguments);
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}: {done:?}"))
+}
+
+/// A file that no other test uses.
+fn temporary(name: &str) -> String {
+    let name = format!("elbowroom-complaints-{}-{name}", std::process::id());
+    std::env::temp_dir().join(name).display().to_string()
+}
+
+#[test]
+fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
+    let outcome = json(&[&["run"], &MATCH[..], &["--json"]].concat());
+    assert_eq!(outcome["verdict"], "goal-reached", "{outcome:#}");
+    let spans = outcome["executed"].as_array().expect("steps").iter().map(|step| {
+        let start = step["start"]["decimal"].as_f64().expect("a number");
+        let duration = step["duration"]["decimal"].as_f64().expect("a number");
+        (step["action"].as_str().expect("a name").to_owned(), start, start + duration)
+    });
+    let spans: Vec<_> = spans.collect();
+    let burns: Vec<_> = spans.iter().filter(|it| it.0.starts_with("(burn")).collect();
+    let inspections: Vec<_> = spans.iter().filter(|it| it.0.starts_with("(inspect")).collect();
+    assert!(!inspections.is_empty());
+    for inspection in inspections {
+        let is_lit = |burn: &&&(String, f64, f64)| burn.1 < inspection.1 && inspection.2 < burn.2;
+        assert!(burns.iter().any(|burn| is_lit(&burn)), "{spans:?}");
+    }
+}
+
+#[test]
+fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
+    let task = errands("(have book)");
+    let mut world = Toy {
+        fault: Some(|_| Fault::Silent),
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert_ne!(report.verdict, Verdict::GoalReached);
+    assert!(causes(&report).contains(&Cause::Silence), "{:?}", report.reasons);
+    assert!(report.reasons.iter().any(|it| it.to_string().contains("(fetch ")));
+    assert!(world.open.is_empty(), "nothing is left running");
+}
+
+#[test]
+fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
+    let domain = "(define (domain late) (:requirements :durative-actions :timed-initial-literals)
+        (:predicates (open) (there) (tried))
+        (:durative-action walk :parameters () :duration (= ?duration 10)
+          :condition (and (at start (not (tried))) (over all (open)))
+          :effect (and (at start (tried)) (at end (there))))
+        (:durative-action ride :parameters () :duration (= ?duration 3)
+          :condition (and (at start (tried)) (over all (open))) :effect (at end (there))))";
+    let problem = "(define (problem p) (:domain late) (:init (open) (at 20 (not (open))))
+        (:goal (there)))";
+    let task = task(domain, problem);
+    // Within the guarantee lateness is no reason for anything.
+    let mut world = Toy {
+        fault: Some(|ticket| if ticket == 0 { Fault::Lasts(15) } else { Fault::None }),
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 0));
+    // No end at all: it is noticed in time, and not after minutes.
+    let mut world = Toy {
+        fault: Some(|ticket| if ticket == 0 { Fault::Lasts(9999) } else { Fault::None }),
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert!(report.time <= Rational::from(26), "{}: {:?}", report.time, report.reasons);
+    assert!(causes(&report).contains(&Cause::Outlived), "{:?}", report.reasons);
+}
+
+#[test]
+fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
+    let task = errands("(have book)");
+    let mut world = Toy {
+        fault: Some(|ticket| if ticket == 0 { Fault::Fails } else { Fault::None }),
+        ..Toy::default()
+    };
+    // A robot whose errand has failed is free again: the world says so.
+    let free = |name: &str| {
+        let fact = task.fact_named(name).expect("a correct test");
+        Event::Fact { fact, truth: true }
+    };
+    world.seen = vec![free("(free r)"), free("(free s)")];
+    let report = run(&task, &mut world);
+    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 1));
+    assert_eq!(causes(&report), [Cause::Failed]);
+}
+
+#[test]
+fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
+    let task = errands("(and (have book) (have cup))");
+    let gone = |name: &str| {
+        let fact = task.fact_named(name).expect("a correct test");
+        let event = Event::Fact { fact, truth: false };
+        Observation { time: Rational::ZERO, event }
+    };
+    let mut world = Toy {
+        fault: Some(|_| Fault::Fails),
+        coming: vec![gone("(here cup)")],
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert_eq!(report.verdict, Verdict::Unsolvable, "{report:?}");
+    let why: Vec<String> = report.dead_end.iter().map(ToString::to_string).collect();
+    assert!(why.iter().any(|why| why.contains("(have cup)") && why.contains("since 0")), "{why:?}");
+    assert!(world.open.is_empty());
+}
+
+#[test]
+fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
+    let task = errands("(and (have book) (have cup))");
+    let asked = |time: i64, request: Request| Observation {
+        time: time.into(),
+        event: Event::Asked(request),
+    };
+    let (name, goal) = ("again".to_owned(), "(not (here cup))".to_owned());
+    let mut world = Toy {
+        coming: vec![
+            asked(0, Request::Pause),
+            asked(100, Request::Resume),
+            asked(105, Request::Pursue { name, goal }),
+        ],
+        ..Toy::default()
+    };
+    let settings = RunSettings {
+        time_limit: Rational::from(107),
+        ..RunSettings::default()
+    };
+    let report = Execution::of(&task).with_settings(settings).lasting(true).run_in(&mut world);
+    for done in &report.executed {
+        assert!(done.step.start.is_zero() || done.step.start >= Rational::from(100));
+        assert!(done.ending.is_some(), "{done:?}");
+    }
+    assert!(world.open.is_empty());
+}
+
+#[test]
+fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
+    let task = errands("(have book)");
+    let have = task.fact_named("(have book)").expect("a correct test");
+    let mut world = Toy {
+        // It says that it has succeeded, and it has not.
+        seen: vec![Event::Fact { fact: have, truth: false }],
+        ..Toy::default()
+    };
+    let report = run(&task, &mut world);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
+    assert_eq!((report.starts, report.replans), (2, 1), "{:?}", report.reasons);
+}
+
+#[test]
+fn a_plan_and_its_progress_can_be_seen_in_time() {
+    let trace = temporary("seen.jsonl");
+    let page = temporary("seen.html");
+    let done = elbowroom(&[&["run"], &DELIVERY[..], &["--trace", &trace]].concat());
+    assert!(done.status.success(), "{done:?}");
+    let done = elbowroom(&["report", &trace, "-o", &page]);
+    assert!(done.status.success(), "{done:?}");
+    let text = fs::read_to_string(&page).expect("a page");
+    for words in ["drive rover depot shelf", "was due", "What happened, and why"] {
+        assert!(text.contains(words), "{words}");
+    }
+    let _ = (fs::remove_file(trace), fs::remove_file(page));
+}
+
+#[test]
+fn a_run_leaves_data_with_which_it_can_be_played_back() {
+    let trace = temporary("data.jsonl");
+    let world = ["--world", "cases/delivery/world.toml", "--seed", "3", "--trace", &trace];
+    elbowroom(&[&["run"], &DELIVERY[..], &world].concat());
+    let text = fs::read_to_string(&trace).expect("a trace");
+    let line = |kind: &str| text.lines().find(|line| line.contains(kind)).expect("a line");
+    for member in ["\"now\"", "\"planned\"", "\"earliest\"", "\"latest\""] {
+        assert!(line("\"event\":\"command\"").contains(member), "{member}");
+    }
+    assert!(line("\"event\":\"decided\"").contains("\"words\""));
+    let replayed = elbowroom(&["run", "--replay", &trace]);
+    assert_eq!(replayed.status.code(), Some(0), "{replayed:?}");
+    let _ = fs::remove_file(trace);
+}
+
+#[test]
+fn durations_and_failures_are_simulated_and_a_seed_makes_them_again() {
+    let run = |seed: &str| {
+        let world = ["--world", "crates/cli/tests/files/clumsy-world.toml", "--seed", seed];
+        let done = elbowroom(&[&["run"], &DELIVERY[..], &world, &["--json"]].concat());
+        done.stdout
+    };
+    assert_eq!(run("1"), run("1"));
+    let others: Vec<_> = (2..8).map(|seed| run(&seed.to_string())).collect();
+    assert!(others.iter().any(|other| *other != run("1")));
+}
+
+#[test]
+fn a_plan_is_relaxed_to_a_network_and_that_is_executed() {
+    let network = json(&[&["stn"], &DELIVERY[..], &[PLAN, "--json"]].concat());
+    assert!(network.to_string().contains("(drive rover depot shelf)"));
+    let outcome = json(&[&["run"], &DELIVERY[..], &[PLAN, "--executor", "stn", "--json"]].concat());
+    assert_eq!(outcome["verdict"], "goal-reached");
+}
+
+#[test]
+fn numbers_durations_from_fluents_and_windows_are_planned_with_and_executed() {
+    let domain = "(define (domain d) (:requirements :durative-actions :fluents
+          :timed-initial-literals)
+        (:predicates (open) (done))
+        (:functions (length) (charge))
+        (:durative-action go :parameters () :duration (= ?duration (* 2 (length)))
+          :condition (and (over all (open)) (at start (>= (charge) (length))))
+          :effect (and (at end (decrease (charge) (length))) (at end (done)))))";
+    let problem = "(define (problem p) (:domain d)
+        (:init (= (length) 4) (= (charge) 5) (at 30 (open)) (at 60 (not (open))))
+        (:goal (and (done) (>= (charge) 1))))";
+    let report = run(&task(domain, problem), &mut Toy::default());
+    assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
+    let step = &report.executed[0].step;
+    assert!(step.start > Rational::from(30) - Rational::ONE && step.start < Rational::from(31));
+    assert_eq!(step.duration, Some(Rational::from(8)));
+}
+
+#[test]
+fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
+    let done = elbowroom(&[&["plan"], &DELIVERY[..], &["--planner", "false {domain} {problem}"]].concat());
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(2), "{done:?}");
+    assert!(said.contains("false") && !said.contains("unsolvable"), "{said}");
+    // A goal that is true already is no mistake.
+    let task = errands("(here book)");
+    let report = run(&task, &mut Toy::default());
+    assert_eq!((report.verdict, report.starts), (Verdict::GoalReached, 0));
+}
+
+#[test]
+fn the_judge_goes_by_the_epsilon_of_the_plan() {
+    let check = |options: &[&str]| {
+        let done = elbowroom(&[&["check"], &DELIVERY[..], &[PLAN], options].concat());
+        done.status.code()
+    };
+    // Its actions are 0.001 apart.
+    assert_eq!(check(&[]), Some(0));
+    assert_eq!(check(&["--epsilon", "0.01"]), Some(1));
+    assert_eq!(check(&["--tolerance", "0.001"]), Some(0));
+    assert_eq!(check(&["--tolerance", "0.01"]), Some(1));
+}
+
+#[test]
+fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
+    let task = errands("(have book)");
+    let (name, goal) = ("cup".to_owned(), "(have cup)".to_owned());
+    let mut world = Toy {
+        coming: vec![Observation {
+            time: Rational::from(2),
+            event: Event::Asked(Request::Pursue { name, goal }),
+        }],
+        ..Toy::default()
+    };
+    let settings = RunSettings {
+        time_limit: Rational::from(40),
+        ..RunSettings::default()
+    };
+    let report = Execution::of(&task).with_settings(settings).lasting(true).run_in(&mut world);
+    let spans = report.executed.iter().map(|it| {
+        let end = &it.step.start + it.step.duration.clone().unwrap_or_default();
+        (it.step.start.clone(), end)
+    });
+    let spans: Vec<_> = spans.collect();
+    assert_eq!(spans.len(), 2, "{report:?}");
+    assert!(spans[1].0 < spans[0].1, "at the same time: {spans:?}");
+}
+
+/// Each row of the page names a test of this file, and each test has its row.
+#[test]
+fn the_page_has_a_row_for_each_test() {
+    let page = fs::read_to_string(root().join("docs/complaints.md")).expect("the page");
+    let own = fs::read_to_string(root().join("crates/cli/tests/complaints.rs")).expect("this file");
+    let tests = own.split("#[test]\nfn ").skip(1);
+    let tests = tests.filter_map(|text| text.split('(').next());
+    let mut tests: Vec<&str> = tests.filter(|name| !name.starts_with("the_page_has")).collect();
+    let rows = page.lines().filter(|line| line.starts_with("| ") && line.ends_with("` |"));
+    let named = rows.filter_map(|row| row.trim_end_matches("` |").rsplit('`').next());
+    let mut named: Vec<&str> = named.collect();
+    (tests.sort_unstable(), named.sort_unstable());
+    assert_eq!(named.len(), 15);
+    assert_eq!(tests, named);
+}

@@ -1,0 +1,137 @@
+//! Actions that take longer than planned: a warning while there is room, a wait while a plan can bear
+//! it, and a plan without them when none can.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use elbowroom::execution::run::{Report, RunSettings, Verdict};
+use elbowroom::execute::Embedded;
+use elbowroom::execution::{Ending, Event, Planner, PlannerAnswer};
+use elbowroom::model::{Situation, Task};
+use elbowroom::num::Rational;
+
+use crate::lasting::{Notes, Scripted};
+use crate::scene::{Scene, read};
+
+/// Walking and climbing take 20 of 26 seconds, and the envelope lets walking take 15. There is also
+/// a slide, where nobody is on the path; who stops walking leaves it.
+fn walking(seconds: Rational, watches_room: bool) -> (Report, Vec<String>) {
+    let (scene, mut world) = walker(seconds);
+    let notes = Notes::default();
+    let report = scene
+        .execution("guarded")
+        .with_settings(RunSettings {
+            watches_room,
+            ..scene.settings.clone()
+        })
+        .recorded_by(notes.clone())
+        .run_in(&mut world);
+    let notes = notes.0.lock().unwrap_or_else(PoisonError::into_inner);
+    (report, notes.clone())
+}
+
+fn walker(seconds: Rational) -> (Scene, Scripted) {
+    let file = |name: &str| read(&format!("crates/cli/tests/files/late/{name}"));
+    let plan = file("plan.plan");
+    let scene = Scene::new(&file("domain.pddl"), &file("problem.pddl"), Some(&plan));
+    let path = scene.task.fact_named("(path)").expect("a correct test");
+    let world = Scripted {
+        now: Rational::ZERO,
+        coming: Vec::new(),
+        end: Rational::from(2000),
+        is_to_end: Arc::default(),
+        slow: Some(("(walk)", seconds)),
+        on_cancel: Some(Event::Fact {
+            fact: path,
+            truth: true,
+        }),
+    };
+    (scene, world)
+}
+
+fn done(report: &Report) -> Vec<&str> {
+    let names = report.executed.iter();
+    names.map(|it| it.step.action.name.as_str()).collect()
+}
+
+#[test]
+fn before_a_new_plan_is_needed_there_is_a_warning() {
+    let (report, notes) = walking(Rational::new(29, 2), true);
+    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 0), "{notes:#?}");
+    let warnings: Vec<_> = notes.iter().filter(|it| it.contains("must end by")).collect();
+    assert_eq!(warnings, ["13.7: (walk) must end by 15"], "{notes:#?}");
+    for (seconds, watches_room) in [(12, true), (14, false)] {
+        let (_, notes) = walking(Rational::from(seconds), watches_room);
+        assert!(!notes.iter().any(|it| it.contains("must end by")), "{notes:#?}");
+    }
+}
+
+#[test]
+fn what_is_late_and_may_still_end_in_time_is_waited_for() {
+    let (report, notes) = walking(Rational::new(31, 2), true);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{notes:#?}");
+    assert_eq!(done(&report), ["(walk)", "(climb)"]);
+    assert_eq!(report.executed[0].step.duration, Some(Rational::new(31, 2)));
+}
+
+#[test]
+fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
+    let (report, notes) = walking(Rational::from(1000), true);
+    assert_eq!(report.verdict, Verdict::GoalReached, "{notes:#?}");
+    assert_eq!(done(&report), ["(walk)", "(slide)"]);
+    assert_eq!(report.executed[0].ending, Some(Ending::Cancelled));
+    let took = report.executed[0].step.duration.clone().expect("it takes time");
+    assert!(took >= Rational::from(15) && took < Rational::from(17), "{took}: {notes:#?}");
+}
+
+/// In worlds without a clock, as in the papers' experiments, that is the end.
+#[test]
+fn where_room_is_not_watched_a_run_ends_when_no_plan_can_bear_what_is_late() {
+    let (report, _) = walking(Rational::from(1000), false);
+    assert_eq!(report.verdict, Verdict::Unsolvable);
+}
+
+/// At the warning the planner is told from where a plan will be needed, and when it is needed it is
+/// asked for that one, which may be ready by then.
+#[test]
+fn the_plan_that_will_be_needed_is_asked_for_ahead() {
+    #[derive(Default)]
+    struct Asked {
+        expected: Vec<Situation>,
+        asked: Vec<Situation>,
+    }
+    struct Noting(Arc<Mutex<Asked>>);
+    impl Noting {
+        fn asked(&self) -> MutexGuard<'_, Asked> {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        }
+    }
+    impl Planner for Noting {
+        fn plan(&mut self, task: &Task, situation: &Situation) -> PlannerAnswer {
+            self.asked().asked.push(situation.clone());
+            let answer = Embedded::default().plan(task, situation);
+            PlannerAnswer {
+                seconds: None,
+                ..answer
+            }
+        }
+        fn expect(&mut self, _task: &Task, situation: &Situation) {
+            self.asked().expected.push(situation.clone());
+        }
+    }
+    let asked = Arc::<Mutex<Asked>>::default();
+    let (scene, mut world) = walker(Rational::from(1000));
+    let report = scene
+        .execution("guarded")
+        .with_settings(RunSettings {
+            watches_room: true,
+            ..scene.settings.clone()
+        })
+        .planned_by(Noting(Arc::clone(&asked)))
+        .run_in(&mut world);
+    assert_eq!(report.verdict, Verdict::GoalReached);
+    let asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
+    let first = &asked.expected[0];
+    assert_eq!(*first, asked.asked[0]);
+    // A quarter of a second after it is needed.
+    assert_eq!(first.time, Rational::new(15_251, 1000));
+}
