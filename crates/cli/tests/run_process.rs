@@ -51,7 +51,7 @@ fn the_example_world_reports_a_cancel_at_once() {
         return;
     }
     let mut run = vec!["run", DELIVERY[0], DELIVERY[1], "--json"];
-    run.extend(["--executor", "fixed:0", "--max-replans", "3"]);
+    run.extend(["--executor", "fixed:0", "--max-replans", "1"]);
     run.extend(["--world-process", "python3 examples/world.py"]);
     let output = elbowroom(&run);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a document");

@@ -12,7 +12,7 @@ use elbowroom::num::Rational;
 use crate::lasting::{Notes, Scripted};
 use crate::scene::{Scene, read};
 
-/// Walking and climbing take 20 of 26 seconds, and the envelope lets walking take 15. There is also
+/// Walking and climbing take 20 of 26 seconds, and the envelope lets walking take 15.3125. There is also
 /// a slide, where nobody is on the path; who stops walking leaves it.
 fn walking(seconds: Rational, watches_room: bool) -> (Report, Vec<String>) {
     let (scene, mut world) = walker(seconds);
@@ -58,7 +58,7 @@ fn before_a_new_plan_is_needed_there_is_a_warning() {
     let (report, notes) = walking(Rational::new(29, 2), true);
     assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 0), "{notes:#?}");
     let warnings: Vec<_> = notes.iter().filter(|it| it.contains("must end by")).collect();
-    assert_eq!(warnings, ["13.7: (walk) must end by 15"], "{notes:#?}");
+    assert_eq!(warnings, ["14: (walk) must end by 15.3"], "{notes:#?}");
     for (seconds, watches_room) in [(12, true), (14, false)] {
         let (_, notes) = walking(Rational::from(seconds), watches_room);
         assert!(!notes.iter().any(|it| it.contains("must end by")), "{notes:#?}");
@@ -132,6 +132,6 @@ fn the_plan_that_will_be_needed_is_asked_for_ahead() {
     let asked = asked.lock().unwrap_or_else(PoisonError::into_inner);
     let first = &asked.expected[0];
     assert_eq!(*first, asked.asked[0]);
-    // A quarter of a second after it is needed.
-    assert_eq!(first.time, Rational::new(15_251, 1000));
+    // A quarter of a second, and ε, after it is needed: at 15.3125.
+    assert_eq!(first.time, Rational::new(153_125 + 2510, 10_000));
 }
