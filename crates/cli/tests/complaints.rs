@@ -135,7 +135,10 @@ fn run(task: &Arc<Task>, world: &mut Toy) -> Report {
         time_limit: Rational::from(100_000),
         ..RunSettings::default()
     };
-    Execution::of(task).with_settings(settings).explaining().run_in(world)
+    Execution::of(task)
+        .with_settings(settings)
+        .explaining()
+        .run_in(world)
 }
 
 fn causes(report: &Report) -> Vec<Cause> {
@@ -158,14 +161,28 @@ fn temporary(name: &str) -> String {
 fn parallel_actions_are_executed_in_parallel_and_as_the_plan_needs_it() {
     let outcome = json(&[&["run"], &MATCH[..], &["--json"]].concat());
     assert_eq!(outcome["verdict"], "goal-reached", "{outcome:#}");
-    let spans = outcome["executed"].as_array().expect("steps").iter().map(|step| {
-        let start = step["start"]["decimal"].as_f64().expect("a number");
-        let duration = step["duration"]["decimal"].as_f64().expect("a number");
-        (step["action"].as_str().expect("a name").to_owned(), start, start + duration)
-    });
+    let spans = outcome["executed"]
+        .as_array()
+        .expect("steps")
+        .iter()
+        .map(|step| {
+            let start = step["start"]["decimal"].as_f64().expect("a number");
+            let duration = step["duration"]["decimal"].as_f64().expect("a number");
+            (
+                step["action"].as_str().expect("a name").to_owned(),
+                start,
+                start + duration,
+            )
+        });
     let spans: Vec<_> = spans.collect();
-    let burns: Vec<_> = spans.iter().filter(|it| it.0.starts_with("(burn")).collect();
-    let inspections: Vec<_> = spans.iter().filter(|it| it.0.starts_with("(inspect")).collect();
+    let burns: Vec<_> = spans
+        .iter()
+        .filter(|it| it.0.starts_with("(burn"))
+        .collect();
+    let inspections: Vec<_> = spans
+        .iter()
+        .filter(|it| it.0.starts_with("(inspect"))
+        .collect();
     assert!(!inspections.is_empty());
     for inspection in inspections {
         let is_lit = |burn: &&&(String, f64, f64)| burn.1 < inspection.1 && inspection.2 < burn.2;
@@ -182,8 +199,17 @@ fn who_never_answers_is_given_up_and_the_run_ends_with_that_reason() {
     };
     let report = run(&task, &mut world);
     assert_ne!(report.verdict, Verdict::GoalReached);
-    assert!(causes(&report).contains(&Cause::Silence), "{:?}", report.reasons);
-    assert!(report.reasons.iter().any(|it| it.to_string().contains("(fetch ")));
+    assert!(
+        causes(&report).contains(&Cause::Silence),
+        "{:?}",
+        report.reasons
+    );
+    assert!(
+        report
+            .reasons
+            .iter()
+            .any(|it| it.to_string().contains("(fetch "))
+    );
     assert!(world.open.is_empty(), "nothing is left running");
 }
 
@@ -201,26 +227,56 @@ fn what_is_late_is_waited_for_as_long_as_the_plan_can_bear_and_then_given_up() {
     let task = task(domain, problem);
     // Within the guarantee lateness is no reason for anything.
     let mut world = Toy {
-        fault: Some(|ticket| if ticket == 0 { Fault::Lasts(15) } else { Fault::None }),
+        fault: Some(|ticket| {
+            if ticket == 0 {
+                Fault::Lasts(15)
+            } else {
+                Fault::None
+            }
+        }),
         ..Toy::default()
     };
     let report = run(&task, &mut world);
-    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 0));
+    assert_eq!(
+        (&report.verdict, report.replans),
+        (&Verdict::GoalReached, 0)
+    );
     // No end at all: it is noticed in time, and not after minutes.
     let mut world = Toy {
-        fault: Some(|ticket| if ticket == 0 { Fault::Lasts(9999) } else { Fault::None }),
+        fault: Some(|ticket| {
+            if ticket == 0 {
+                Fault::Lasts(9999)
+            } else {
+                Fault::None
+            }
+        }),
         ..Toy::default()
     };
     let report = run(&task, &mut world);
-    assert!(report.time <= Rational::from(26), "{}: {:?}", report.time, report.reasons);
-    assert!(causes(&report).contains(&Cause::Outlived), "{:?}", report.reasons);
+    assert!(
+        report.time <= Rational::from(26),
+        "{}: {:?}",
+        report.time,
+        report.reasons
+    );
+    assert!(
+        causes(&report).contains(&Cause::Outlived),
+        "{:?}",
+        report.reasons
+    );
 }
 
 #[test]
 fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
     let task = errands("(have book)");
     let mut world = Toy {
-        fault: Some(|ticket| if ticket == 0 { Fault::Fails } else { Fault::None }),
+        fault: Some(|ticket| {
+            if ticket == 0 {
+                Fault::Fails
+            } else {
+                Fault::None
+            }
+        }),
         ..Toy::default()
     };
     // A robot whose errand has failed is free again: the world says so.
@@ -230,7 +286,10 @@ fn after_a_failure_there_is_a_new_plan_without_anybody_asking() {
     };
     world.seen = vec![free("(free r)"), free("(free s)")];
     let report = run(&task, &mut world);
-    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 1));
+    assert_eq!(
+        (&report.verdict, report.replans),
+        (&Verdict::GoalReached, 1)
+    );
     assert_eq!(causes(&report), [Cause::Failed]);
 }
 
@@ -240,7 +299,10 @@ fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
     let gone = |name: &str| {
         let fact = task.fact_named(name).expect("a correct test");
         let event = Event::Fact { fact, truth: false };
-        Observation { time: Rational::ZERO, event }
+        Observation {
+            time: Rational::ZERO,
+            event,
+        }
     };
     let mut world = Toy {
         fault: Some(|_| Fault::Fails),
@@ -251,7 +313,11 @@ fn a_run_that_cannot_go_on_stops_early_and_says_since_when_and_why() {
     assert_eq!(report.verdict, Verdict::Unsolvable, "{report:?}");
     let why: Vec<String> = report.dead_end.iter().map(ToString::to_string).collect();
     let words = "(have cup) can never become true again, since 10";
-    assert!(why.iter().any(|why| why.contains(words) && why.contains("slips")), "{why:?}");
+    assert!(
+        why.iter()
+            .any(|why| why.contains(words) && why.contains("slips")),
+        "{why:?}"
+    );
     assert!(world.open.is_empty());
 }
 
@@ -275,7 +341,10 @@ fn a_pause_starts_nothing_and_a_stop_leaves_nothing_running() {
         time_limit: Rational::from(107),
         ..RunSettings::default()
     };
-    let report = Execution::of(&task).with_settings(settings).lasting(true).run_in(&mut world);
+    let report = Execution::of(&task)
+        .with_settings(settings)
+        .lasting(true)
+        .run_in(&mut world);
     for done in &report.executed {
         assert!(done.step.start.is_zero() || done.step.start >= Rational::from(100));
         assert!(done.ending.is_some(), "{done:?}");
@@ -289,12 +358,20 @@ fn what_an_action_should_have_done_is_compared_with_what_is_seen() {
     let have = task.fact_named("(have book)").expect("a correct test");
     let mut world = Toy {
         // It says that it has succeeded, and it has not.
-        seen: vec![Event::Fact { fact: have, truth: false }],
+        seen: vec![Event::Fact {
+            fact: have,
+            truth: false,
+        }],
         ..Toy::default()
     };
     let report = run(&task, &mut world);
     assert_eq!(report.verdict, Verdict::GoalReached, "{report:?}");
-    assert_eq!((report.starts, report.replans), (2, 1), "{:?}", report.reasons);
+    assert_eq!(
+        (report.starts, report.replans),
+        (2, 1),
+        "{:?}",
+        report.reasons
+    );
 }
 
 #[test]
@@ -306,7 +383,11 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
     let done = elbowroom(&["report", &trace, "-o", &page]);
     assert!(done.status.success(), "{done:?}");
     let text = fs::read_to_string(&page).expect("a page");
-    for words in ["drive rover depot shelf", "was due", "What happened, and why"] {
+    for words in [
+        "drive rover depot shelf",
+        "was due",
+        "What happened, and why",
+    ] {
         assert!(text.contains(words), "{words}");
     }
     let _ = (fs::remove_file(trace), fs::remove_file(page));
@@ -315,10 +396,21 @@ fn a_plan_and_its_progress_can_be_seen_in_time() {
 #[test]
 fn a_run_leaves_data_with_which_it_can_be_played_back() {
     let trace = temporary("data.jsonl");
-    let world = ["--world", "cases/delivery/world.toml", "--seed", "3", "--trace", &trace];
+    let world = [
+        "--world",
+        "cases/delivery/world.toml",
+        "--seed",
+        "3",
+        "--trace",
+        &trace,
+    ];
     elbowroom(&[&["run"], &DELIVERY[..], &world].concat());
     let text = fs::read_to_string(&trace).expect("a trace");
-    let line = |kind: &str| text.lines().find(|line| line.contains(kind)).expect("a line");
+    let line = |kind: &str| {
+        text.lines()
+            .find(|line| line.contains(kind))
+            .expect("a line")
+    };
     for member in ["\"now\"", "\"planned\"", "\"earliest\"", "\"latest\""] {
         assert!(line("\"event\":\"command\"").contains(member), "{member}");
     }
@@ -331,7 +423,12 @@ fn a_run_leaves_data_with_which_it_can_be_played_back() {
 #[test]
 fn durations_and_failures_are_simulated_and_a_seed_makes_them_again() {
     let run = |seed: &str| {
-        let world = ["--world", "crates/cli/tests/files/clumsy-world.toml", "--seed", seed];
+        let world = [
+            "--world",
+            "crates/cli/tests/files/clumsy-world.toml",
+            "--seed",
+            seed,
+        ];
         let done = elbowroom(&[&["run"], &DELIVERY[..], &world, &["--json"]].concat());
         done.stdout
     };
@@ -344,7 +441,14 @@ fn durations_and_failures_are_simulated_and_a_seed_makes_them_again() {
 fn a_plan_is_relaxed_to_a_network_and_that_is_executed() {
     let network = json(&[&["stn"], &DELIVERY[..], &[PLAN, "--json"]].concat());
     assert!(network.to_string().contains("(drive rover depot shelf)"));
-    let outcome = json(&[&["run"], &DELIVERY[..], &[PLAN, "--executor", "stn", "--json"]].concat());
+    let outcome = json(
+        &[
+            &["run"],
+            &DELIVERY[..],
+            &[PLAN, "--executor", "stn", "--json"],
+        ]
+        .concat(),
+    );
     assert_eq!(outcome["verdict"], "goal-reached");
 }
 
@@ -369,10 +473,20 @@ fn numbers_durations_from_fluents_and_windows_are_planned_with_and_executed() {
 
 #[test]
 fn a_planner_that_dies_is_not_taken_for_one_that_says_there_is_no_plan() {
-    let done = elbowroom(&[&["plan"], &DELIVERY[..], &["--planner", "false {domain} {problem}"]].concat());
+    let done = elbowroom(
+        &[
+            &["plan"],
+            &DELIVERY[..],
+            &["--planner", "false {domain} {problem}"],
+        ]
+        .concat(),
+    );
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(2), "{done:?}");
-    assert!(said.contains("false") && !said.contains("unsolvable"), "{said}");
+    assert!(
+        said.contains("false") && !said.contains("unsolvable"),
+        "{said}"
+    );
     // A goal that is true already is no mistake.
     let task = errands("(here book)");
     let report = run(&task, &mut Toy::default());
@@ -407,7 +521,10 @@ fn two_robots_do_two_things_at_once_and_goals_come_while_they_do() {
         time_limit: Rational::from(40),
         ..RunSettings::default()
     };
-    let report = Execution::of(&task).with_settings(settings).lasting(true).run_in(&mut world);
+    let report = Execution::of(&task)
+        .with_settings(settings)
+        .lasting(true)
+        .run_in(&mut world);
     let spans = report.executed.iter().map(|it| {
         let end = &it.step.start + it.step.duration.clone().unwrap_or_default();
         (it.step.start.clone(), end)
@@ -424,8 +541,12 @@ fn the_page_has_a_row_for_each_test() {
     let own = fs::read_to_string(root().join("crates/cli/tests/complaints.rs")).expect("this file");
     let tests = own.split("#[test]\nfn ").skip(1);
     let tests = tests.filter_map(|text| text.split('(').next());
-    let mut tests: Vec<&str> = tests.filter(|name| !name.starts_with("the_page_has")).collect();
-    let rows = page.lines().filter(|line| line.starts_with("| ") && line.ends_with("` |"));
+    let mut tests: Vec<&str> = tests
+        .filter(|name| !name.starts_with("the_page_has"))
+        .collect();
+    let rows = page
+        .lines()
+        .filter(|line| line.starts_with("| ") && line.ends_with("` |"));
     let named = rows.filter_map(|row| row.trim_end_matches("` |").rsplit('`').next());
     let mut named: Vec<&str> = named.collect();
     (tests.sort_unstable(), named.sort_unstable());

@@ -421,7 +421,9 @@ fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
     }
     let (text, code) = walking("1000");
     assert_eq!(code, Some(0), "{text}");
-    let walked = text.lines().find_map(|line| line.split_once("(walk) [")?.1.split_once(']'));
+    let walked = text
+        .lines()
+        .find_map(|line| line.split_once("(walk) [")?.1.split_once(']'));
     let (seconds, outcome) = walked.expect("walking is what was done first");
     let seconds: f64 = seconds.parse().expect("a number");
     assert!((15.0..17.0).contains(&seconds), "{text}");

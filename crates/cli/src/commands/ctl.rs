@@ -231,7 +231,11 @@ fn state(state: &State) -> String {
             let _ = write!(text, ", planned {}", nearest(&planned.0));
         }
         if let Some(needed) = &running.needed {
-            let _ = write!(text, "; if it goes on, a new plan is needed at {}", nearest(&needed.0));
+            let _ = write!(
+                text,
+                "; if it goes on, a new plan is needed at {}",
+                nearest(&needed.0)
+            );
         }
         if let Some(note) = &running.note {
             let _ = write!(text, ": {}", tame(note));

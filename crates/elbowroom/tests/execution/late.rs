@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execute::Embedded;
+use elbowroom::execution::run::{Report, RunSettings, Verdict};
 use elbowroom::execution::{Ending, Event, Planner, PlannerAnswer};
 use elbowroom::model::{Situation, Task};
 use elbowroom::num::Rational;
@@ -56,12 +56,22 @@ fn done(report: &Report) -> Vec<&str> {
 #[test]
 fn before_a_new_plan_is_needed_there_is_a_warning() {
     let (report, notes) = walking(Rational::new(29, 2), true);
-    assert_eq!((&report.verdict, report.replans), (&Verdict::GoalReached, 0), "{notes:#?}");
-    let warnings: Vec<_> = notes.iter().filter(|it| it.contains("must end by")).collect();
+    assert_eq!(
+        (&report.verdict, report.replans),
+        (&Verdict::GoalReached, 0),
+        "{notes:#?}"
+    );
+    let warnings: Vec<_> = notes
+        .iter()
+        .filter(|it| it.contains("must end by"))
+        .collect();
     assert_eq!(warnings, ["14: (walk) must end by 15.3"], "{notes:#?}");
     for (seconds, watches_room) in [(12, true), (14, false)] {
         let (_, notes) = walking(Rational::from(seconds), watches_room);
-        assert!(!notes.iter().any(|it| it.contains("must end by")), "{notes:#?}");
+        assert!(
+            !notes.iter().any(|it| it.contains("must end by")),
+            "{notes:#?}"
+        );
     }
 }
 
@@ -79,8 +89,15 @@ fn what_no_plan_can_bear_has_failed_and_the_next_plan_does_without() {
     assert_eq!(report.verdict, Verdict::GoalReached, "{notes:#?}");
     assert_eq!(done(&report), ["(walk)", "(slide)"]);
     assert_eq!(report.executed[0].ending, Some(Ending::Cancelled));
-    let took = report.executed[0].step.duration.clone().expect("it takes time");
-    assert!(took >= Rational::from(15) && took < Rational::from(17), "{took}: {notes:#?}");
+    let took = report.executed[0]
+        .step
+        .duration
+        .clone()
+        .expect("it takes time");
+    assert!(
+        took >= Rational::from(15) && took < Rational::from(17),
+        "{took}: {notes:#?}"
+    );
 }
 
 /// In worlds without a clock, as in the papers' experiments, that is the end.

@@ -186,11 +186,7 @@ impl Run<'_> {
 
     /// Where things will stand when the new plan can begin: after the time that planning is
     /// expected to take, and ε after whatever happens last before that.
-    pub(super) fn situation(
-        &self,
-        allowance: &Rational,
-        guess: Guess,
-    ) -> (Situation, Vec<Ticket>) {
+    pub(super) fn situation(&self, allowance: &Rational, guess: Guess) -> (Situation, Vec<Ticket>) {
         let epsilon = self.task.epsilon();
         let mut time = &self.now + allowance;
         // Another goal makes another problem, which is written anew for planners that read files.

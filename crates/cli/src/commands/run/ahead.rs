@@ -32,11 +32,7 @@ struct Work {
 }
 
 impl<'a> Ahead<'a> {
-    pub(super) fn new(
-        inner: Box<dyn Planner + 'a>,
-        spec: &RunSpec,
-        interrupt: &Interrupt,
-    ) -> Self {
+    pub(super) fn new(inner: Box<dyn Planner + 'a>, spec: &RunSpec, interrupt: &Interrupt) -> Self {
         Self {
             inner,
             spec: Arc::new(spec.clone()),
@@ -53,9 +49,7 @@ impl<'a> Ahead<'a> {
             return None;
         }
         match work.answer.join().ok()?? {
-            PlanAnswer::Plan(plan) => {
-                renumbered(&plan, task, situation).map(PlanAnswer::Plan)
-            }
+            PlanAnswer::Plan(plan) => renumbered(&plan, task, situation).map(PlanAnswer::Plan),
             other => Some(other),
         }
     }
