@@ -197,8 +197,22 @@ struct Told {
     report: Report,
 }
 
-/// A run of that script until `end`.
+/// A run of that script until `end`, which goes on when its goal is reached.
 fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) -> Told {
+    scripted(task, end, script, |execution| execution.lasting(true))
+}
+
+/// A run of that script until `end`, which can be paused and whose goal can be given up.
+fn attended(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) -> Told {
+    scripted(task, end, script, |execution| execution.attended(true))
+}
+
+fn scripted(
+    task: &Arc<Task>,
+    end: i64,
+    script: Vec<(impl Into<Rational>, Event)>,
+    kind: impl FnOnce(Execution<'_>) -> Execution<'_>,
+) -> Told {
     let is_to_end = Arc::new(AtomicBool::new(false));
     let script = script.into_iter().map(|(time, event)| Observation {
         time: time.into(),
@@ -213,14 +227,13 @@ fn run(task: &Arc<Task>, end: i64, script: Vec<(impl Into<Rational>, Event)>) ->
         on_cancel: None,
     };
     let (notes, plans) = (Notes::default(), Arc::new(Mutex::new(0)));
-    let report = Execution::of(task)
+    let execution = Execution::of(task)
         .with_settings(RunSettings::default())
         .planned_by(Counting(Arc::clone(&plans)))
         .recorded_by(notes.clone())
         .ending_when(move || is_to_end.load(Ordering::SeqCst))
-        .explaining()
-        .lasting(true)
-        .run_in(&mut world);
+        .explaining();
+    let report = kind(execution).run_in(&mut world);
     let notes = notes
         .0
         .lock()
@@ -260,6 +273,53 @@ fn assert_has(told: &Told, notes: &[&str]) {
         let found = left.any(|it| it.contains(note));
         assert!(found, "no `{note}` in its place in {:#?}", told.notes);
     }
+}
+
+#[test]
+fn an_attended_run_is_over_with_its_goal_and_takes_no_other() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = attended(&task, 100, vec![(5, pursue("key", "(have key)"))]);
+    assert_has(&told, &["takes no other goals", "start"]);
+    assert_eq!(told.report.verdict, Verdict::GoalReached);
+    assert!(!has(&told, "key"), "{:#?}", told.notes);
+    assert_eq!(told.plans, 1);
+}
+
+#[test]
+fn an_attended_run_whose_goal_is_given_up_is_over_when_what_is_under_way_has_ended() {
+    let task = task("", "(and (have book) (have cup))");
+    let told = attended(&task, 100, vec![(5, abandon("problem"))]);
+    let starts = told.notes.iter().filter(|it| it.contains("start"));
+    assert_eq!(starts.count(), 1, "{:#?}", told.notes);
+    assert!(!has(&told, "cancel") && !has(&told, "rest"));
+    assert_eq!(told.report.verdict, Verdict::Interrupted);
+    assert_eq!(told.report.time, Rational::from(10));
+    assert_eq!(told.report.executed.len(), 1);
+}
+
+#[test]
+fn an_attended_run_is_paused_between_two_actions() {
+    let task = task("", "(and (have book) (have cup))");
+    let script = vec![
+        (5, Event::Asked(Request::Pause)),
+        (30, Event::Asked(Request::Resume)),
+    ];
+    let told = attended(&task, 100, script);
+    assert_has(&told, &["0: start", "30"]);
+    assert_eq!(told.report.verdict, Verdict::GoalReached);
+    assert!(
+        told.report.time >= Rational::from(40),
+        "{}",
+        told.report.time
+    );
+    // A goal that is given up while it is paused ends it, too.
+    let script = vec![
+        (5, Event::Asked(Request::Pause)),
+        (6, abandon("problem")),
+        (30, Event::Asked(Request::Resume)),
+    ];
+    let told = attended(&task, 100, script);
+    assert_eq!(told.report.verdict, Verdict::Interrupted);
 }
 
 #[test]
