@@ -82,7 +82,11 @@ pub fn read_goal(
         start: 0,
         end: goal.text().len(),
     };
-    let mut scope = Scope::default();
+    // A preference would need a metric that counts it.
+    let mut scope = Scope {
+        without_preferences: 1,
+        ..Scope::default()
+    };
     let condition = match nodes.as_slice() {
         [node] => reader.condition(node, &mut scope),
         [] => {

@@ -131,6 +131,14 @@ fn a_written_problem_has_the_same_constraints() {
 }
 
 #[test]
+fn a_goal_by_itself_has_no_preferences() {
+    let (problem, _) = read_sections("(:init) (:goal (and))").expect("a problem");
+    let read = |goal: &str| elbowroom_pddl::read_goal(&Source::new("goal", goal), &problem);
+    assert!(read("(lit)").is_ok());
+    assert!(mistakes(read("(preference p (lit))")).contains("a preference cannot stand here"));
+}
+
+#[test]
 fn constraints_that_make_no_sense_are_mistakes() {
     let wrong = |text: &str| {
         mistakes(read_sections(&format!(

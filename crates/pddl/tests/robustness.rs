@@ -23,7 +23,9 @@ const DOMAIN: &str = "(define (domain d)
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects b1 b2 - ball)
 (:init (in b1 hall) (= (size b1) 4) (= (level) 1e2) (at 5 (lit)) (at 6.5 (not (lit))) (at 7 (= (level) 3)))
 (:goal (and (preference q (lit)) (imply (dark) (< (level) 7)) (forall (?b - ball) (in ?b hall))))
-(:metric minimize (+ (total-time) (* 2 (level)))))";
+(:constraints (and (forall (?b - ball) (preference r (sometime-before (lit) (in ?b hall))))
+  (always-within 2.5 (lit) (dark)) (hold-during 1 7 (not (lit))) (at end (lit)) (at-most-once (lit))))
+(:metric minimize (+ (total-time) (+ (* 2 (level)) (is-violated r)))))";
 
 const PLAN: &str = "; Plan found with metric 3\n0.000: (throw b1 hall) [0.001]\n0.001: (ROLL b1) [D:2.0; C:1]\n2.1: (roll b2)";
 
@@ -200,7 +202,8 @@ proptest! {
             ":predicates", ":functions", ":derived", ":durative-action", ":parameters", ":duration",
             ":condition", ":effect", "=", "-", "?x", "?duration", "#t", "at", "start", "end", "over",
             "all", "and", "or", "not", "when", "forall", "exists", "either", "object", "3", "-1.5",
-            "increase", "lit", "in", "hall", "level", "*", "/", "preference", "imply",
+            "increase", "lit", "in", "hall", "level", "*", "/", "preference", "imply", ":constraints",
+            "always", "within", "hold-during", "sometime-after", "is-violated", ":metric",
         ]), 0..120),
         which in 0..3_usize,
     ) {
