@@ -1,5 +1,10 @@
 //! Constraints on the course of a plan, and what the judge makes of them.
 
+#![allow(
+    clippy::format_push_string,
+    reason = "the tests put texts together, and know what is in them"
+)]
+
 mod reading;
 
 use elbowroom_model::Situation;

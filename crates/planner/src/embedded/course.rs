@@ -1,7 +1,7 @@
 //! Constraints on the course of a plan, as conditions of actions and goals.
 //!
 //! A problem with constraints becomes one without them, of which the plans are made that keep them
-//! (Baier & McIlraith, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala,
+//! (Baier & `McIlraith`, ICAPS 2006, and Bonassi, De Giacomo, Favorito, Fuggitti, Gerevini & Scala,
 //! ICAPS 2021, do such things for sequential plans; here happenings overlap):
 //!
 //! - `always`: what would make the last literal of a clause false needs another one to be true.
@@ -84,7 +84,7 @@ pub(super) fn plan(
     if is_improving {
         let first = match search.under(&demanded, None, true) {
             Ok(answer) => answer,
-            Err(answer) => return answer,
+            Err(answer) => return *answer,
         };
         if search.best.is_none() || search.is_interrupted {
             return search.answer(first);
@@ -107,7 +107,7 @@ pub(super) fn plan(
     }
     match search.under(&demanded, None, settings.first_plan_only) {
         Ok(answer) => search.answer(answer),
-        Err(answer) => answer,
+        Err(answer) => *answer,
     }
 }
 
@@ -128,16 +128,18 @@ impl Search<'_> {
         demanded: &[usize],
         most_states: Option<u64>,
         first_plan_only: bool,
-    ) -> Result<Answer, Answer> {
+    ) -> Result<Answer, Box<Answer>> {
         let free = match rewriting::without_constraints(self.task, demanded) {
             Ok(problem) => free_task(self.task, problem),
-            Err(Obstacle::Feature(feature)) => return Err(unsupported(self.task, feature)),
+            Err(Obstacle::Feature(feature)) => {
+                return Err(Box::new(unsupported(self.task, feature)));
+            }
             Err(Obstacle::Broken(constraint)) => {
                 let reason = format!("the constraint {constraint} is broken from the beginning");
-                return Err(Answer::Unsolvable {
+                return Err(Box::new(Answer::Unsolvable {
                     proof: Proof::Unreachable(vec![reason]),
                     counts: Counts::default(),
-                });
+                }));
             }
         };
         let settings = Settings {

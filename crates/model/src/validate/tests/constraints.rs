@@ -1,5 +1,11 @@
 //! Constraints on the course of a plan, and preferences.
 
+#![allow(
+    clippy::format_collect,
+    clippy::format_push_string,
+    reason = "the tests put texts together, and know what is in them"
+)]
+
 use elbowroom_num::Rational;
 
 use super::world::World;
