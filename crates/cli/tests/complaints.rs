@@ -549,7 +549,8 @@ fn the_page_has_a_row_for_each_test() {
         .filter(|line| line.starts_with("| ") && line.ends_with("` |"));
     let named = rows.filter_map(|row| row.trim_end_matches("` |").rsplit('`').next());
     let mut named: Vec<&str> = named.collect();
-    (tests.sort_unstable(), named.sort_unstable());
+    tests.sort_unstable();
+    named.sort_unstable();
     assert_eq!(named.len(), 15);
     assert_eq!(tests, named);
 }

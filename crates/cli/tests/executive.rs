@@ -213,6 +213,7 @@ fn events_are_the_lines_of_the_trace() {
 type Refused<'a> = (&'a str, &'a str, Option<&'a str>, String, u16, &'a str);
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of refusals")]
 fn who_may_not_or_talks_nonsense_gets_one_clear_sentence() {
     let own = simulated("refused");
     own.await_state(|state| state["activity"] == "resting");
