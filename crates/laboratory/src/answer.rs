@@ -41,11 +41,14 @@ pub enum CompareAnswer {
     Untimed(PerturbedResults),
 }
 
+/// Row, column, and the position of a kind of failure in that cell's most frequent ones.
+pub type FailurePlace = (usize, usize, usize);
+
 /// A failed trial that stands for others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct FailedTrial {
-    /// Row, column, and the position of its kind of failure in that cell's most frequent ones.
-    pub place: (usize, usize, usize),
+    /// Which others.
+    pub place: FailurePlace,
     /// The trial.
     pub id: TrialId,
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom::report::statistics::{Mean, Proportion, mcnemar};
+use elbowroom_laboratory::answer::FailurePlace;
 use elbowroom_laboratory::compare::{Cell, Results};
 use elbowroom_laboratory::perturbed::PerturbedResults;
 
@@ -13,7 +14,7 @@ use crate::plan::word;
 const INTERVALS: &str = "The share of runs that reached the goal, with Wilson's 95 % interval.";
 
 /// The pages of some failed trials, by row, column and kind of failure.
-pub(crate) type Trials = BTreeMap<(usize, usize, usize), Document>;
+pub(crate) type Trials = BTreeMap<FailurePlace, Document>;
 
 /// The page about an experiment on a clock.
 pub(crate) fn timed(results: &Results, trials: Trials) -> Document {

@@ -46,6 +46,7 @@ mod run;
 use elbowroom::answers::{EnvelopeAnswer, PlanAnswer, RegionAnswer, RunAnswer};
 use elbowroom::execute::RunSpec;
 use elbowroom::report::trace::Stored;
+use elbowroom_laboratory::answer::FailurePlace;
 use elbowroom_laboratory::compare::Results;
 use elbowroom_laboratory::perturbed::PerturbedResults;
 use serde::Deserialize;
@@ -107,7 +108,7 @@ pub fn page(name: &str, text: &str) -> Result<String, PageError> {
 pub fn experiment_page(
     name: &str,
     text: &str,
-    traces: &[((usize, usize, usize), String, String)],
+    traces: &[(FailurePlace, String, String)],
 ) -> Result<String, PageError> {
     let results = Results::read(text).map_err(|error| damaged(name, &error))?;
     let mut trials = experiment::Trials::new();

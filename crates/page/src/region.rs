@@ -115,15 +115,12 @@ fn plane(
         let size = nominal.abs().max(1.0);
         // As far as the boxes reach, if that is not too far to see anything else.
         let far = 4.0 * size;
-        let ends = |end: fn(&(Option<f64>, Option<f64>)) -> Option<f64>| {
-            let near = move |value: &f64| (value - nominal).abs() <= far;
-            boxes
-                .iter()
-                .filter_map(move |own| end(&own.intervals[place]))
-                .filter(near)
-        };
-        let from = ends(|it| it.0).fold(nominal - size, f64::min);
-        let to = ends(|it| it.1).fold(nominal + 1.5 * size, f64::max);
+        let near = |value: &f64| (value - nominal).abs() <= far;
+        let intervals = || boxes.iter().map(|own| own.intervals[place]);
+        let lower = intervals().filter_map(|(lower, _)| lower).filter(near);
+        let upper = intervals().filter_map(|(_, upper)| upper).filter(near);
+        let from = lower.fold(nominal - size, f64::min);
+        let to = upper.fold(nominal + 1.5 * size, f64::max);
         // Durations begin at zero.
         let from = if nominal >= 0.0 { from.max(0.0) } else { from };
         PlaneQuantity {

@@ -92,6 +92,10 @@ pub struct StnQuestion {
 }
 
 /// Asks for an envelope, or whether a box is inside.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is an option of the command"
+)]
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EnvelopeQuestion {

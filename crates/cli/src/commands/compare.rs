@@ -7,7 +7,7 @@ use std::{fs, io};
 use elbowroom::answers::{Event, Halt, Watcher};
 use elbowroom::report::table::Table;
 use elbowroom_laboratory::answer::{
-    AnyExperiment, CompareAnswer, CompareError, CompareRequest, compare_recorded,
+    AnyExperiment, CompareAnswer, CompareError, CompareRequest, FailurePlace, compare_recorded,
 };
 use elbowroom_laboratory::compare::Part;
 use elbowroom_laboratory::record::TrialRecords;
@@ -188,7 +188,7 @@ fn write_failures(
 
 /// The traces of failed trials in a folder that an experiment was written to: row, column and kind of
 /// each, and its file.
-pub(crate) fn traces(folder: &Path) -> Result<Vec<((usize, usize, usize), PathBuf)>, Failure> {
+pub(crate) fn traces(folder: &Path) -> Result<Vec<(FailurePlace, PathBuf)>, Failure> {
     let wrong = |error: &io::Error| {
         let words = plain(error);
         Failure::new(format!("cannot read {}: {words}", folder.display()), "")

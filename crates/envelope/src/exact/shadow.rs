@@ -65,7 +65,7 @@ impl Piece {
             let mut factors = [Rational::ZERO, Rational::ZERO];
             for (id, factor) in &row.factors {
                 match axes.iter().position(|axis| axis == id) {
-                    Some(axis) => factors[axis] = factor.clone(),
+                    Some(place) => factors[place] = factor.clone(),
                     None => bound -= factor * &values(*id),
                 }
             }
@@ -90,7 +90,7 @@ impl Piece {
         // The axes behind all others, which are eliminated.
         let others = ids.map(ParameterId::index).max().unwrap_or(0) + 1;
         let place = |id: ParameterId| match axes.iter().position(|axis| *axis == id) {
-            Some(axis) => others + axis,
+            Some(place) => others + place,
             None => id.index(),
         };
         let mut polyhedron = Polyhedron::default();

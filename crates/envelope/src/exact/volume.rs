@@ -39,7 +39,7 @@ impl Region {
                 let found = program.of(index);
                 *own = Some(match own.take() {
                     None => found,
-                    Some(before) => around(&before, found),
+                    Some(before) => around(&before, &found),
                 });
             }
         }
@@ -58,7 +58,7 @@ impl Region {
 }
 
 /// The smallest interval around two.
-fn around(one: &Interval, two: Interval) -> Interval {
+fn around(one: &Interval, two: &Interval) -> Interval {
     let lower = match (one.lower.value(), two.lower.value()) {
         (Some(a), Some(b)) => End::Closed(a.min(b).clone()),
         _ => End::Infinite,

@@ -77,11 +77,18 @@ pub(super) struct Lasting<'a> {
     plan: Option<TimeTriggeredPlan>,
     /// Since when the run rests.
     rests_since: Option<Rational>,
-    /// Whether the run is over where others are: it only takes pauses, and that its goal is
-    /// abandoned.
-    ends: bool,
-    /// Whether that was done, so that the run is over as soon as nothing is under way.
-    is_given_up: bool,
+    at_rest: AtRest,
+}
+
+/// What becomes of a run where another one would be over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum AtRest {
+    /// It waits for what is asked next.
+    Waits,
+    /// It is over, too: it only takes pauses, and that its goal is abandoned.
+    Ends,
+    /// Its goal was abandoned: it is over as soon as nothing is under way.
+    GivenUp,
 }
 
 /// A change of the goals.
@@ -111,8 +118,7 @@ impl<'a> Run<'a> {
             change: None,
             plan: None,
             rests_since: None,
-            ends: false,
-            is_given_up: false,
+            at_rest: AtRest::Waits,
         });
         self
     }
@@ -125,7 +131,7 @@ impl<'a> Run<'a> {
         let reads_none = |_: &Task, _: &str| Err("this run has one goal".to_owned());
         let mut run = self.lasting(reads_none);
         if let Some(lasting) = &mut run.lasting {
-            lasting.ends = true;
+            lasting.at_rest = AtRest::Ends;
         }
         run
     }
@@ -136,7 +142,7 @@ impl<'a> Run<'a> {
             return Some("this run takes no requests; nothing was made of it");
         };
         match request {
-            Request::Pursue { .. } if lasting.ends => {
+            Request::Pursue { .. } if lasting.at_rest != AtRest::Waits => {
                 Some("this run takes no other goals; nothing was made of it")
             }
             Request::Pursue { name, goal } => {
@@ -235,7 +241,7 @@ impl<'a> Run<'a> {
             self.stay();
             return Ok(true);
         }
-        if lasting.is_given_up {
+        if lasting.at_rest == AtRest::GivenUp {
             if self.account.open_tickets().next().is_none() {
                 return Err(Stop::Over(Verdict::Interrupted));
             }
@@ -277,7 +283,9 @@ impl<'a> Run<'a> {
         if !has_goals {
             self.drop_plan();
             match &mut self.lasting {
-                Some(lasting) if lasting.ends => lasting.is_given_up = true,
+                Some(lasting) if lasting.at_rest != AtRest::Waits => {
+                    lasting.at_rest = AtRest::GivenUp;
+                }
                 _ => self.rest_because(None, &[]),
             }
             return Ok(());
@@ -372,7 +380,9 @@ impl<'a> Run<'a> {
 
     /// Whether the run rests with this verdict, and is not over.
     pub(super) fn goes_on_after(&self, verdict: &Verdict) -> bool {
-        self.lasting.as_ref().is_some_and(|lasting| !lasting.ends)
+        self.lasting
+            .as_ref()
+            .is_some_and(|lasting| lasting.at_rest == AtRest::Waits)
             && match verdict {
                 Verdict::GoalReached
                 | Verdict::Unsolvable

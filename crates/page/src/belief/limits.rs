@@ -66,12 +66,12 @@ impl Limits {
         let name = action.name.clone();
         let body = match &action.body {
             Body::Instantaneous(snap) => {
-                return self.moment(format!("at {name}"), &snap.condition, None, state);
+                return self.moment(&format!("at {name}"), &snap.condition, None, state);
             }
             Body::Durative(body) => body,
         };
         self.moment(
-            format!("at the start of {name}"),
+            &format!("at the start of {name}"),
             &body.start.condition,
             planned,
             state,
@@ -105,7 +105,7 @@ impl Limits {
         if has_succeeded {
             let when = format!("at the end of {}", running.name);
             let took = state.time() - &running.since;
-            self.moment(when, &running.at_end, Some(&took), state);
+            self.moment(&when, &running.at_end, Some(&took), state);
         }
     }
 
@@ -120,7 +120,7 @@ impl Limits {
 
     fn moment(
         &mut self,
-        when: String,
+        when: &str,
         condition: &Condition,
         duration: Option<&Rational>,
         state: &Progression,
@@ -130,7 +130,7 @@ impl Limits {
                 from: state.time().clone(),
                 to: state.time().clone(),
                 bound,
-                when: when.clone(),
+                when: when.to_owned(),
                 value: state.value(fluent).cloned(),
             };
             self.add(fluent, allowed);

@@ -135,9 +135,10 @@ impl Host for Alone<'_> {
                 "give --serve and --control again",
             ));
         }
-        Ok(match spec.is_attended {
-            true => super::attendance(self.0),
-            false => Attendance::default(),
+        Ok(if spec.is_attended {
+            super::attendance(self.0)
+        } else {
+            Attendance::default()
         })
     }
 }

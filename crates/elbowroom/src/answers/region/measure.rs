@@ -119,7 +119,7 @@ fn size_of(body: &Body, seed: u64, flow: &mut dyn FnMut() -> ControlFlow<()>) ->
         for (place, component) in components.iter().enumerate() {
             let own = seed.wrapping_add(0x9E37_79B9 * (1 + place as u64) + ((index as u64) << 40));
             match size_of_component(component, own, flow) {
-                Some(size) => product = product.times(size),
+                Some(size) => product = product.times(&size),
                 None if flow().is_break() => return None,
                 // Flat: the piece has no volume.
                 None => {
@@ -139,10 +139,10 @@ fn size_of_component(
     seed: u64,
     flow: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Size> {
-    if component.parameters.len() <= MOST_EXACT {
-        if let Some(volume) = component.volume(MOST_SIDES, flow) {
-            return Some(Size::Exact(volume));
-        }
+    if component.parameters.len() <= MOST_EXACT
+        && let Some(volume) = component.volume(MOST_SIDES, flow)
+    {
+        return Some(Size::Exact(volume));
     }
     let found = estimate(component, seed, flow)?;
     Some(Size::Estimate {
@@ -175,8 +175,8 @@ impl Size {
         }
     }
 
-    fn times(self, other: Self) -> Self {
-        if let (Self::Exact(one), Self::Exact(two)) = (&self, &other) {
+    fn times(&self, other: &Self) -> Self {
+        if let (Self::Exact(one), Self::Exact(two)) = (self, other) {
             return Self::Exact(one * two);
         }
         Self::Estimate {

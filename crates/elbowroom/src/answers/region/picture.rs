@@ -144,7 +144,7 @@ fn window(
     flats: &[Flat],
     rectangles: &[(&str, Vec<[Option<&Rational>; 2]>)],
 ) -> [Rational; 2] {
-    let axis = usize::from(axes[1] == id);
+    let own = usize::from(axes[1] == id);
     let nominal = &plan.parameter(id).nominal;
     let room = nominal.abs().max(Rational::ONE);
     // Three times the nominal value away at most: what goes on for ever leaves the picture there.
@@ -158,7 +158,7 @@ fn window(
         }
     };
     for (_, ends) in rectangles {
-        ends[axis].iter().flatten().for_each(|end| stretch(end));
+        ends[own].iter().flatten().for_each(|end| stretch(end));
     }
     let wide = axes.map(|id| {
         let nominal = &plan.parameter(id).nominal;
@@ -169,7 +169,7 @@ fn window(
     let upper = [wide[0][1].clone(), wide[1][1].clone()];
     for flat in flats {
         for corner in flat.polygon(&lower, &upper) {
-            stretch(&corner[axis]);
+            stretch(&corner[own]);
         }
     }
     // Durations begin at zero.
