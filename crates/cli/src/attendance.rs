@@ -3,7 +3,6 @@
 //! Requests wait at a [`Desk`]. The run fetches them as observations of its world ([`Attended`]), so
 //! that they stand in its record and it never waits for anybody.
 
-mod desk;
 mod world;
 
 use std::sync::Arc;
@@ -13,9 +12,9 @@ use elbowroom::executive::Status;
 use elbowroom::model::Task;
 use elbowroom::report::trace::Line;
 
-pub(crate) use desk::{Ask, Desk};
 pub(crate) use world::Attended;
 
+use crate::desk::Desk;
 use crate::serve::Board;
 
 /// Who attends a run, if anybody does.

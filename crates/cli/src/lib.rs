@@ -10,6 +10,7 @@ mod bug;
 mod clock;
 mod commands;
 mod conversation;
+mod desk;
 mod exit;
 mod http;
 mod input;

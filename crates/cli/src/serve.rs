@@ -15,7 +15,7 @@ use std::time::Duration;
 use elbowroom::execution::run::FIRST_GOAL;
 use tiny_http::{Header, Method, Request, Response, Server};
 
-use crate::attendance::{Ask, Desk};
+use crate::desk::{Ask, Desk};
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::output;

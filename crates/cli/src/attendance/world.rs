@@ -9,8 +9,9 @@ use elbowroom::model::Task;
 use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 
-use super::{Attendance, Desk};
+use super::Attendance;
 use crate::clock::Clock;
+use crate::desk::Desk;
 use crate::interrupt::Interrupt;
 
 /// The time on the wall clock after which a wait looks for requests.

@@ -29,8 +29,9 @@ use elbowroom::sim::WorldModel;
 use elbowroom::text::Source;
 
 use crate::args::RunArgs;
-use crate::attendance::{Attendance, Attended, Desk};
+use crate::attendance::{Attendance, Attended};
 use crate::clock::Clock;
+use crate::desk::Desk;
 use crate::exit::{Answer, Exit, Failure};
 use crate::input;
 use crate::interrupt::Interrupt;

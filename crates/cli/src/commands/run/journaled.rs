@@ -11,7 +11,7 @@ use elbowroom::model::ground::{FactId, FluentId};
 use elbowroom::num::Rational;
 use elbowroom::report::trace::Line;
 
-use crate::attendance::Desk;
+use crate::desk::Desk;
 use crate::journal::JournalFile;
 
 /// Whether everything is on the disk that should be.

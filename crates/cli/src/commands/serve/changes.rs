@@ -17,7 +17,7 @@ use elbowroom::pddl::{self, Source};
 use serde::de::DeserializeOwned;
 
 use super::front::{Front, Refused};
-use crate::attendance::Ask;
+use crate::desk::Ask;
 
 /// How long a client waits for the run to take its request in; afterwards it is told that it will.
 const PATIENCE: Duration = Duration::from_secs(2);

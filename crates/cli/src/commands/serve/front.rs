@@ -12,7 +12,7 @@ use elbowroom::executive::{METHODS, Status, openapi};
 use elbowroom::model::Task;
 use serde::Serialize;
 
-use crate::attendance::Desk;
+use crate::desk::Desk;
 use crate::http::{Misunderstood, Request, Stream, respond, respond_with_events};
 use crate::interrupt::Interrupt;
 use crate::serve::{Board, Control, is_local_name};

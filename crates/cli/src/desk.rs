@@ -73,7 +73,7 @@ impl Desk {
     }
 
     /// Everything that waits, as observed at `now`.
-    pub(super) fn fetch(&self, now: &Rational, task: &Task) -> Vec<Observation> {
+    pub(crate) fn fetch(&self, now: &Rational, task: &Task) -> Vec<Observation> {
         let asks = {
             let mut state = self.lock();
             state.fetched = state.given;

@@ -1,0 +1,287 @@
+//! How much of the possible room incremental rectangular robustification finds: its box beside the
+//! largest one, by family, in the published order of the parameters and in random ones.
+//!
+//! ```text
+//! cargo run --release -p elbowroom --example shares -- DATA [ORDERS] [STEPS]
+//! cargo run --release -p elbowroom --example shares -- DATA volume
+//! ```
+//!
+//! The second prints which share of the exact region's volume each box has (weak guarantee, whose region
+//! it is; published order).
+//!
+//! `DATA` is the folder with `envelopes/`, `ORDERS` the number of random orders (20), `STEPS` how many
+//! boxes a search for the largest one may try (2000); plans for which that is not enough are counted
+//! and left out. Guarantee: dynamic. Steps: a hundredth of each nominal value. Ends count up to nine times
+//! the nominal value.
+#![allow(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "that is what the example does"
+)]
+
+#[path = "../tests/shared/instances.rs"]
+mod instances;
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
+use elbowroom::answers::{EnvelopeRequest, Unwatched};
+use elbowroom::envelope::{
+    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr,
+};
+use elbowroom::model::Task;
+use elbowroom::num::Rational;
+use elbowroom::pddl::{Source, read_problem};
+use elbowroom::plan::{BoxEnd, DecoupledEnvelope, format};
+use instances::{Instance, figure_3, figure_4};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// One order of the parameters of one plan: IRR's share of the greatest sum of widths and of the
+/// greatest least slack, and whether it leaves an end with no room that could have some.
+struct Shares {
+    widths: f64,
+    slack: f64,
+    is_starved: bool,
+}
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let data = arguments
+        .next()
+        .unwrap_or_else(|| "../shared/data".to_owned());
+    let number = |text: Option<String>, default: usize| {
+        text.map_or(default, |text| text.parse().expect("a whole number"))
+    };
+    let second = arguments.next();
+    let families = families(Path::new(&data));
+    if second.as_deref() == Some("volume") {
+        return volumes(&families);
+    }
+    let orders = number(second, 20);
+    let steps = number(arguments.next(), 2000);
+    println!(
+        "| family | order | plans | widths: least | median | greatest | least slack: least | median | greatest | starved |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    for (family, instances) in families {
+        let (mut published, mut shuffled, mut left_out) = (Vec::new(), Vec::new(), 0);
+        for instance in &instances {
+            let Some(mut found) = compared(instance, orders, steps) else {
+                left_out += 1;
+                continue;
+            };
+            shuffled.extend(found.split_off(1));
+            published.extend(found);
+        }
+        eprintln!("{family}: {left_out} left out");
+        row(&family, "published", &published);
+        row(&family, "random", &shuffled);
+    }
+}
+
+fn families(data: &Path) -> Vec<(String, Vec<Instance>)> {
+    let mut families: Vec<(String, Vec<Instance>)> = Vec::new();
+    for instance in figure_3(data) {
+        let family = instance
+            .name
+            .split(' ')
+            .next()
+            .unwrap_or_default()
+            .to_owned();
+        match families.iter_mut().find(|(name, _)| *name == family) {
+            Some((_, instances)) => instances.push(instance),
+            None => families.push((family, vec![instance])),
+        }
+    }
+    families.push(("robot_delivery".to_owned(), figure_4(data)));
+    families
+}
+
+/// The share of the exact region's volume that each box has.
+fn volumes(families: &[(String, Vec<Instance>)]) {
+    println!(
+        "| family | plans | with a volume | exactly | IRR: least | median | greatest | best least slack: median | best sum of widths: median |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (family, instances) in families {
+        let mut shares: [Vec<f64>; 3] = Default::default();
+        let (mut measured, mut exact) = (0, 0);
+        for (boxes, is_exact) in instances.iter().filter_map(shares_of_volume) {
+            measured += 1;
+            exact += usize::from(is_exact);
+            for (name, share) in boxes {
+                let names = ["irr", "least-slack", "widths"];
+                if let Some(place) = names.iter().position(|own| *own == name) {
+                    shares[place].push(share);
+                }
+            }
+        }
+        let percent = |value: Option<&f64>| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{:.1} %", value * 100.0))
+        };
+        for own in &mut shares {
+            own.sort_by(f64::total_cmp);
+        }
+        let median = |own: &[f64]| percent(own.get(own.len() / 2));
+        println!(
+            "| {family} | {} | {measured} | {exact} | {} | {} | {} | {} | {} |",
+            instances.len(),
+            percent(shares[0].first()),
+            median(&shares[0]),
+            percent(shares[0].last()),
+            median(&shares[1]),
+            median(&shares[2]),
+        );
+    }
+}
+
+/// The share that each box has, by name, and whether it is exact.
+fn shares_of_volume(instance: &Instance) -> Option<(Vec<(String, f64)>, bool)> {
+    let (task, text) = read(instance)?;
+    let plan = format::read(text.as_bytes(), &task).ok()?;
+    let settings = RegionSettings {
+        with_boxes: true,
+        with_volume: true,
+        seed: 0,
+    };
+    let request = EnvelopeRequest::new(&task, plan);
+    let outcome = region(&request, &settings, &mut Unwatched).ok()?;
+    let RegionFinding::Region {
+        boxes,
+        measure: Some(measure),
+        ..
+    } = outcome.answer.finding
+    else {
+        return None;
+    };
+    let shares = boxes
+        .into_iter()
+        .filter_map(|own| Some((own.name, own.share?.decimal)));
+    Some((shares.collect(), measure.volume.is_some()))
+}
+
+fn read(instance: &Instance) -> Option<(Arc<Task>, String)> {
+    let source = |path: &Path| {
+        let bytes =
+            std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        Source::from_bytes(path.display().to_string(), &bytes)
+    };
+    let read = read_problem(&source(&instance.domain), &source(&instance.problem));
+    let task = Arc::new(Task::new(read.ok()?.0));
+    Some((task, source(&instance.plan).text().to_owned()))
+}
+
+fn row(family: &str, order: &str, shares: &[Shares]) {
+    let spread = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        let percent = |value: Option<&f64>| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{:.0} %", value * 100.0))
+        };
+        format!(
+            "{} | {} | {}",
+            percent(values.first()),
+            percent(values.get(values.len() / 2)),
+            percent(values.last())
+        )
+    };
+    let widths = spread(shares.iter().map(|own| own.widths).collect());
+    let slack = spread(shares.iter().map(|own| own.slack).collect());
+    let starved = shares.iter().filter(|own| own.is_starved).count();
+    println!(
+        "| {family} | {order} | {} | {widths} | {slack} | {starved} |",
+        shares.len()
+    );
+}
+
+/// The published order first; `None` if the largest boxes are not found, or if there is no room.
+fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shares>> {
+    let (task, text) = read(instance)?;
+    let widest = largest(&task, &text, Objective::Widths, steps)?;
+    let fairest = largest(&task, &text, Objective::LeastSlack, steps)?;
+    let plan = format::read(text.as_bytes(), &task).ok()?;
+    let names: Vec<String> = plan.parameters.into_iter().map(|own| own.name).collect();
+    let largest = (&widest, &fairest);
+    let mut all = vec![shares(&task, &text, &names, largest)?];
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for _ in 0..orders {
+        let (mut parameters, others): (Vec<&str>, Vec<&str>) = text
+            .lines()
+            .partition(|line| line.trim_start().starts_with("parameter"));
+        parameters.shuffle(&mut rng);
+        parameters.extend(others);
+        all.push(shares(&task, &parameters.join("\n"), &names, largest)?);
+    }
+    Some(all)
+}
+
+/// The largest box, if it is proved to be.
+fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> Option<BestRun> {
+    let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
+    let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
+    let settings = BestSettings {
+        objective,
+        ..BestSettings::default()
+    };
+    let mut left = steps;
+    let run = best(&mut oracle, &settings, None, &mut |_| {
+        left = left.saturating_sub(1);
+        if left == 0 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    run.ok()
+        .filter(|run| run.is_proved && run.envelope.is_ok() && run.value.is_positive())
+}
+
+/// IRR's box beside the largest ones.
+fn shares(
+    task: &Arc<Task>,
+    text: &str,
+    names: &[String],
+    (widest, fairest): (&BestRun, &BestRun),
+) -> Option<Shares> {
+    let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
+    let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
+    let settings = Settings {
+        relative: Some(Rational::new(1, 100)),
+        ..Settings::default()
+    };
+    let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).ok()?;
+    let found = run.envelope.ok()?;
+    let nominal = DecoupledEnvelope::point(&plan.nominal());
+    let mut sum = Rational::ZERO;
+    let mut least: Option<Rational> = None;
+    let mut is_starved = false;
+    for own in &widest.proof.variables {
+        let scale = &own.scale;
+        for end in &own.ends {
+            // In this order of the parameters it has another position.
+            let end = &BoxEnd {
+                parameter: plan.find(&names[end.parameter.index()])?,
+                side: end.side,
+            };
+            let far = end.reach(&found).zip(end.reach(&nominal));
+            let moved = far.map_or_else(|| own.most.clone(), |(far, near)| far - near);
+            let moved = moved.min(own.most.clone());
+            let weight = &plan.parameter(end.parameter).weight;
+            sum += weight * &moved;
+            let slack = moved.checked_div(scale)?;
+            is_starved |= moved.is_zero() && fairest.value.is_positive();
+            least = Some(least.map_or(slack.clone(), |least| least.min(slack)));
+        }
+    }
+    let share = |part: &Rational, whole: &Rational| {
+        part.checked_div(whole).map_or(1.0, |share| share.to_f64())
+    };
+    Some(Shares {
+        widths: share(&sum, &widest.value),
+        slack: share(&least?, &fairest.value),
+        is_starved,
+    })
+}
