@@ -46,7 +46,8 @@ pub(crate) fn plan_of(
     } = replay;
     let log = stepper.log.as_ref()?;
     let times = if state.symbolic.is_none() {
-        exact_times(compiled, &state.network, log, task.epsilon())?
+        let known = known_ends(situation, &timings);
+        exact_times(compiled, &state.network, log, (task.epsilon(), &known))?
     } else {
         let exact = exact_distances(log);
         symbolic::solve(&state, compiled, &exact)?
@@ -161,7 +162,17 @@ fn exact_distances(log: &Log) -> Vec<(NodeId, NodeId, Rational)> {
     distances
 }
 
-/// The earliest times of all happenings in exact numbers.
+/// The earliest ends of what is under way, exactly: its start need not lie on the grid.
+fn known_ends(situation: &Situation, timings: &[Timing]) -> Vec<(NodeId, Rational)> {
+    let both = situation.running.iter().zip(timings);
+    let end = |(running, timing): (&elbowroom_model::RunningAction, &Timing)| {
+        let end = &running.start + running.duration.lower.value()?;
+        Some((timing.end?, end.max(situation.time.clone())))
+    };
+    both.filter_map(end).collect()
+}
+
+/// The earliest times of all happenings in exact numbers; those of `known` are no earlier than that.
 ///
 /// Where everything lies on the grid these are the network's own. Elsewhere exact durations take
 /// the place of rounded ones; a bound by a fixed time is moved by a tick, to be safe from its
@@ -171,7 +182,7 @@ fn exact_times(
     compiled: &Compiled,
     network: &Network,
     log: &Log,
-    epsilon: &Rational,
+    (epsilon, known): (&Rational, &[(NodeId, Rational)]),
 ) -> Option<Vec<Rational>> {
     let scale = compiled.scale;
     let is_on_grid = |number: &Rational| scale.exactly(number).is_some();
@@ -194,6 +205,9 @@ fn exact_times(
             compiled.earliest(if is_free { floor } else { floor + slack })
         })
         .collect();
+    for (node, end) in known {
+        times[*node as usize] = end.clone();
+    }
     let exact = exact_distances(log);
     let of_end = |from: NodeId, to: NodeId| {
         let found = exact.iter().find(|known| (known.0, known.1) == (from, to));

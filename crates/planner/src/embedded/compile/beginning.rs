@@ -58,9 +58,17 @@ fn one(running: &RunningAction, now: &Rational, scale: Scale) -> (Running, bool)
         }
         End::Open(value) => (Some(scale.ceil(value).0 - 1), false),
     };
+    // Between two ticks there is nothing: a duration that is still possible takes the next one.
+    let can_end = running
+        .duration
+        .upper
+        .value()
+        .is_none_or(|upper| *upper >= elapsed);
+    let least = least.max(scale.ceil(&elapsed).0);
+    let most = most.map(|most| if can_end { most.max(least) } else { most });
     let running = Running {
         start,
-        least: least.max(scale.ceil(&elapsed).0),
+        least,
         most,
         duration: known_duration(running).cloned(),
     };
