@@ -126,7 +126,7 @@ pub struct EnvelopeQuestion {
     /// The algorithm.
     #[serde(default)]
     pub method: Method,
-    /// With [`Method::Exact`]: whether the answer has the region's volume, and boxes with their
+    /// With the method `exact`: whether the answer has the region's volume, and boxes with their
     /// shares of it.
     #[serde(default)]
     pub volume: bool,
