@@ -110,17 +110,21 @@ fn plane(
             .collect(),
     };
     let boxes: Vec<PlaneBox> = boxes.iter().map(drawn).collect();
+    let pieces: Vec<Vec<PlaneRow>> = pieces.iter().map(piece).collect();
+    let all: Vec<f64> = parameters.iter().map(|it| it.nominal.to_f64()).collect();
     let quantity = |(place, parameter): (usize, &elbowroom::answers::envelope::Quantity)| {
         let nominal = parameter.nominal.to_f64();
         let size = nominal.abs().max(1.0);
-        // As far as the boxes reach, if that is not too far to see anything else.
+        // As far as the boxes reach, and as the plan works with the others as planned, if that is
+        // not too far to see anything else.
         let far = 4.0 * size;
         let near = |value: &f64| (value - nominal).abs() <= far;
         let intervals = || boxes.iter().map(|own| own.intervals[place]);
         let lower = intervals().filter_map(|(lower, _)| lower).filter(near);
         let upper = intervals().filter_map(|(_, upper)| upper).filter(near);
-        let from = lower.fold(nominal - size, f64::min);
-        let to = upper.fold(nominal + 1.5 * size, f64::max);
+        let alone = || ends_alone(&pieces, &all, place).into_iter().filter(near);
+        let from = lower.chain(alone()).fold(nominal - size, f64::min);
+        let to = upper.chain(alone()).fold(nominal + 1.5 * size, f64::max);
         // Durations begin at zero.
         let from = if nominal >= 0.0 { from.max(0.0) } else { from };
         PlaneQuantity {
@@ -131,15 +135,27 @@ fn plane(
             to: to + (to - from) / 20.0,
         }
     };
+    let quantities = parameters.iter().enumerate().map(quantity).collect();
     Plane {
         heading: "Two quantities at a time".to_owned(),
         note: "Where the plan works, by two quantities; the others have their nominal values or those \
                chosen below."
             .to_owned(),
-        quantities: parameters.iter().enumerate().map(quantity).collect(),
-        pieces: pieces.iter().map(piece).collect(),
+        quantities,
+        pieces,
         boxes,
     }
+}
+
+/// Where rows stop a quantity while the others have these values.
+fn ends_alone(pieces: &[Vec<PlaneRow>], values: &[f64], place: usize) -> Vec<f64> {
+    let end = |row: &PlaneRow| {
+        let own = row.factors.iter().find(|(index, _)| *index == place)?.1;
+        let others = row.factors.iter().filter(|(index, _)| *index != place);
+        let taken: f64 = others.map(|(index, factor)| factor * values[*index]).sum();
+        Some((row.bound - taken) / own)
+    };
+    pieces.iter().flatten().filter_map(end).collect()
 }
 
 fn box_name(name: &str) -> &str {
