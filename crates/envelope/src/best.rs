@@ -9,11 +9,16 @@
 //! - [`Objective::LeastSlack`]: all ends move out together, in relation to their nominal values,
 //!   until one is stopped; then the others go on. No linear program is needed ([`fill`]).
 //! - [`Objective::Widths`]: a linear program over the cuts, with branch and bound where a cut has
-//!   alternatives ([`widths`]).
+//!   alternatives ([`branch`]).
+//! - [`Objective::Volume`]: the same, where each linear program is about tangents of the logarithm
+//!   ([`volume`]).
 
+mod barrier;
+mod branch;
 mod fill;
+mod goal;
 mod master;
-mod widths;
+mod volume;
 
 use std::fmt;
 use std::ops::ControlFlow;
@@ -30,6 +35,11 @@ use crate::obligations::Refusal;
 use crate::oracle::Oracle;
 use crate::row::Row;
 
+use goal::Goal;
+use volume::Volume;
+
+pub use volume::foot as volume_foot;
+
 /// The objective of a largest box.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
@@ -43,6 +53,11 @@ pub enum Objective {
     LeastSlack,
     /// The sum of the widths of all intervals, each times its parameter's weight.
     Widths,
+    /// The product of the widths of all intervals, each in relation to its nominal value and raised
+    /// to its parameter's weight. To each a millionth is added first, so that the product is not 0
+    /// wherever one duration cannot deviate at all. The value is the logarithm of the product, and
+    /// a box is the best one if no other has more than a millionth more.
+    Volume,
 }
 
 impl Objective {
@@ -51,6 +66,7 @@ impl Objective {
         match self {
             Self::LeastSlack => "least-slack",
             Self::Widths => "widths",
+            Self::Volume => "volume",
         }
     }
 }
@@ -83,15 +99,22 @@ impl Default for BestSettings {
     }
 }
 
+/// A box is the best one by an objective that is a logarithm if no other is worth more than so much
+/// more: a millionth.
+pub(crate) fn tolerance() -> Rational {
+    Rational::new(1, 1_000_000)
+}
+
 /// The result of [`best`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct BestRun {
     /// The box; `Err` if the plan does not even work at the nominal values.
     pub envelope: Result<DecoupledEnvelope, Objection>,
-    /// The value of the objective: the least slack, or the sum of widths.
+    /// The value of the objective: the least slack, the sum of widths, or the logarithm of the
+    /// volume, which is rounded down to a billionth.
     pub value: Rational,
     /// An upper bound on the objective of all boxes; equal to `value` if the box is proved to be
-    /// the largest.
+    /// the largest, but for at most a millionth where the objective is a logarithm.
     pub bound: Rational,
     /// Whether there is no better box. With [`Objective::LeastSlack`] that also says that the
     /// second least slack is the greatest there can be, and so on.
@@ -170,6 +193,9 @@ pub enum Case {
     Bounded {
         /// The bounds.
         multipliers: Vec<(Source, Rational)>,
+        /// For an objective that is no sum, of each parameter the slope of the tangent that stands
+        /// for it.
+        slopes: Vec<Rational>,
         /// Whether there is no box in this case.
         is_impossible: bool,
     },
@@ -328,7 +354,14 @@ pub fn best(
     let variables = Variables::new(&plan, settings);
     let mut run = match settings.objective {
         Objective::LeastSlack => fill::fill(oracle, &plan, &variables, on_step)?,
-        Objective::Widths => widths::widths(oracle, &plan, &variables, start, on_step)?,
+        Objective::Widths => {
+            let goal = Goal::widths(&plan, &variables);
+            branch::branch(oracle, &plan, &variables, goal, start, on_step)?
+        }
+        Objective::Volume => {
+            let goal = Goal::Volume(Volume::new(&plan, &variables));
+            branch::branch(oracle, &plan, &variables, goal, start, on_step)?
+        }
     };
     if let Ok(envelope) = &mut run.envelope {
         run.proof.variables = variables.moved(&nominal, envelope);

@@ -82,7 +82,7 @@ pub mod soundness;
 pub use balance::{Balance, Share, balance};
 pub use best::{
     BestProof, BestRun, BestSettings, BestStep, Case, Moved, Objective, Reasons, Source, Stopped,
-    best,
+    best, volume_foot,
 };
 pub use control::{ControlConflict, ControlGround};
 pub use cut::{Cut, Ground, ProofPart, ProofWay};

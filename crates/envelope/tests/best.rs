@@ -121,6 +121,13 @@ fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
     slacks
 }
 
+/// The logarithm of the product of widths in relation to the nominal values, a millionth wider.
+fn volume(envelope: &DecoupledEnvelope) -> f64 {
+    let widths = envelope.intervals().iter().filter_map(Interval::width);
+    let nominal = Rational::from(NOMINAL).to_f64();
+    widths.map(|width| (width.to_f64() / nominal + 1e-6).ln()).sum()
+}
+
 fn is_symmetric(envelope: &DecoupledEnvelope) -> bool {
     let twice = Rational::from(2 * NOMINAL);
     envelope.intervals().iter().all(|own| {
@@ -221,6 +228,49 @@ fn relay(unit: &Rational) -> String {
          c: first.end - first.start in [a, a]; c: second.end - second.start in [b, b];
          c: second.start - first.end in [0, 0]; c: second.end - .zero in [0, {limit}];"
     )
+}
+
+#[test]
+fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
+    let mut dice = Dice(23);
+    let (mut proved, mut unproved, mut torn, mut flat, mut others) = (0, 0, 0, 0, 0);
+    for _ in 0..40 {
+        let bounds = dice.bounds();
+        let given = Given {
+            domain: DOMAIN,
+            plan: &problem(&bounds),
+            ..Given::default()
+        };
+        let (task, plan) = given.task_and_plan();
+        for guarantee in Guarantee::ALL {
+            let Ok(mut oracle) = Oracle::new(&task, &plan, guarantee) else {
+                continue;
+            };
+            for symmetric in [false, true] {
+                let Some((run, best)) = found(&mut oracle, Objective::Volume, symmetric) else {
+                    continue;
+                };
+                let what = format!("{guarantee} {symmetric} {bounds} {run:?}");
+                assert_eq!(oracle.objection(&best), Ok(None), "{what}");
+                let (value, bound) = (run.value.to_f64(), run.bound.to_f64());
+                assert!((volume(&best) - value).abs() < 1e-8, "{what}");
+                assert!(value <= bound, "{what}");
+                assert_eq!(run.is_proved, bound <= value + 1e-6, "{what}");
+                proved += usize::from(run.is_proved);
+                unproved += usize::from(!run.is_proved);
+                torn += usize::from(run.proof.cuts.iter().any(|cut| cut.rows.len() > 1));
+                flat += usize::from(value < -10.0);
+                for other in boxes(&plan) {
+                    if volume(&other) > bound + 1e-9 && (!symmetric || is_symmetric(&other)) {
+                        assert!(oracle.objection(&other).unwrap().is_some(), "{other:?} {what}");
+                        others += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(proved > 100 && torn > 5 && flat > 5 && others > 1000, "{proved} {torn} {flat} {others}");
+    assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 
 #[test]

@@ -8,6 +8,7 @@
 //! - [`Delta`]: a rational plus a multiple of an infinitesimal, to treat `<` like `<=`.
 //! - [`CommonDenominator`]: the unit in which given fractions are whole numbers.
 //! - [`Interval`]: a set of rationals between two ends, each closed, open or infinite.
+//! - [`enclosed`]: logarithms, between two fractions.
 //! - [`simplex`]: systems of linear inequalities, decided and optimised exactly, with proofs.
 //!
 //! No planning word occurs in this crate.
@@ -24,6 +25,7 @@
 
 mod delta;
 mod denominator;
+pub mod enclosed;
 mod interval;
 mod rational;
 pub mod simplex;

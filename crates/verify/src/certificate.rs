@@ -203,6 +203,24 @@ pub enum Reasons {
     /// The weighted sum of widths is at most so much in each of these cases, of which the first is
     /// split into the others.
     Widths(Vec<Case>),
+    /// The logarithm of the weighted product of widths is at most so much in each of these cases.
+    Volume {
+        /// What is added to each width in relation to its scale.
+        #[serde(with = "number")]
+        foot: Rational,
+        /// The first is split into the others.
+        cases: Vec<Case>,
+    },
+}
+
+impl Reasons {
+    /// The cases of a tree, if that is what follows.
+    pub fn cases(&self) -> &[Case] {
+        match self {
+            Self::LeastSlack(_) => &[],
+            Self::Widths(cases) | Self::Volume { cases, .. } => cases,
+        }
+    }
 }
 
 /// Why a variable can have no more slack.
@@ -246,6 +264,10 @@ pub struct Total {
     /// What their bounds add up to.
     #[serde(with = "number")]
     pub bound: Rational,
+    /// Where the objective is a product: what the width of each parameter counts in the sum, which
+    /// is the slope of a tangent of its logarithm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub slopes: Vec<Exact>,
 }
 
 /// An inequality, and how often it is added.

@@ -4,17 +4,20 @@ use elbowroom_num::Rational;
 
 use crate::bounds::Ends;
 use crate::certificate::{
-    Case, Certificate, Exact, Multiplier, Proof, Reasons, Source, Stopped, Total,
+    Case, Certificate, Exact, Multiplier, Parameter, Proof, Reasons, Source, Stopped, Total,
 };
 use crate::flaw::Flaw;
-use crate::{claim, network, row};
+use crate::{claim, network, row, volume};
 
 /// What a certificate proves.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verified {
-    /// What no box inside the envelope exceeds: the least slack as a share of the nominal value, or
-    /// the weighted sum of widths.
+    /// What no box inside the envelope exceeds: the least slack as a share of the nominal value, the
+    /// weighted sum of widths, or of their logarithms.
     pub bound: Rational,
+    /// A box counts as the best one if its value is at most so much below the bound: 0, or a
+    /// millionth where logarithms are only known between bounds.
+    pub tolerance: Rational,
     /// The value of the box in the certificate.
     pub value: Rational,
     /// The number of proofs of inequalities.
@@ -47,15 +50,25 @@ pub fn verify(certificate: &Certificate) -> Result<Verified, Flaw> {
     let bound = match &certificate.reasons {
         Reasons::LeastSlack(stopped) => checker.least_slack(stopped)?,
         Reasons::Widths(cases) => checker.widths(cases)?,
+        Reasons::Volume { foot, cases } => checker.volume(foot, cases)?,
     };
     let value = match &certificate.reasons {
         Reasons::LeastSlack(_) => bound.clone(),
         Reasons::Widths(_) => checker.worth(),
+        Reasons::Volume { foot, .. } => {
+            let worth = volume::worth(foot, checker.widths_of_parameters());
+            worth.ok_or(Flaw::Range("the volume of box", 0))?
+        }
+    };
+    let tolerance = match &certificate.reasons {
+        Reasons::LeastSlack(_) | Reasons::Widths(_) => Rational::ZERO,
+        Reasons::Volume { .. } => Rational::new(1, 1_000_000),
     };
     let is_assumed = |proof: &&Proof| matches!(proof, Proof::Assumed { .. });
     Ok(Verified {
         bound,
         value,
+        tolerance,
         proofs: certificate.proofs.len(),
         assumed: certificate.proofs.iter().filter(is_assumed).count(),
         proves: proves.to_owned(),
@@ -80,7 +93,7 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
                 }
             }
         }
-        Reasons::Widths(cases) => {
+        Reasons::Widths(cases) | Reasons::Volume { cases, .. } => {
             for (index, case) in cases.iter_mut().enumerate() {
                 if let Case::Sum(total) | Case::Impossible(total) = case {
                     let rows = total.of.iter().filter_map(|own| match own.source {
@@ -88,7 +101,7 @@ pub fn added_up(mut certificate: Certificate) -> Result<Certificate, Flaw> {
                         Source::Most(_) | Source::Least(_) => None,
                     });
                     let rows: Vec<(usize, usize)> = rows.collect();
-                    let Total { of, bound } = total;
+                    let Total { of, bound, .. } = total;
                     *bound = checker.sum(index, of, &rows)?.1;
                 }
             }
@@ -269,8 +282,55 @@ impl<'a> Checker<'a> {
         Ok(over.collect())
     }
 
+    /// The width of each parameter's interval.
+    fn widths_of_parameters(&self) -> impl Iterator<Item = (&'a Parameter, Rational)> {
+        let parameters = self.certificate.parameters.iter().enumerate();
+        parameters.map(|(index, parameter)| {
+            let width = if self.certificate.symmetric {
+                &self.slacks[index] + &self.slacks[index]
+            } else {
+                &self.slacks[2 * index] + &self.slacks[2 * index + 1]
+            };
+            (parameter, width)
+        })
+    }
+
     /// That in each case the weighted sum of widths is at most a bound: the greatest of these.
     fn widths(&self, cases: &[Case]) -> Result<Rational, Flaw> {
+        self.cases(cases, &|total, factors| {
+            let is_that = factors == self.worths && total.slopes.is_empty();
+            is_that.then(|| total.bound.clone())
+        })
+    }
+
+    /// That in each case the logarithm of the product of widths is at most a bound: the greatest of
+    /// these.
+    fn volume(&self, foot: &Rational, cases: &[Case]) -> Result<Rational, Flaw> {
+        if !foot.is_positive() {
+            return Err(Flaw::Range("foot", 0));
+        }
+        let parameters = &self.certificate.parameters;
+        self.cases(cases, &|total, factors| {
+            let mut slopes = total.slopes.iter().flat_map(|Exact(slope)| {
+                if self.certificate.symmetric {
+                    vec![slope + slope]
+                } else {
+                    vec![slope.clone(); 2]
+                }
+            });
+            let is_that = factors.iter().all(|own| slopes.next().as_ref() == Some(own));
+            let bound = volume::bound(foot, parameters, &total.slopes, &total.bound);
+            bound.filter(|_| is_that)
+        })
+    }
+
+    /// That one of these cases holds, and the greatest of their bounds, each of which follows from
+    /// what its inequalities add up to.
+    fn cases(
+        &self,
+        cases: &[Case],
+        follows: &dyn Fn(&Total, &[Rational]) -> Option<Rational>,
+    ) -> Result<Rational, Flaw> {
         let mut bound: Option<Rational> = None;
         let mut is_seen = vec![false; cases.len()];
         // Each case with the inequalities, by proof and position, that hold in it.
@@ -298,15 +358,16 @@ impl<'a> Checker<'a> {
                 }
                 Case::Sum(total) => {
                     let (factors, sum) = self.sum(index, &total.of, &chosen)?;
-                    if factors != self.worths || sum != total.bound {
+                    if sum != total.bound {
                         return Err(Flaw::Sum(index));
                     }
-                    bound = Some(bound.map_or(sum.clone(), |bound| bound.max(sum)));
+                    let own = follows(total, &factors).ok_or(Flaw::Sum(index))?;
+                    bound = Some(bound.map_or(own.clone(), |bound| bound.max(own)));
                 }
                 Case::Impossible(total) => {
                     let (factors, sum) = self.sum(index, &total.of, &chosen)?;
                     let is_free = factors.iter().all(Rational::is_zero);
-                    if !is_free || !sum.is_negative() || sum != total.bound {
+                    if !is_free || !sum.is_negative() || sum != total.bound || !total.slopes.is_empty() {
                         return Err(Flaw::Sum(index));
                     }
                 }

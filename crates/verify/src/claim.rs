@@ -12,6 +12,10 @@ pub(crate) fn proves(certificate: &Certificate) -> &'static str {
         Reasons::Widths(_) => {
             "in no box inside the envelope is the weighted sum of widths greater than `bound`"
         }
+        Reasons::Volume { .. } => {
+            "in no box inside the envelope is the weighted sum of the logarithms of the widths, each \
+             in relation to its `scale` and `foot` wider, greater than `bound`"
+        }
     }
 }
 

@@ -45,6 +45,7 @@ mod flaw;
 mod network;
 mod number;
 pub mod row;
+mod volume;
 
 pub use answer::{AnswerError, verify_answer};
 pub use bounds::Ends;

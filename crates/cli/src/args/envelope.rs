@@ -241,6 +241,8 @@ pub(crate) enum Objective {
     LeastSlack,
     /// The sum of the widths of all intervals, times the weights of --vary
     Widths,
+    /// The product of the widths of all intervals, with the weights of --vary as exponents
+    Volume,
 }
 
 impl From<Objective> for library::Objective {
@@ -248,6 +250,7 @@ impl From<Objective> for library::Objective {
         match objective {
             Objective::LeastSlack => Self::LeastSlack,
             Objective::Widths => Self::Widths,
+            Objective::Volume => Self::Volume,
         }
     }
 }

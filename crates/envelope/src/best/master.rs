@@ -20,20 +20,38 @@ pub(super) enum Solved {
     Impossible(Vec<(Source, Rational)>),
 }
 
+/// `Σ factor · variable <= bound`.
+pub(super) struct Known {
+    pub(super) factors: Vec<(usize, Rational)>,
+    pub(super) bound: Rational,
+    is_strict: bool,
+    /// The sum as a variable of the linear program; none if it has no terms.
+    sum: Option<VariableId>,
+}
+
+impl Known {
+    /// Whether the row holds, strictly where it has to.
+    pub(super) fn holds(&self, values: &[Rational]) -> bool {
+        let terms = self.factors.iter().map(|(index, factor)| factor * &values[*index]);
+        let sum: Rational = terms.sum();
+        sum < self.bound || (sum == self.bound && !self.is_strict)
+    }
+}
+
 /// `max Σ worth · variable` over the cuts of one row, and, in a case, over a row each of some
 /// others.
 pub(super) struct Master {
     simplex: Simplex,
     variables: Vec<VariableId>,
-    objective: Vec<(VariableId, Rational)>,
     /// The sources of the bounds, by the tags of the linear program.
     sources: Vec<Source>,
-    /// The rows of the cuts, as variables with their bounds, where they have any factor.
-    rows: BTreeMap<(usize, usize), (Option<VariableId>, Rational)>,
+    rows: BTreeMap<(usize, usize), Known>,
+    /// Those that hold in all cases.
+    everywhere: Vec<(usize, usize)>,
 }
 
 impl Master {
-    pub(super) fn new(variables: &Variables, worths: &[Rational]) -> Self {
+    pub(super) fn new(variables: &Variables) -> Self {
         let mut simplex = Simplex::new();
         let ids: Vec<VariableId> = variables
             .most
@@ -47,13 +65,12 @@ impl Master {
             simplex.assert_upper(*id, Delta::from(most.clone()), sources.len());
             sources.push(Source::Most(index));
         }
-        let objective = ids.iter().copied().zip(worths.iter().cloned());
         Self {
             simplex,
-            objective: objective.collect(),
             variables: ids,
             sources,
             rows: BTreeMap::new(),
+            everywhere: Vec::new(),
         }
     }
 
@@ -68,35 +85,51 @@ impl Master {
         for (place, row) in cut.rows.iter().enumerate() {
             let (factors, bound) = variables.row(plan, row);
             let terms: Vec<(VariableId, Rational)> = factors
-                .into_iter()
-                .map(|(variable, factor)| (self.variables[variable], factor))
+                .iter()
+                .map(|(variable, factor)| (self.variables[*variable], factor.clone()))
                 .collect();
             let sum = (!terms.is_empty()).then(|| self.simplex.define(&terms));
-            self.rows.insert((index, place), (sum, bound));
+            let known = Known {
+                factors,
+                bound,
+                is_strict: row.is_strict,
+                sum,
+            };
+            self.rows.insert((index, place), known);
         }
         if cut.rows.len() == 1 {
             // Every box inside the envelope satisfies it, the nominal values among them.
             self.assert(index, 0);
+            self.everywhere.push((index, 0));
         }
+    }
+
+    /// The rows that hold in a case.
+    pub(super) fn rows<'a>(
+        &'a self,
+        chosen: &'a [(usize, usize)],
+    ) -> impl Iterator<Item = &'a Known> {
+        let all = self.everywhere.iter().chain(chosen);
+        all.filter_map(|place| self.rows.get(place))
     }
 
     /// Asserts a row; `false` if it cannot hold.
     fn assert(&mut self, cut: usize, row: usize) -> bool {
-        let Some((sum, bound)) = self.rows.get(&(cut, row)) else {
+        let Some(known) = self.rows.get(&(cut, row)) else {
             return true;
         };
-        let Some(sum) = sum else {
-            return !bound.is_negative();
+        let Some(sum) = known.sum else {
+            return !known.bound.is_negative();
         };
         let tag = self.sources.len();
         self.sources.push(Source::Row(cut, row));
         self.simplex
-            .assert_upper(*sum, Delta::from(bound.clone()), tag);
+            .assert_upper(sum, Delta::from(known.bound.clone()), tag);
         true
     }
 
     /// The best values in the case in which these rows hold, too.
-    pub(super) fn solve(&mut self, chosen: &[(usize, usize)]) -> Solved {
+    pub(super) fn solve(&mut self, chosen: &[(usize, usize)], worths: &[Rational]) -> Solved {
         self.simplex.push();
         let tags = self.sources.len();
         let mut solved = None;
@@ -109,20 +142,63 @@ impl Master {
                 break;
             }
         }
-        let solved = solved.unwrap_or_else(|| self.optimum());
+        let solved = solved.unwrap_or_else(|| self.optimum(worths));
         self.simplex.pop();
         self.sources.truncate(tags);
         solved
     }
 
-    fn optimum(&mut self) -> Solved {
+    /// The best values in that case of those that are at most these; strict rows are kept with a
+    /// little to spare. `None` if there are none.
+    pub(super) fn below(
+        &mut self,
+        chosen: &[(usize, usize)],
+        most: &[Rational],
+        worths: &[Rational],
+    ) -> Option<Vec<Rational>> {
+        // As a share of the bound.
+        let spared = Rational::new(1, 1_000_000_000);
+        self.simplex.push();
+        let tags = self.sources.len();
+        let mut is_possible = true;
+        for &(cut, row) in chosen {
+            is_possible &= self.assert(cut, row);
+        }
+        for (id, most) in self.variables.iter().zip(most) {
+            self.simplex
+                .assert_upper(*id, Delta::from(most.clone()), self.sources.len());
+        }
+        let strict: Vec<(VariableId, Rational)> = self
+            .rows(chosen)
+            .filter(|row| row.is_strict && row.bound.is_positive())
+            .filter_map(|row| Some((row.sum?, &row.bound - &(&row.bound * &spared))))
+            .collect();
+        for (sum, bound) in strict {
+            self.simplex
+                .assert_upper(sum, Delta::from(bound), self.sources.len());
+        }
+        // What stops it is not asked, so that all these bounds may have one name.
+        self.sources.push(Source::Most(0));
+        let found = is_possible.then(|| self.optimum(worths));
+        self.simplex.pop();
+        self.sources.truncate(tags);
+        match found {
+            Some(Solved::Best { values, .. }) => Some(values),
+            _ => None,
+        }
+    }
+
+    fn optimum(&mut self, worths: &[Rational]) -> Solved {
         let named = |sources: &[Source], proof: Vec<(usize, Rational)>| {
             let named = proof
                 .into_iter()
                 .map(|(tag, factor)| (sources[tag], factor));
             named.collect()
         };
-        match self.simplex.maximize_with_proof(&self.objective) {
+        let objective = self.variables.iter().copied().zip(worths.iter().cloned());
+        let objective: Vec<(VariableId, Rational)> =
+            objective.filter(|(_, worth)| !worth.is_zero()).collect();
+        match self.simplex.maximize_with_proof(&objective) {
             Err(impossible) => Solved::Impossible(named(&self.sources, impossible.certificate)),
             Ok((optimum, proof)) => {
                 let values = self.variables.iter();

@@ -352,7 +352,7 @@ fn ended(
     best: Option<&Best>,
 ) -> String {
     match stop {
-        Stop::Converged if best.is_some() => best.map(goodness).unwrap_or_default(),
+        Stop::Converged if best.is_some() => best.map_or_else(String::new, |best| goodness(best, parameters)),
         Stop::Converged if request.search.sharpen => "Each end is at its limit".to_owned(),
         Stop::Converged => {
             let steps = match &request.search.relative {
@@ -398,6 +398,10 @@ fn gained(best: &Best) -> Option<String> {
                 number::rounded(&percent, 2, Rounding::Down)
             )
         }
+        Objective::Volume => {
+            let percent = &worth.gain * &Rational::from(100);
+            format!("{} % of volume", number::nearest(&percent))
+        }
         _ => format!("{} in the sum of the widths", number::nearest(&worth.gain)),
     };
     let named = best.worth.iter().take(MOST_NAMED).map(|worth| {
@@ -411,8 +415,33 @@ fn gained(best: &Best) -> Option<String> {
     (!named.is_empty()).then(|| format!("Bounds that are worth most: {}.", named.join("; ")))
 }
 
+/// How large the product of the widths is.
+fn spacious(best: &Best, parameters: &[Room]) -> String {
+    let weights: Rational = parameters.iter().map(|own| own.range.quantity.weight.clone()).sum();
+    // The geometric mean says more to people than a product of many numbers.
+    let mean = |logarithm: &Rational| {
+        let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();
+        let percent = Rational::from_f64_exactly(mean * 100.0).unwrap_or_default();
+        format!("{} %", number::rounded(&percent, 1, Rounding::Down))
+    };
+    let value = mean(&best.value);
+    let counted = number::nearest(&best.most);
+    let also = if best.is_proved {
+        "It is proved that no box has a volume that is more than a millionth greater".to_owned()
+    } else {
+        format!("No box has more than {}", mean(&best.bound))
+    };
+    format!(
+        "The geometric mean of the widths is {value} of the nominal values, counted up to {counted} \
+         times these. {also}"
+    )
+}
+
 /// How good the box is.
-fn goodness(best: &Best) -> String {
+fn goodness(best: &Best, parameters: &[Room]) -> String {
+    if best.objective == Objective::Volume {
+        return spacious(best, parameters);
+    }
     let number = |value: &Rational| match best.objective {
         Objective::LeastSlack => {
             let percent = value * &Rational::from(100);

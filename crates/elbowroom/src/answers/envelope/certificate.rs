@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, ProofPart, ProofWay};
+use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, Objective};
+use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
 use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
@@ -36,7 +37,14 @@ pub(super) fn certificate(
             Reasons::LeastSlack(stopped.collect())
         }
         KnownReasons::Tree(tree) => {
-            Reasons::Widths(tree.iter().map(|case| cuts.case(case)).collect())
+            let cases = tree.iter().map(|case| cuts.case(case)).collect();
+            match settings.objective {
+                Objective::Volume => Reasons::Volume {
+                    foot: volume_foot(),
+                    cases,
+                },
+                _ => Reasons::Widths(cases),
+            }
         }
     };
     let proofs = cuts.used.iter();
@@ -109,20 +117,16 @@ pub(super) fn certificate(
 /// Which variables the reasons need to know a limit of.
 fn used_limits(reasons: &Reasons, variables: usize) -> Vec<bool> {
     let mut is_used = vec![false; variables];
-    match reasons {
-        Reasons::LeastSlack(stopped) => {
-            for one in stopped {
-                is_used[one.variable] |= one.proof.is_none();
-            }
+    if let Reasons::LeastSlack(stopped) = reasons {
+        for one in stopped {
+            is_used[one.variable] |= one.proof.is_none();
         }
-        Reasons::Widths(cases) => {
-            for case in cases {
-                if let Case::Sum(total) | Case::Impossible(total) = case {
-                    for own in &total.of {
-                        if let Source::Most(variable) = own.source {
-                            is_used[variable] = true;
-                        }
-                    }
+    }
+    for case in reasons.cases() {
+        if let Case::Sum(total) | Case::Impossible(total) = case {
+            for own in &total.of {
+                if let Source::Most(variable) = own.source {
+                    is_used[variable] = true;
                 }
             }
         }
@@ -305,6 +309,7 @@ impl Cuts {
             },
             KnownCase::Bounded {
                 multipliers,
+                slopes,
                 is_impossible,
             } => {
                 let used = multipliers.iter().filter(|(_, factor)| !factor.is_zero());
@@ -319,6 +324,7 @@ impl Cuts {
                 let total = Total {
                     of: multipliers.collect(),
                     bound: Rational::ZERO,
+                    slopes: slopes.iter().cloned().map(Exact).collect(),
                 };
                 if *is_impossible {
                     Case::Impossible(total)

@@ -1,12 +1,13 @@
-//! The box with the greatest sum of widths: branch and bound over the cuts with alternatives, the
-//! most promising case first, each case a linear program.
+//! The box with the greatest sum or product of widths: branch and bound over the cuts with
+//! alternatives, the most promising case first, each case a linear program, or nearly so.
 
 use std::ops::ControlFlow;
 
 use elbowroom_num::Rational;
 use elbowroom_plan::{BoxEnd, DecoupledEnvelope, ParametrizedPlan};
 
-use super::master::{Master, Solved};
+use super::goal::{Goal, Outcome};
+use super::master::Master;
 use super::{BestProof, BestRun, BestStep, Case, Reasons, Variables};
 use crate::cut::{Cut, Ground};
 use crate::learn::Learnt;
@@ -37,7 +38,7 @@ struct Search<'a> {
     oracle: &'a mut Oracle,
     plan: &'a ParametrizedPlan,
     variables: &'a Variables,
-    worths: Vec<Rational>,
+    goal: Goal,
     master: Master,
     cuts: Vec<Cut>,
     tree: Vec<Case>,
@@ -46,27 +47,24 @@ struct Search<'a> {
     shrunk: usize,
 }
 
-/// The box with the greatest weighted sum of widths.
-pub(super) fn widths(
+/// The box that is best by a goal.
+pub(super) fn branch(
     oracle: &mut Oracle,
     plan: &ParametrizedPlan,
     variables: &Variables,
+    goal: Goal,
     start: Option<&DecoupledEnvelope>,
     on_step: &mut dyn FnMut(&BestStep<'_>) -> ControlFlow<()>,
 ) -> Result<BestRun, Refusal> {
-    let weight = |end: &BoxEnd| &plan.parameter(end.parameter).weight;
-    let worths: Vec<Rational> = variables
-        .ends
-        .iter()
-        .map(|ends| ends.iter().map(weight).sum())
-        .collect();
+    let nothing = vec![Rational::ZERO; variables.count()];
+    let tolerance = goal.tolerance();
     let mut search = Search {
-        master: Master::new(variables, &worths),
+        master: Master::new(variables),
         oracle,
         plan,
         variables,
-        best: (Rational::ZERO, vec![Rational::ZERO; variables.count()]),
-        worths,
+        best: (goal.worth(&nothing), nothing),
+        goal,
         cuts: Vec::new(),
         tree: Vec::new(),
         leaves: Vec::new(),
@@ -75,13 +73,13 @@ pub(super) fn widths(
     if let Some(start) = start {
         search.take(search.values_in(start));
     }
-    search.open(Vec::new(), Rational::ZERO);
+    search.open(Vec::new(), search.best.0.clone());
     let mut is_cancelled = false;
     let mut steps = 0_u64;
     // What is left of cases in which nothing more could be told.
     let mut left: Option<Rational> = None;
     while let Some(at) = search.most_promising() {
-        if search.leaves[at].bound <= search.best.0 {
+        if search.leaves[at].bound <= &search.best.0 + &tolerance {
             break;
         }
         if !search.leaves[at].is_fresh {
@@ -106,6 +104,11 @@ pub(super) fn widths(
         match search.oracle.learn(&candidate)? {
             Learnt::Nothing => {
                 search.take(values);
+                if search.leaves[at].bound > &search.best.0 + &tolerance {
+                    // As close as this case can be approached.
+                    let leaf = search.leaves.remove(at);
+                    left = left.max(Some(leaf.bound));
+                }
                 continue;
             }
             Learnt::Cut(cut) if !search.is_known(&cut, &values) => search.learn(cut),
@@ -123,11 +126,11 @@ pub(super) fn widths(
         }
     }
     let open = search.leaves.iter().map(|leaf| leaf.bound.clone());
-    let bound = open.chain(left).max().unwrap_or_default();
-    let bound = bound.max(search.best.0.clone());
+    let bound = open.chain(left).max();
+    let bound = bound.map_or(search.best.0.clone(), |bound| bound.max(search.best.0.clone()));
     Ok(BestRun {
         envelope: Ok(variables.envelope(plan, &search.best.1)),
-        is_proved: bound == search.best.0,
+        is_proved: bound <= &search.best.0 + &tolerance,
         value: search.best.0,
         bound,
         checks: 0,
@@ -141,14 +144,9 @@ pub(super) fn widths(
 }
 
 impl Search<'_> {
-    fn worth(&self, values: &[Rational]) -> Rational {
-        let terms = self.worths.iter().zip(values).map(|(w, v)| w * v);
-        terms.sum()
-    }
-
     /// Takes the box with these values, which is inside the envelope, if it is better.
     fn take(&mut self, values: Vec<Rational>) {
-        let worth = self.worth(&values);
+        let worth = self.goal.worth(&values);
         if worth > self.best.0 {
             self.best = (worth, values);
         }
@@ -174,6 +172,7 @@ impl Search<'_> {
         let case = self.tree.len();
         self.tree.push(Case::Bounded {
             multipliers: Vec::new(),
+            slopes: Vec::new(),
             is_impossible: false,
         });
         self.leaves.push(Leaf {
@@ -202,23 +201,28 @@ impl Search<'_> {
     /// Solves a case with all that is known.
     fn work_out(&mut self, at: usize) {
         let leaf = &mut self.leaves[at];
-        match self.master.solve(&leaf.chosen) {
-            Solved::Best {
+        let known = &self.best.1;
+        let (master, variables) = (&mut self.master, self.variables);
+        match self.goal.solve(master, variables, &leaf.chosen, known) {
+            Outcome::Best {
                 values,
-                worth,
+                bound,
                 proof,
+                slopes,
             } => {
-                leaf.bound = worth;
+                leaf.bound = bound;
                 leaf.values = values;
                 leaf.is_fresh = true;
                 self.tree[leaf.case] = Case::Bounded {
                     multipliers: proof,
+                    slopes,
                     is_impossible: false,
                 };
             }
-            Solved::Impossible(proof) => {
+            Outcome::Impossible(proof) => {
                 self.tree[leaf.case] = Case::Bounded {
                     multipliers: proof,
+                    slopes: Vec::new(),
                     is_impossible: true,
                 };
                 self.leaves.remove(at);

@@ -1,0 +1,220 @@
+//! The greatest value of a concave function of the ends of a box, approximately: Newton's method
+//! with a logarithmic barrier (Boyd & Vandenberghe 2004, chapter 11), in floating-point numbers.
+//!
+//! What is found here is nothing but a proposal: whoever uses it works out with exact numbers what
+//! it is good for.
+
+/// All bounds are loosened by so much, so that something lies strictly inside of them.
+const LOOSE: f64 = 1e-10;
+/// The sum of what the barriers of all bounds cost in the end.
+const GAP: f64 = 2e-8;
+/// By how much the barriers count less in each round.
+const SHARPER: f64 = 20.0;
+/// The limit on Newton steps in all rounds together.
+const MOST_STEPS: usize = 600;
+
+/// A concave function that is a sum over few variables each.
+pub(super) trait Concave {
+    /// Adds the gradient, and minus the second derivatives, where they are not zero; its value.
+    fn derive(&self, at: &[f64], gradient: &mut [f64], curvature: &mut [Vec<f64>]) -> f64;
+
+    /// Its value; minus infinity where it is not defined.
+    fn value(&self, at: &[f64]) -> f64;
+}
+
+/// `Σ factor · variable <= bound` for each row, and `0 <= variable <= most`.
+pub(super) struct Polytope {
+    pub(super) rows: Vec<(Vec<(usize, f64)>, f64)>,
+    pub(super) most: Vec<f64>,
+}
+
+impl Polytope {
+    /// By how much each bound is not reached.
+    fn slacks(&self, at: &[f64]) -> Vec<f64> {
+        let rows = self.rows.iter().map(|(factors, bound)| {
+            let sum: f64 = factors.iter().map(|(index, f)| f * at[*index]).sum();
+            bound + LOOSE - sum
+        });
+        let own = at.iter().zip(&self.most);
+        rows.chain(own.flat_map(|(value, most)| [value + LOOSE, most + LOOSE - value]))
+            .collect()
+    }
+
+    fn least_slack(&self, at: &[f64]) -> f64 {
+        self.slacks(at).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// About the point where the function is greatest; from the best one of these points to begin
+    /// with. `None` if none of them is inside.
+    pub(super) fn maximize(
+        &self,
+        function: &dyn Concave,
+        starts: &[Vec<f64>],
+    ) -> Option<Vec<f64>> {
+        let inside = starts.iter().map(|start| (self.least_slack(start), start));
+        let (slack, start) = inside.max_by(|one, other| one.0.total_cmp(&other.0))?;
+        if !(slack > 0.0 && function.value(start).is_finite()) {
+            return None;
+        }
+        let mut at = start.clone();
+        let count = self.rows.len() + 2 * at.len();
+        #[allow(clippy::cast_precision_loss, reason = "a count of bounds")]
+        let last = count as f64 / GAP;
+        let (mut sharpness, mut steps) = (1.0_f64, 0);
+        loop {
+            while steps < MOST_STEPS && self.newton(function, sharpness, &mut at) {
+                steps += 1;
+            }
+            if sharpness >= last || steps >= MOST_STEPS {
+                return Some(at);
+            }
+            sharpness = (sharpness * SHARPER).min(last);
+        }
+    }
+
+    /// What is made as large as possible: the function, and the barriers.
+    fn merit(&self, function: &dyn Concave, sharpness: f64, at: &[f64]) -> f64 {
+        let slacks = self.slacks(at);
+        if slacks.iter().any(|slack| *slack <= 0.0) {
+            return f64::NEG_INFINITY;
+        }
+        sharpness * function.value(at) + slacks.iter().map(|slack| slack.ln()).sum::<f64>()
+    }
+
+    /// One step; `false` if there is nothing left to gain.
+    fn newton(&self, function: &dyn Concave, sharpness: f64, at: &mut Vec<f64>) -> bool {
+        let count = at.len();
+        let mut gradient = vec![0.0; count];
+        let mut curvature = vec![vec![0.0; count]; count];
+        function.derive(at, &mut gradient, &mut curvature);
+        for (slope, row) in gradient.iter_mut().zip(&mut curvature) {
+            *slope *= sharpness;
+            for own in row {
+                *own *= sharpness;
+            }
+        }
+        let slacks = self.slacks(at);
+        for ((factors, _), slack) in self.rows.iter().zip(&slacks) {
+            for (one, factor) in factors {
+                gradient[*one] -= factor / slack;
+                for (other, second) in factors {
+                    curvature[*one][*other] += factor / slack * (second / slack);
+                }
+            }
+        }
+        for (index, own) in slacks[self.rows.len()..].chunks(2).enumerate() {
+            let (below, above) = (1.0 / own[0], 1.0 / own[1]);
+            gradient[index] += below - above;
+            curvature[index][index] += below * below + above * above;
+        }
+        let Some(direction) = solve(curvature, &gradient) else {
+            return false;
+        };
+        let promise: f64 = direction.iter().zip(&gradient).map(|(d, g)| d * g).sum();
+        // Half of it is what the step would gain if the function were quadratic.
+        if promise.is_nan() || promise < 1e-7 {
+            return false;
+        }
+        let before = self.merit(function, sharpness, at);
+        let mut length = 1.0;
+        while length > 1e-12 {
+            let moved: Vec<f64> = at
+                .iter()
+                .zip(&direction)
+                .map(|(value, step)| value + length * step)
+                .collect();
+            if self.merit(function, sharpness, &moved) >= before + 0.1 * length * promise {
+                *at = moved;
+                return true;
+            }
+            length *= 0.5;
+        }
+        false
+    }
+}
+
+/// The solution of `matrix · x = right`, for a matrix that is symmetric and positive definite
+/// (Cholesky, after all rows and columns are brought to the same size).
+fn solve(mut matrix: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
+    let count = right.len();
+    let sizes: Vec<f64> = (0..count).map(|i| matrix[i][i].sqrt()).collect();
+    if sizes.iter().any(|size| !(size.is_finite() && *size > 0.0)) {
+        return None;
+    }
+    for i in 0..count {
+        for j in 0..=i {
+            let mut sum = matrix[i][j] / sizes[i] / sizes[j];
+            if i == j {
+                sum += 1e-13;
+            }
+            let (above, own) = matrix.split_at(i);
+            let first = if i == j { &own[0] } else { &above[j] };
+            sum -= first[..j].iter().zip(&own[0][..j]).map(|(a, b)| a * b).sum::<f64>();
+            if i == j {
+                if sum <= 0.0 {
+                    return None;
+                }
+                matrix[i][i] = sum.sqrt();
+            } else {
+                matrix[i][j] = sum / matrix[j][j];
+            }
+        }
+    }
+    let mut solution: Vec<f64> = right.iter().zip(&sizes).map(|(r, s)| r / s).collect();
+    for i in 0..count {
+        let sum: f64 = (0..i).map(|j| matrix[i][j] * solution[j]).sum();
+        solution[i] = (solution[i] - sum) / matrix[i][i];
+    }
+    for i in (0..count).rev() {
+        let sum: f64 = (i + 1..count).map(|j| matrix[j][i] * solution[j]).sum();
+        solution[i] = (solution[i] - sum) / matrix[i][i];
+    }
+    Some(solution.iter().zip(&sizes).map(|(x, s)| x / s).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sum of the logarithms.
+    struct Logarithms;
+
+    impl Concave for Logarithms {
+        fn derive(&self, at: &[f64], gradient: &mut [f64], curvature: &mut [Vec<f64>]) -> f64 {
+            for (index, value) in at.iter().enumerate() {
+                gradient[index] += 1.0 / (value + 1e-6);
+                curvature[index][index] += (value + 1e-6).powi(-2);
+            }
+            self.value(at)
+        }
+
+        fn value(&self, at: &[f64]) -> f64 {
+            at.iter().map(|value| (value + 1e-6).ln()).sum()
+        }
+    }
+
+    #[test]
+    fn the_greatest_product_shares_a_budget_by_prices() {
+        // x + 2 y + 4 z <= 12 and z <= 1/2: z takes its most, the others half of the rest each.
+        let polytope = Polytope {
+            rows: vec![(vec![(0, 1.0), (1, 2.0), (2, 4.0)], 12.0)],
+            most: vec![100.0, 100.0, 0.5],
+        };
+        let found = polytope.maximize(&Logarithms, &[vec![0.0; 3]]).unwrap();
+        for (found, known) in found.iter().zip([5.0, 2.5, 0.5]) {
+            assert!((found - known).abs() < 1e-5, "{found} {known}");
+        }
+    }
+
+    #[test]
+    fn a_variable_that_cannot_move_does_not_keep_the_others_from_moving() {
+        let polytope = Polytope {
+            rows: vec![(vec![(0, 1.0)], 0.0), (vec![(1, 1.0), (2, 1.0)], 1.0)],
+            most: vec![9.0; 3],
+        };
+        let found = polytope.maximize(&Logarithms, &[vec![0.0; 3]]).unwrap();
+        for (found, known) in found.iter().zip([0.0, 0.5, 0.5]) {
+            assert!((found - known).abs() < 1e-5, "{found} {known}");
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! The box with the greatest product of widths.
+//!
+//! The logarithm of the product is a concave function of the ends, and lies below each of its
+//! tangents: `ln x <= ln(1/c) - 1 + c·x` for every slope `c`. So the greatest sum of tangents in a
+//! case, a linear program, is an upper bound in this case, and a close one if the tangents touch
+//! where the logarithm is greatest. Where that is, Newton's method finds out ([`barrier`]); what
+//! follows from it is worked out with exact numbers.
+//!
+//! [`barrier`]: super::barrier
+
+use elbowroom_num::{Rational, enclosed};
+use elbowroom_plan::ParametrizedPlan;
+
+use super::Variables;
+use super::barrier::{Concave, Polytope};
+use super::goal::Outcome;
+use super::master::{Master, Solved};
+
+/// One parameter.
+struct Width {
+    /// The variables that move its ends, and how many ends each moves.
+    variables: Vec<(usize, i64)>,
+    weight: Rational,
+    scale: Rational,
+}
+
+/// `Σ weight · ln(width / scale + foot)`.
+pub(super) struct Volume {
+    widths: Vec<Width>,
+    /// The power of ten of which slopes are multiples, for each parameter.
+    grids: Vec<Rational>,
+}
+
+/// What is added to each width, in relation to its scale, before the product is taken: a millionth.
+/// So a box in which one interval has no width can still be compared with others.
+pub fn foot() -> Rational {
+    Rational::new(1, 1_000_000)
+}
+
+impl Volume {
+    pub(super) fn new(plan: &ParametrizedPlan, variables: &Variables) -> Self {
+        let mut widths: Vec<Width> = plan
+            .parameters
+            .iter()
+            .map(|parameter| Width {
+                variables: Vec::new(),
+                weight: parameter.weight.clone(),
+                scale: Rational::ONE,
+            })
+            .collect();
+        for (index, (ends, scale)) in variables.ends.iter().zip(&variables.scales).enumerate() {
+            let width = &mut widths[ends[0].parameter.index()];
+            let count = i64::try_from(ends.len()).expect("at most two ends");
+            width.variables.push((index, count));
+            width.scale = scale.clone();
+        }
+        // Slopes with a common denominator keep the numbers of the linear program short.
+        let grids = widths.iter().map(|width| {
+            let fine = Rational::new(1, 1_000_000_000_000);
+            power_of_ten(&(&fine / &width.scale))
+        });
+        Self {
+            grids: grids.collect(),
+            widths,
+        }
+    }
+
+    /// The widths in relation to their scales, each a foot wider.
+    fn footed<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
+        self.widths.iter().map(|width| {
+            let own = width.variables.iter();
+            let sum: Rational = own.map(|(v, count)| &values[*v] * &Rational::from(*count)).sum();
+            sum / &width.scale + foot()
+        })
+    }
+
+    /// What a box is worth, rounded down to a billionth.
+    pub(super) fn worth(&self, values: &[Rational]) -> Rational {
+        let terms = self.widths.iter().zip(self.footed(values));
+        let terms = terms.filter_map(|(width, footed)| {
+            let [below, _] = enclosed::ln(&footed)?;
+            Some(below * &width.weight)
+        });
+        enclosed::billionths_below(&terms.sum())
+    }
+
+    pub(super) fn solve(
+        &self,
+        master: &mut Master,
+        variables: &Variables,
+        chosen: &[(usize, usize)],
+        known: &[Rational],
+    ) -> Outcome {
+        let guess = self.guess(master, variables, chosen, known);
+        let guess = guess.unwrap_or_else(|| known.to_vec());
+        let near = self.slopes(&guess);
+        let values = master.below(chosen, &guess, &self.worths(variables, &near));
+        let values = values.map(|values| self.tidied(values, master, variables, chosen));
+        let slopes = values.as_ref().map_or(near, |values| self.slopes(values));
+        match master.solve(chosen, &self.worths(variables, &slopes)) {
+            Solved::Impossible(proof) => Outcome::Impossible(proof),
+            Solved::Best {
+                values: corner,
+                worth,
+                proof,
+            } => Outcome::Best {
+                values: values.unwrap_or(corner),
+                bound: self.bound(&slopes, worth),
+                proof,
+                slopes,
+            },
+        }
+    }
+
+    /// What the objective is at most if that is what the tangents with these slopes add up to
+    /// without what they are at 0.
+    fn bound(&self, slopes: &[Rational], sum: Rational) -> Rational {
+        let heights = self.widths.iter().zip(slopes).filter_map(|(width, slope)| {
+            let touches = width.weight.checked_div(&(slope * &width.scale))?;
+            let [_, above] = enclosed::ln(&touches)?;
+            let foot = foot() * &width.scale * slope;
+            Some((above - Rational::ONE) * &width.weight + foot)
+        });
+        enclosed::billionths_above(&(heights.sum::<Rational>() + sum))
+    }
+
+    /// Of each parameter the slope of the tangent that touches there.
+    fn slopes(&self, values: &[Rational]) -> Vec<Rational> {
+        let all = self.widths.iter().zip(&self.grids).zip(self.footed(values));
+        all.map(|((width, grid), footed)| {
+            let slope = width.weight.checked_div(&(footed * &width.scale));
+            let steps = slope.and_then(|slope| slope.checked_div(grid));
+            steps.map_or(Rational::ZERO, |steps| steps.ceil() * grid)
+        })
+        .collect()
+    }
+
+    /// What each variable counts in the tangents.
+    fn worths(&self, variables: &Variables, slopes: &[Rational]) -> Vec<Rational> {
+        let mut worths = vec![Rational::ZERO; variables.count()];
+        for (width, slope) in self.widths.iter().zip(slopes) {
+            for (variable, count) in &width.variables {
+                worths[*variable] = slope * &Rational::from(*count);
+            }
+        }
+        worths
+    }
+
+    /// About the best values.
+    fn guess(
+        &self,
+        master: &mut Master,
+        variables: &Variables,
+        chosen: &[(usize, usize)],
+        known: &[Rational],
+    ) -> Option<Vec<Rational>> {
+        let scales: Vec<f64> = variables.scales.iter().map(Rational::to_f64).collect();
+        let rows = master.rows(chosen).map(|row| {
+            let factors: Vec<(usize, f64)> = row
+                .factors
+                .iter()
+                .map(|(variable, factor)| (*variable, factor.to_f64() * scales[*variable]))
+                .collect();
+            let size = factors.iter().map(|own| own.1.abs()).fold(0.0, f64::max);
+            let factors = factors.into_iter().map(|(v, factor)| (v, factor / size));
+            (factors.collect(), row.bound.to_f64() / size)
+        });
+        let rows = rows.filter(|(factors, _): &(Vec<_>, _)| !factors.is_empty());
+        let in_scale = |values: &[Rational]| -> Vec<f64> {
+            let values = values.iter().zip(&scales);
+            values.map(|(value, scale)| value.to_f64() / scale).collect()
+        };
+        let polytope = Polytope {
+            rows: rows.collect(),
+            most: in_scale(&variables.most),
+        };
+        let inner: Vec<f64> = in_scale(known).iter().map(|value| value * 0.9).collect();
+        let mut starts = vec![inner, vec![0.0; scales.len()]];
+        if !chosen.is_empty() {
+            // The alternative may hold nowhere near the boxes that are known.
+            let even: Vec<Rational> = vec![Rational::ONE; scales.len()];
+            if let Solved::Best { values, .. } = master.solve(chosen, &even) {
+                starts.push(in_scale(&values));
+            }
+        }
+        let found = polytope.maximize(&InScale(self), &starts)?;
+        let rounded = found.iter().zip(&variables.scales).zip(&variables.most);
+        let rounded = rounded.map(|((value, scale), most)| {
+            let fine = Rational::new(1, 1_000_000_000_000);
+            let value = Rational::from_f64_rounded(*value, &fine)?;
+            let near = Rational::new(1, 100_000_000);
+            Some(if value < near {
+                Rational::ZERO
+            } else if &(&value + &near) * scale >= *most {
+                most.clone()
+            } else {
+                let grid = power_of_ten(&(&fine * scale));
+                ((value * scale) / &grid).floor() * &grid
+            })
+        });
+        rounded.collect()
+    }
+
+    /// The same values with fewer digits, if they are as good.
+    fn tidied(
+        &self,
+        values: Vec<Rational>,
+        master: &Master,
+        variables: &Variables,
+        chosen: &[(usize, usize)],
+    ) -> Vec<Rational> {
+        let tidy = values.iter().zip(&variables.scales).zip(&variables.most);
+        let tidy: Vec<Rational> = tidy
+            .map(|((value, scale), most)| {
+                let grid = power_of_ten(&(scale / &Rational::from(100_000)));
+                let steps = value / &grid + Rational::new(1, 2);
+                (steps.floor() * &grid).min(most.clone())
+            })
+            .collect();
+        let loss = Rational::new(1, 100_000_000);
+        let holds = master.rows(chosen).all(|row| row.holds(&tidy));
+        if holds && self.worth(&tidy) + loss >= self.worth(&values) {
+            tidy
+        } else {
+            values
+        }
+    }
+}
+
+/// The greatest power of ten that is at most this number; 1 for what is not positive.
+fn power_of_ten(number: &Rational) -> Rational {
+    let ten = Rational::from(10);
+    let mut power = Rational::ONE;
+    if !number.is_positive() {
+        return power;
+    }
+    while power > *number {
+        power = power / &ten;
+    }
+    while &power * &ten <= *number {
+        power = power * &ten;
+    }
+    power
+}
+
+/// The same for values in relation to their scales, in floating-point numbers.
+struct InScale<'a>(&'a Volume);
+
+impl InScale<'_> {
+    fn terms<'a>(&'a self, at: &'a [f64]) -> impl Iterator<Item = (&'a Width, f64, f64)> + 'a {
+        self.0.widths.iter().map(|width| {
+            let own = width.variables.iter();
+            let sum: f64 = own.map(|(variable, count)| at[*variable] * ends(*count)).sum();
+            (width, width.weight.to_f64(), sum + foot().to_f64())
+        })
+    }
+}
+
+fn ends(count: i64) -> f64 {
+    if count == 1 { 1.0 } else { 2.0 }
+}
+
+impl Concave for InScale<'_> {
+    fn derive(&self, at: &[f64], gradient: &mut [f64], curvature: &mut [Vec<f64>]) -> f64 {
+        let mut value = 0.0;
+        for (width, weight, footed) in self.terms(at) {
+            value += weight * footed.ln();
+            for (one, count) in &width.variables {
+                gradient[*one] += weight * ends(*count) / footed;
+                for (other, second) in &width.variables {
+                    curvature[*one][*other] +=
+                        weight * ends(*count) * ends(*second) / (footed * footed);
+                }
+            }
+        }
+        value
+    }
+
+    fn value(&self, at: &[f64]) -> f64 {
+        self.terms(at)
+            .map(|(_, weight, footed)| {
+                if weight == 0.0 {
+                    0.0
+                } else {
+                    weight * footed.ln()
+                }
+            })
+            .sum()
+    }
+}

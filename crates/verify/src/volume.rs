@@ -1,0 +1,106 @@
+//! That no box has a greater product of widths: sums of tangents.
+//!
+//! `ln x <= ln(1/c) - 1 + c·x` for all positive `x` and `c`. So where the widths, each times a
+//! slope, add up to no more than a bound, the sum of their logarithms is no more than that of the
+//! tangents with these slopes.
+
+use elbowroom_num::{Rational, enclosed};
+
+use crate::certificate::{Exact, Parameter};
+
+/// What the widths of a box are worth, rounded down: `Σ weight · ln(width / scale + foot)`; `None`
+/// if that is not defined.
+pub(crate) fn worth<'a>(
+    foot: &Rational,
+    widths: impl Iterator<Item = (&'a Parameter, Rational)>,
+) -> Option<Rational> {
+    let mut worth = Rational::ZERO;
+    for (parameter, width) in widths {
+        let footed = width.checked_div(&parameter.scale)? + foot;
+        let [below, _] = enclosed::ln(&footed)?;
+        worth += below * &parameter.weight;
+    }
+    Some(enclosed::billionths_below(&worth))
+}
+
+/// What that is at most, rounded up, in all boxes in which the widths, each times the slope of its
+/// parameter, add up to no more than `sum`; `None` if nothing follows.
+pub(crate) fn bound(
+    foot: &Rational,
+    parameters: &[Parameter],
+    slopes: &[Exact],
+    sum: &Rational,
+) -> Option<Rational> {
+    if slopes.len() != parameters.len() {
+        return None;
+    }
+    let mut bound = sum.clone();
+    for (parameter, Exact(slope)) in parameters.iter().zip(slopes) {
+        if parameter.weight.is_zero() {
+            if !slope.is_zero() {
+                return None;
+            }
+            continue;
+        }
+        let scaled = slope * &parameter.scale;
+        if !scaled.is_positive() {
+            return None;
+        }
+        let [_, above] = enclosed::ln(&parameter.weight.checked_div(&scaled)?)?;
+        bound += (above - Rational::ONE) * &parameter.weight + foot * &scaled;
+    }
+    Some(enclosed::billionths_above(&bound))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(weight: i64, scale: i64) -> Parameter {
+        Parameter {
+            name: "drive".to_owned(),
+            nominal: Rational::from(scale),
+            scale: Rational::from(scale),
+            weight: Rational::from(weight),
+            most_below: None,
+            most_above: None,
+        }
+    }
+
+    #[test]
+    fn no_tangent_lies_below_what_boxes_are_worth() {
+        let foot = Rational::new(1, 1_000_000);
+        let parameters = [parameter(1, 4), parameter(3, 10)];
+        for slope in 1..40_i64 {
+            for other in 1..40_i64 {
+                let slopes = [Rational::new(slope, 7), Rational::new(other, 7)].map(Exact);
+                for width in [0, 1, 5, 30_i64] {
+                    let widths = [Rational::from(width), Rational::new(width * 3 + 1, 2)];
+                    let sum = widths.iter().zip(&slopes).map(|(w, c)| w * &c.0).sum();
+                    let worth = worth(&foot, parameters.iter().zip(widths)).unwrap();
+                    assert!(bound(&foot, &parameters, &slopes, &sum).unwrap() >= worth);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_tangent_that_touches_is_no_more_than_rounding_above() {
+        let foot = Rational::new(1, 1_000_000);
+        let parameters = [parameter(3, 10)];
+        let width = Rational::from(25);
+        let slope = Rational::from(3) / (&width + &foot * &Rational::from(10));
+        let above = bound(&foot, &parameters, &[Exact(slope.clone())], &(&width * &slope));
+        let worth = worth(&foot, parameters.iter().zip([width])).unwrap();
+        assert!(above.unwrap() - worth <= Rational::new(1, 100_000_000));
+    }
+
+    #[test]
+    fn nothing_follows_from_slopes_that_are_missing_or_not_positive() {
+        let foot = Rational::new(1, 1_000_000);
+        let parameters = [parameter(1, 1)];
+        for slopes in [vec![], vec![Exact(Rational::ZERO)], vec![Exact(Rational::from(-1))]] {
+            assert_eq!(bound(&foot, &parameters, &slopes, &Rational::ONE), None);
+        }
+    }
+}
