@@ -3,10 +3,14 @@
 //!
 //! ```text
 //! cargo run --release -p elbowroom --example shares -- DATA [ORDERS] [STEPS]
+//! cargo run --release -p elbowroom --example shares -- DATA times [STEPS]
 //! cargo run --release -p elbowroom --example shares -- DATA volume
 //! ```
 //!
-//! The second prints which share of the exact region's volume each box has (weak guarantee, whose region
+//! The second prints how long the largest box takes for each guarantee and objective (IRR, with whose
+//! box it begins, and the search), and its certificate, as `elbowroom verify` reads it.
+//!
+//! The third prints which share of the exact region's volume each box has (weak guarantee, whose region
 //! it is; published order).
 //!
 //! `DATA` is the folder with `envelopes/`, `ORDERS` the number of random orders (20), `STEPS` how many
@@ -19,8 +23,9 @@
     reason = "that is what the example does"
 )]
 
-#[path = "../tests/shared/instances.rs"]
+#[path = "../../tests/shared/instances.rs"]
 mod instances;
+mod times;
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -29,7 +34,7 @@ use std::sync::Arc;
 use elbowroom::answers::region::{RegionFinding, RegionSettings, region};
 use elbowroom::answers::{EnvelopeRequest, Unwatched};
 use elbowroom::envelope::{
-    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr,
+    BestRun, BestSettings, Guarantee, Objective, Oracle, Settings, best, irr, volume_foot,
 };
 use elbowroom::model::Task;
 use elbowroom::num::Rational;
@@ -40,12 +45,21 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// One order of the parameters of one plan: IRR's share of the greatest sum of widths and of the
-/// greatest least slack, and whether it leaves an end with no room that could have some.
+/// One order of the parameters of one plan: IRR's share of the greatest sum of widths, of the
+/// greatest least slack, and of the greatest volume (the geometric mean of the widths), and whether
+/// it leaves an end with no room that could have some.
 struct Shares {
     widths: f64,
     slack: f64,
+    volume: f64,
     is_starved: bool,
+}
+
+/// The largest boxes of one plan.
+struct Largest {
+    widest: BestRun,
+    fairest: BestRun,
+    most_spacious: BestRun,
 }
 
 fn main() {
@@ -58,15 +72,17 @@ fn main() {
     };
     let second = arguments.next();
     let families = families(Path::new(&data));
-    if second.as_deref() == Some("volume") {
-        return volumes(&families);
+    match second.as_deref() {
+        Some("volume") => return volumes(&families),
+        Some("times") => return times::times(&families, number(arguments.next(), 2000)),
+        _ => {}
     }
     let orders = number(second, 20);
     let steps = number(arguments.next(), 2000);
     println!(
-        "| family | order | plans | widths: least | median | greatest | least slack: least | median | greatest | starved |"
+        "| family | order | plans | boxes | widths: least | median | least slack: least | median | volume: least | median | starved |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for (family, instances) in families {
         let (mut published, mut shuffled, mut left_out) = (Vec::new(), Vec::new(), 0);
         for instance in &instances {
@@ -78,8 +94,9 @@ fn main() {
             published.extend(found);
         }
         eprintln!("{family}: {left_out} left out");
-        row(&family, "published", &published);
-        row(&family, "random", &shuffled);
+        let plans = published.len();
+        row(&family, "published", plans, &published);
+        row(&family, "random", plans, &shuffled);
     }
 }
 
@@ -175,24 +192,24 @@ fn read(instance: &Instance) -> Option<(Arc<Task>, String)> {
     Some((task, source(&instance.plan).text().to_owned()))
 }
 
-fn row(family: &str, order: &str, shares: &[Shares]) {
+fn row(family: &str, order: &str, plans: usize, shares: &[Shares]) {
     let spread = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         let percent = |value: Option<&f64>| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{:.0} %", value * 100.0))
         };
         format!(
-            "{} | {} | {}",
+            "{} | {}",
             percent(values.first()),
-            percent(values.get(values.len() / 2)),
-            percent(values.last())
+            percent(values.get(values.len() / 2))
         )
     };
     let widths = spread(shares.iter().map(|own| own.widths).collect());
     let slack = spread(shares.iter().map(|own| own.slack).collect());
+    let volume = spread(shares.iter().map(|own| own.volume).collect());
     let starved = shares.iter().filter(|own| own.is_starved).count();
     println!(
-        "| {family} | {order} | {} | {widths} | {slack} | {starved} |",
+        "| {family} | {order} | {plans} | {} | {widths} | {slack} | {volume} | {starved} |",
         shares.len()
     );
 }
@@ -200,12 +217,14 @@ fn row(family: &str, order: &str, shares: &[Shares]) {
 /// The published order first; `None` if the largest boxes are not found, or if there is no room.
 fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shares>> {
     let (task, text) = read(instance)?;
-    let widest = largest(&task, &text, Objective::Widths, steps)?;
-    let fairest = largest(&task, &text, Objective::LeastSlack, steps)?;
+    let largest = Largest {
+        widest: largest(&task, &text, Objective::Widths, steps)?,
+        fairest: largest(&task, &text, Objective::LeastSlack, steps)?,
+        most_spacious: largest(&task, &text, Objective::Volume, steps)?,
+    };
     let plan = format::read(text.as_bytes(), &task).ok()?;
     let names: Vec<String> = plan.parameters.into_iter().map(|own| own.name).collect();
-    let largest = (&widest, &fairest);
-    let mut all = vec![shares(&task, &text, &names, largest)?];
+    let mut all = vec![shares(&task, &text, &names, &largest)?];
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     for _ in 0..orders {
         let (mut parameters, others): (Vec<&str>, Vec<&str>) = text
@@ -213,21 +232,36 @@ fn compared(instance: &Instance, orders: usize, steps: usize) -> Option<Vec<Shar
             .partition(|line| line.trim_start().starts_with("parameter"));
         parameters.shuffle(&mut rng);
         parameters.extend(others);
-        all.push(shares(&task, &parameters.join("\n"), &names, largest)?);
+        all.push(shares(&task, &parameters.join("\n"), &names, &largest)?);
     }
     Some(all)
 }
 
-/// The largest box, if it is proved to be.
+/// The largest box with the dynamic guarantee, if it is proved to be, and has any room.
 fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> Option<BestRun> {
+    let run = sought(task, text, Guarantee::Dynamic, objective, steps)?;
+    let has_room = objective == Objective::Volume || run.value.is_positive();
+    (run.is_proved && has_room).then_some(run)
+}
+
+/// The largest box that is found in so many steps, from IRR's on.
+fn sought(
+    task: &Arc<Task>,
+    text: &str,
+    guarantee: Guarantee,
+    objective: Objective,
+    steps: usize,
+) -> Option<BestRun> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
-    let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
+    let mut oracle = Oracle::new(task, &plan, guarantee).ok()?;
+    let start = irr(&mut oracle, &fine(), &mut |_| ControlFlow::Continue(()));
+    let start = start.ok()?.envelope.ok()?;
     let settings = BestSettings {
         objective,
         ..BestSettings::default()
     };
     let mut left = steps;
-    let run = best(&mut oracle, &settings, None, &mut |_| {
+    let run = best(&mut oracle, &settings, Some(&start), &mut |_| {
         left = left.saturating_sub(1);
         if left == 0 {
             ControlFlow::Break(())
@@ -235,8 +269,15 @@ fn largest(task: &Arc<Task>, text: &str, objective: Objective, steps: usize) -> 
             ControlFlow::Continue(())
         }
     });
-    run.ok()
-        .filter(|run| run.is_proved && run.envelope.is_ok() && run.value.is_positive())
+    run.ok().filter(|run| run.envelope.is_ok())
+}
+
+/// IRR's steps: a hundredth of each nominal value.
+fn fine() -> Settings {
+    Settings {
+        relative: Some(Rational::new(1, 100)),
+        ..Settings::default()
+    }
 }
 
 /// IRR's box beside the largest ones.
@@ -244,18 +285,21 @@ fn shares(
     task: &Arc<Task>,
     text: &str,
     names: &[String],
-    (widest, fairest): (&BestRun, &BestRun),
+    largest: &Largest,
 ) -> Option<Shares> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
-    let settings = Settings {
-        relative: Some(Rational::new(1, 100)),
-        ..Settings::default()
-    };
-    let run = irr(&mut oracle, &settings, &mut |_| ControlFlow::Continue(())).ok()?;
+    let run = irr(&mut oracle, &fine(), &mut |_| ControlFlow::Continue(())).ok()?;
     let found = run.envelope.ok()?;
     let nominal = DecoupledEnvelope::point(&plan.nominal());
+    let Largest {
+        widest,
+        fairest,
+        most_spacious,
+    } = largest;
     let mut sum = Rational::ZERO;
+    // Of each parameter its weight, and its width in relation to the scale.
+    let mut widths = vec![(0.0, volume_foot().to_f64()); plan.parameters.len()];
     let mut least: Option<Rational> = None;
     let mut is_starved = false;
     for own in &widest.proof.variables {
@@ -272,6 +316,9 @@ fn shares(
             let weight = &plan.parameter(end.parameter).weight;
             sum += weight * &moved;
             let slack = moved.checked_div(scale)?;
+            let width = &mut widths[end.parameter.index()];
+            width.0 = weight.to_f64();
+            width.1 += slack.to_f64();
             is_starved |= moved.is_zero() && fairest.value.is_positive();
             least = Some(least.map_or(slack.clone(), |least| least.min(slack)));
         }
@@ -279,7 +326,10 @@ fn shares(
     let share = |part: &Rational, whole: &Rational| {
         part.checked_div(whole).map_or(1.0, |share| share.to_f64())
     };
+    let volume: f64 = widths.iter().map(|(weight, width)| weight * width.ln()).sum();
+    let weights: f64 = widths.iter().map(|(weight, _)| weight).sum();
     Some(Shares {
+        volume: ((volume - most_spacious.value.to_f64()) / weights).exp(),
         widths: share(&sum, &widest.value),
         slack: share(&least?, &fairest.value),
         is_starved,

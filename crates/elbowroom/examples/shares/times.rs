@@ -1,0 +1,105 @@
+//! How long the largest boxes take, and their certificates.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use elbowroom::answers::envelope::envelope;
+use elbowroom::answers::{EnvelopeRequest, Halt, Watcher};
+use elbowroom::envelope::{Guarantee, Method, Objective};
+use elbowroom::model::Task;
+use elbowroom::plan::format;
+use elbowroom::verify::{AnswerError, verify_answer};
+
+use crate::instances::Instance;
+use crate::{read, sought};
+
+/// A row for each family, guarantee and objective.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "how long it takes is what is asked"
+)]
+pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
+    println!(
+        "| family | guarantee | objective | plans | proved | box: median | longest | certificates | check: longest |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for (family, instances) in families {
+        for guarantee in [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong] {
+            for objective in [Objective::LeastSlack, Objective::Widths, Objective::Volume] {
+                let (mut boxes, mut checks, mut proved) = (Vec::new(), Vec::new(), 0);
+                for instance in instances {
+                    let Some((task, text)) = read(instance) else {
+                        continue;
+                    };
+                    let begun = Instant::now();
+                    let Some(run) = sought(&task, &text, guarantee, objective, steps) else {
+                        continue;
+                    };
+                    boxes.push(begun.elapsed().as_secs_f64());
+                    proved += usize::from(run.is_proved);
+                    checks.extend(checked(&task, &text, guarantee, objective, steps));
+                }
+                for own in [&mut boxes, &mut checks] {
+                    own.sort_by(f64::total_cmp);
+                }
+                let milliseconds = |value: Option<&f64>| {
+                    value.map_or_else(|| "-".to_owned(), |value| format!("{:.1} ms", value * 1000.0))
+                };
+                println!(
+                    "| {family} | {guarantee} | {objective} | {} | {proved} | {} | {} | {} | {} |",
+                    boxes.len(),
+                    milliseconds(boxes.get(boxes.len() / 2)),
+                    milliseconds(boxes.last()),
+                    checks.len(),
+                    milliseconds(checks.last()),
+                );
+            }
+        }
+    }
+}
+
+/// How long the certificate of the largest box takes to check, in seconds; `None` without one.
+///
+/// # Panics
+/// When it is refused.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "how long it takes is what is asked"
+)]
+fn checked(
+    task: &Arc<Task>,
+    text: &str,
+    guarantee: Guarantee,
+    objective: Objective,
+    steps: usize,
+) -> Option<f64> {
+    let plan = format::read(text.as_bytes(), task).ok()?;
+    let mut request = EnvelopeRequest::new(task, plan);
+    request.guarantee = guarantee;
+    request.search.method = Method::Best;
+    request.search.best.objective = objective;
+    let outcome = envelope(&request, &mut Patience(steps)).ok()?;
+    let answer = serde_json::to_string(&outcome.answer).expect("a document");
+    let begun = Instant::now();
+    let verdict = verify_answer(&answer);
+    let seconds = begun.elapsed().as_secs_f64();
+    match verdict {
+        Ok(_) => Some(seconds),
+        Err(AnswerError::NoBox | AnswerError::NoCertificate) => None,
+        Err(wrong) => panic!("{guarantee} {objective}: {wrong}"),
+    }
+}
+
+/// Ends a search after so many steps.
+struct Patience(usize);
+
+impl Watcher for Patience {
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        self.0 = self.0.saturating_sub(1);
+        if self.0 == 0 {
+            return ControlFlow::Break(Halt::TimeLimit);
+        }
+        ControlFlow::Continue(())
+    }
+}
