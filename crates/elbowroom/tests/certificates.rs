@@ -24,11 +24,7 @@ use shared::case::Case;
 use shared::instances::{Instance, figure_3, figure_4};
 
 const GUARANTEES: [Guarantee; 3] = [Guarantee::Weak, Guarantee::Dynamic, Guarantee::Strong];
-const OBJECTIVES: [Objective; 3] = [
-    Objective::LeastSlack,
-    Objective::Widths,
-    Objective::Volume,
-];
+const OBJECTIVES: [Objective; 3] = [Objective::LeastSlack, Objective::Widths, Objective::Volume];
 
 /// A case of this repository.
 fn case(name: &str) -> (Arc<Task>, AnyPlan) {

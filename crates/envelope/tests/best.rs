@@ -125,7 +125,9 @@ fn slacks(envelope: &DecoupledEnvelope) -> Vec<Rational> {
 fn volume(envelope: &DecoupledEnvelope) -> f64 {
     let widths = envelope.intervals().iter().filter_map(Interval::width);
     let nominal = Rational::from(NOMINAL).to_f64();
-    widths.map(|width| (width.to_f64() / nominal + 1e-6).ln()).sum()
+    widths
+        .map(|width| (width.to_f64() / nominal + 1e-6).ln())
+        .sum()
 }
 
 fn is_symmetric(envelope: &DecoupledEnvelope) -> bool {
@@ -262,14 +264,20 @@ fn no_box_on_a_grid_has_more_volume_than_the_best_one() {
                 flat += usize::from(value < -10.0);
                 for other in boxes(&plan) {
                     if volume(&other) > bound + 1e-9 && (!symmetric || is_symmetric(&other)) {
-                        assert!(oracle.objection(&other).unwrap().is_some(), "{other:?} {what}");
+                        assert!(
+                            oracle.objection(&other).unwrap().is_some(),
+                            "{other:?} {what}"
+                        );
                         others += 1;
                     }
                 }
             }
         }
     }
-    assert!(proved > 100 && torn > 5 && flat > 5 && others > 1000, "{proved} {torn} {flat} {others}");
+    assert!(
+        proved > 100 && torn > 5 && flat > 5 && others > 1000,
+        "{proved} {torn} {flat} {others}"
+    );
     assert!(unproved * 10 < proved, "{proved} {unproved}");
 }
 

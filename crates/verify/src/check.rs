@@ -318,7 +318,9 @@ impl<'a> Checker<'a> {
                     vec![slope.clone(); 2]
                 }
             });
-            let is_that = factors.iter().all(|own| slopes.next().as_ref() == Some(own));
+            let is_that = factors
+                .iter()
+                .all(|own| slopes.next().as_ref() == Some(own));
             let bound = volume::bound(foot, parameters, &total.slopes, &total.bound);
             bound.filter(|_| is_that)
         })
@@ -367,7 +369,11 @@ impl<'a> Checker<'a> {
                 Case::Impossible(total) => {
                     let (factors, sum) = self.sum(index, &total.of, &chosen)?;
                     let is_free = factors.iter().all(Rational::is_zero);
-                    if !is_free || !sum.is_negative() || sum != total.bound || !total.slopes.is_empty() {
+                    if !is_free
+                        || !sum.is_negative()
+                        || sum != total.bound
+                        || !total.slopes.is_empty()
+                    {
                         return Err(Flaw::Sum(index));
                     }
                 }

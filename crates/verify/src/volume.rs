@@ -90,7 +90,12 @@ mod tests {
         let parameters = [parameter(3, 10)];
         let width = Rational::from(25);
         let slope = Rational::from(3) / (&width + &foot * &Rational::from(10));
-        let above = bound(&foot, &parameters, &[Exact(slope.clone())], &(&width * &slope));
+        let above = bound(
+            &foot,
+            &parameters,
+            &[Exact(slope.clone())],
+            &(&width * &slope),
+        );
         let worth = worth(&foot, parameters.iter().zip([width])).unwrap();
         assert!(above.unwrap() - worth <= Rational::new(1, 100_000_000));
     }
@@ -99,7 +104,11 @@ mod tests {
     fn nothing_follows_from_slopes_that_are_missing_or_not_positive() {
         let foot = Rational::new(1, 1_000_000);
         let parameters = [parameter(1, 1)];
-        for slopes in [vec![], vec![Exact(Rational::ZERO)], vec![Exact(Rational::from(-1))]] {
+        for slopes in [
+            vec![],
+            vec![Exact(Rational::ZERO)],
+            vec![Exact(Rational::from(-1))],
+        ] {
             assert_eq!(bound(&foot, &parameters, &slopes, &Rational::ONE), None);
         }
     }

@@ -69,7 +69,9 @@ fn proven(name: &str, verified: &Verified, look: Look) -> String {
     let claim = if verified.value == verified.bound {
         format!("No box inside the envelope is better than this one ({value}).")
     } else if verified.bound <= &verified.value + &verified.tolerance {
-        format!("No box inside the envelope is better than this one ({value}) by more than a millionth.")
+        format!(
+            "No box inside the envelope is better than this one ({value}) by more than a millionth."
+        )
     } else {
         format!("No box inside the envelope has more than {bound}; this one has {value}.")
     };

@@ -281,12 +281,7 @@ fn fine() -> Settings {
 }
 
 /// IRR's box beside the largest ones.
-fn shares(
-    task: &Arc<Task>,
-    text: &str,
-    names: &[String],
-    largest: &Largest,
-) -> Option<Shares> {
+fn shares(task: &Arc<Task>, text: &str, names: &[String], largest: &Largest) -> Option<Shares> {
     let plan = Arc::new(format::read(text.as_bytes(), task).ok()?);
     let mut oracle = Oracle::new(task, &plan, Guarantee::Dynamic).ok()?;
     let run = irr(&mut oracle, &fine(), &mut |_| ControlFlow::Continue(())).ok()?;
@@ -326,7 +321,10 @@ fn shares(
     let share = |part: &Rational, whole: &Rational| {
         part.checked_div(whole).map_or(1.0, |share| share.to_f64())
     };
-    let volume: f64 = widths.iter().map(|(weight, width)| weight * width.ln()).sum();
+    let volume: f64 = widths
+        .iter()
+        .map(|(weight, width)| weight * width.ln())
+        .sum();
     let weights: f64 = widths.iter().map(|(weight, _)| weight).sum();
     Some(Shares {
         volume: ((volume - most_spacious.value.to_f64()) / weights).exp(),

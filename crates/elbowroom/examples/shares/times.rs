@@ -44,7 +44,10 @@ pub(crate) fn times(families: &[(String, Vec<Instance>)], steps: usize) {
                     own.sort_by(f64::total_cmp);
                 }
                 let milliseconds = |value: Option<&f64>| {
-                    value.map_or_else(|| "-".to_owned(), |value| format!("{:.1} ms", value * 1000.0))
+                    value.map_or_else(
+                        || "-".to_owned(),
+                        |value| format!("{:.1} ms", value * 1000.0),
+                    )
                 };
                 println!(
                     "| {family} | {guarantee} | {objective} | {} | {proved} | {} | {} | {} | {} |",

@@ -46,11 +46,7 @@ impl Polytope {
 
     /// About the point where the function is greatest; from the best one of these points to begin
     /// with. `None` if none of them is inside.
-    pub(super) fn maximize(
-        &self,
-        function: &dyn Concave,
-        starts: &[Vec<f64>],
-    ) -> Option<Vec<f64>> {
+    pub(super) fn maximize(&self, function: &dyn Concave, starts: &[Vec<f64>]) -> Option<Vec<f64>> {
         let inside = starts.iter().map(|start| (self.least_slack(start), start));
         let (slack, start) = inside.max_by(|one, other| one.0.total_cmp(&other.0))?;
         if !(slack > 0.0 && function.value(start).is_finite()) {
@@ -149,7 +145,11 @@ fn solve(mut matrix: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
             }
             let (above, own) = matrix.split_at(i);
             let first = if i == j { &own[0] } else { &above[j] };
-            sum -= first[..j].iter().zip(&own[0][..j]).map(|(a, b)| a * b).sum::<f64>();
+            sum -= first[..j]
+                .iter()
+                .zip(&own[0][..j])
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
             if i == j {
                 if sum <= 0.0 {
                     return None;

@@ -127,7 +127,9 @@ pub(super) fn branch(
     }
     let open = search.leaves.iter().map(|leaf| leaf.bound.clone());
     let bound = open.chain(left).max();
-    let bound = bound.map_or(search.best.0.clone(), |bound| bound.max(search.best.0.clone()));
+    let bound = bound.map_or(search.best.0.clone(), |bound| {
+        bound.max(search.best.0.clone())
+    });
     Ok(BestRun {
         envelope: Ok(variables.envelope(plan, &search.best.1)),
         is_proved: bound <= &search.best.0 + &tolerance,

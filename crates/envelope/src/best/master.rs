@@ -32,7 +32,10 @@ pub(super) struct Known {
 impl Known {
     /// Whether the row holds, strictly where it has to.
     pub(super) fn holds(&self, values: &[Rational]) -> bool {
-        let terms = self.factors.iter().map(|(index, factor)| factor * &values[*index]);
+        let terms = self
+            .factors
+            .iter()
+            .map(|(index, factor)| factor * &values[*index]);
         let sum: Rational = terms.sum();
         sum < self.bound || (sum == self.bound && !self.is_strict)
     }

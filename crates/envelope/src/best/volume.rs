@@ -69,7 +69,9 @@ impl Volume {
     fn footed<'a>(&'a self, values: &'a [Rational]) -> impl Iterator<Item = Rational> + 'a {
         self.widths.iter().map(|width| {
             let own = width.variables.iter();
-            let sum: Rational = own.map(|(v, count)| &values[*v] * &Rational::from(*count)).sum();
+            let sum: Rational = own
+                .map(|(v, count)| &values[*v] * &Rational::from(*count))
+                .sum();
             sum / &width.scale + foot()
         })
     }
@@ -168,7 +170,9 @@ impl Volume {
         let rows = rows.filter(|(factors, _): &(Vec<_>, _)| !factors.is_empty());
         let in_scale = |values: &[Rational]| -> Vec<f64> {
             let values = values.iter().zip(&scales);
-            values.map(|(value, scale)| value.to_f64() / scale).collect()
+            values
+                .map(|(value, scale)| value.to_f64() / scale)
+                .collect()
         };
         let polytope = Polytope {
             rows: rows.collect(),
@@ -250,7 +254,9 @@ impl InScale<'_> {
     fn terms<'a>(&'a self, at: &'a [f64]) -> impl Iterator<Item = (&'a Width, f64, f64)> + 'a {
         self.0.widths.iter().map(|width| {
             let own = width.variables.iter();
-            let sum: f64 = own.map(|(variable, count)| at[*variable] * ends(*count)).sum();
+            let sum: f64 = own
+                .map(|(variable, count)| at[*variable] * ends(*count))
+                .sum();
             (width, width.weight.to_f64(), sum + foot().to_f64())
         })
     }

@@ -352,7 +352,9 @@ fn ended(
     best: Option<&Best>,
 ) -> String {
     match stop {
-        Stop::Converged if best.is_some() => best.map_or_else(String::new, |best| goodness(best, parameters)),
+        Stop::Converged if best.is_some() => {
+            best.map_or_else(String::new, |best| goodness(best, parameters))
+        }
         Stop::Converged if request.search.sharpen => "Each end is at its limit".to_owned(),
         Stop::Converged => {
             let steps = match &request.search.relative {
@@ -417,7 +419,10 @@ fn gained(best: &Best) -> Option<String> {
 
 /// How large the product of the widths is.
 fn spacious(best: &Best, parameters: &[Room]) -> String {
-    let weights: Rational = parameters.iter().map(|own| own.range.quantity.weight.clone()).sum();
+    let weights: Rational = parameters
+        .iter()
+        .map(|own| own.range.quantity.weight.clone())
+        .sum();
     // The geometric mean says more to people than a product of many numbers.
     let mean = |logarithm: &Rational| {
         let mean = (logarithm.to_f64() / weights.to_f64().max(f64::MIN_POSITIVE)).exp();

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use elbowroom_envelope::{BestProof, BestSettings, Cut, Ground, Guarantee, Objective};
-use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
 use elbowroom_envelope::{Case as KnownCase, Reasons as KnownReasons, Source as KnownSource};
+use elbowroom_envelope::{ProofPart, ProofWay, volume_foot};
 use elbowroom_num::Rational;
 use elbowroom_plan::{Bound, BoxEnd, DecoupledEnvelope, Origin, ParametrizedPlan, Side};
 use elbowroom_verify::{
