@@ -21,7 +21,7 @@ use elbowroom::num::Rational;
 
 pub(crate) use compare::CompareArgs;
 pub(crate) use envelope::{EnvelopeArgs, Growth, Order, controllable};
-pub(crate) use export::{ExportArgs, ExportFormat};
+pub(crate) use export::{Bound, ExportArgs, ExportFormat};
 pub(crate) use learn::LearnArgs;
 pub(crate) use network::{DurationsChoice, NetworkArgs};
 use number::{positive, positive_or_zero};

@@ -5,6 +5,8 @@
 //! - [`box_check`]: whether a plan is guaranteed to work in a box, as SMT-LIB 2: each answer is
 //!   `unsat` exactly if it is.
 //! - [`region`]: all values for which a plan works, as SMT-LIB 2.
+//! - [`prism`]: what the best executor can reach, without time and on a clock, as decision
+//!   processes in the language of PRISM.
 //!
 //! Dynamic controllability is a game, which SMT-LIB has no words for: [`box_check`] then says only
 //! that every schedule is valid, and [`stnu`] has the other half.
@@ -42,6 +44,7 @@
 //! ```
 
 mod names;
+pub mod prism;
 mod smt;
 mod write;
 

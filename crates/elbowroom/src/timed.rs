@@ -45,9 +45,9 @@ use elbowroom_num::Rational;
 use elbowroom_sim::WorldModel;
 use serde::{Deserialize, Serialize};
 
-use chances::Chances;
+pub(crate) use chances::Chances;
 pub use policy::Policy;
-use world::TimedWorld;
+pub(crate) use world::{Act, Facts, Needs, TimedWorld};
 
 /// How far to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -180,6 +180,24 @@ pub fn optimum(
 /// Rounding errors stay far below this.
 const SLACK: f64 = 1e-9;
 
+/// The length of a cell, in seconds.
+fn step(world: &TimedWorld, cells: usize) -> f64 {
+    #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
+    let cells = cells as f64;
+    world.horizon / cells
+}
+
+/// In which of so many cells what happens does, as a bound sees it; `cells` is below 65,534.
+pub(crate) fn chances(
+    world: &TimedWorld,
+    cells: usize,
+    side: Side,
+) -> Result<Chances, NotTabulated> {
+    // What happens at the horizon itself begins a cell, seen from above.
+    let all = cells + usize::from(side == Side::Above);
+    Chances::new(world, step(world, cells), all, side)
+}
+
 fn grid(
     world: &TimedWorld,
     cells: usize,
@@ -189,13 +207,10 @@ fn grid(
     if cells >= usize::from(u16::MAX) {
         return Ok(Err(Stop::TooManyStates));
     }
-    #[allow(clippy::cast_precision_loss, reason = "at most 65,535")]
-    let step = world.horizon / cells as f64;
+    let step = step(world, cells);
     let mut left = settings.most_states;
     let mut bound = |side| -> Result<Result<f64, Stop>, NotTabulated> {
-        // What happens at the horizon itself begins a cell, seen from above.
-        let cells = cells + usize::from(side == Side::Above);
-        let chances = Chances::new(world, step, cells, side)?;
+        let chances = chances(world, cells, side)?;
         let value = match side {
             Side::Above => graph::value(&above::Above::new(world, &chances), &mut left, goes_on),
             Side::Below => graph::value(&below::Below::new(world, &chances), &mut left, goes_on),

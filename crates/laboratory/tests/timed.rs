@@ -94,6 +94,28 @@ fn bounds_enclose_what_a_plain_recursion_finds() {
 }
 
 #[test]
+fn what_is_taken_away_and_given_back_in_one_cell_is_there_after_it() {
+    // The door closes at 2.5 and opens again at 3, and going through takes 4. Seen on a coarse
+    // grid both happen in one cell, and nobody knows in which order.
+    let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
+        (:predicates (open) (day) (through))
+        (:durative-action go :parameters () :duration (= ?duration 4)
+          :condition (and (over all (open)) (at end (day))) :effect (at end (through))))";
+    let problem = "(define (problem p) (:domain d)
+        (:init (open) (day) (at 2.5 (not (open))) (at 3 (open)) (at 8 (not (day)))) (:goal (through)))";
+    let world = "format = \"elbowroom-world\"\nversion = 1";
+    for first_cells in 1..=32 {
+        let settings = Settings {
+            first_cells,
+            gap: 1.0,
+            ..Settings::default()
+        };
+        assert_encloses(&bounds(domain, problem, world, &settings), 1.0);
+    }
+    assert_encloses(&bounds(domain, problem, world, &Settings::default()), 1.0);
+}
+
+#[test]
 fn who_waits_for_the_door_goes_through_it() {
     // The door opens at 3 for certain, and closes at a time in [5, 9]; going through takes 2. Who
     // waits at the door is through at 5.

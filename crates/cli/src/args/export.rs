@@ -1,9 +1,11 @@
 //! What can be said to `elbowroom export`.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use elbowroom::num::Rational;
+use elbowroom::probability::optimum::DeadEnds;
 
 use super::ProblemArgs;
 use super::envelope::Guarantee;
@@ -16,14 +18,16 @@ text, and to one that ends in .json, as Elbowroom JSON, exactly. The others are 
 that takes another unit of time, it is told.\n\n\
 docs/second-witness.md says what each text means and how to ask others about it.")]
 pub(crate) struct ExportArgs {
-    /// What to write: the network as an STNU, or the box or region as SMT-LIB 2
+    /// What to write: the network as an STNU, the box or region as SMT-LIB 2, or what the best
+    /// executor can reach as a process of PRISM
     #[arg(value_name = "FORMAT", value_enum)]
     pub(crate) format: ExportFormat,
     #[command(flatten)]
     pub(crate) problem: ProblemArgs,
-    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file
+    /// The plan: `start: (action arguments) [duration]` lines, or an STN plan file; not for `prism`,
+    /// which is about all that can be done
     #[arg(value_name = "PLAN|FILE.stn")]
-    pub(crate) plan: PathBuf,
+    pub(crate) plan: Option<PathBuf>,
     /// The box: `"dur_0=[7/4,12] (drive a b)=12 all=±10%"`; parameters that are not named keep
     /// their nominal value. Without a box, `smt2` writes the whole region
     #[arg(long, value_name = "BOX")]
@@ -49,9 +53,67 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "E", default_value = "0.001", value_parser = positive)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) epsilon: Rational,
+    #[command(flatten)]
+    pub(crate) process: ProcessArgs,
     /// Write there instead of to standard output
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+}
+
+/// What a process of PRISM is about.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Processes (prism)")]
+pub(crate) struct ProcessArgs {
+    /// Without time: facts change step by step, with these likelihoods
+    #[arg(long, value_name = "FILE", conflicts_with = "world")]
+    pub(crate) likelihoods: Option<PathBuf>,
+    /// On a clock: the world's durations, failures and events
+    #[arg(long, value_name = "WORLD.toml")]
+    pub(crate) world: Option<PathBuf>,
+    /// What becomes of a run where there is no plan: `lost`, `harmless`, or how many such steps it
+    /// takes until it is lost (without time; lost by default)
+    #[arg(long, value_name = "RULE")]
+    pub(crate) dead_ends: Option<DeadEndRule>,
+    /// How many actions can be under way at once (without time; no limit by default)
+    #[arg(long, value_name = "N")]
+    pub(crate) most_running: Option<usize>,
+    /// An action breaks off as soon as what it needs throughout does not hold (without time)
+    #[arg(long)]
+    pub(crate) keep_over_all: bool,
+    /// Into how many cells time is cut (on a clock; 32 by default)
+    #[arg(long, value_name = "N")]
+    pub(crate) cells: Option<usize>,
+    /// Which bound of the optimum (on a clock; upper by default)
+    #[arg(long, value_enum)]
+    pub(crate) bound: Option<Bound>,
+}
+
+/// The bounds of the timed optimum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Bound {
+    /// What happens in a cell happens in the worst order: a game, `smg`
+    Lower,
+    /// What a cell brings is told, and its order chosen: `mdp`
+    Upper,
+}
+
+/// What becomes of a run in a dead end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct DeadEndRule(pub(crate) DeadEnds);
+
+impl FromStr for DeadEndRule {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "lost" => Ok(Self(DeadEnds::Lost)),
+            "harmless" => Ok(Self(DeadEnds::Harmless)),
+            number => match number.parse() {
+                Ok(steps @ 1..=1000) => Ok(Self(DeadEnds::Patience(steps))),
+                _ => Err("say `lost`, `harmless`, or a number from 1 to 1000".to_owned()),
+            },
+        }
+    }
 }
 
 /// A format that others read.
@@ -61,4 +123,6 @@ pub(crate) enum ExportFormat {
     Stnu,
     /// Whether the plan is guaranteed to work in the box; or the region
     Smt2,
+    /// What the best of all executors can reach, as a Markov decision process
+    Prism,
 }

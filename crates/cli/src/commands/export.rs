@@ -1,5 +1,7 @@
 //! `elbowroom export`: what other programs can check.
 
+mod prism;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,11 +24,23 @@ use crate::{input, output};
 
 /// Writes a network, a box check or a region.
 pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
+    if arguments.format == ExportFormat::Prism {
+        let text = prism::text(arguments, output)?;
+        write(arguments, &text)?;
+        return Ok(Exit::Yes);
+    }
+    refuse_what_is_about_processes(arguments)?;
     if arguments.format == ExportFormat::Stnu {
         refuse_what_networks_do_not_have(arguments)?;
     }
+    let Some(file) = &arguments.plan else {
+        return Err(Failure::new(
+            "which plan is it about?",
+            "give its file after the problem's",
+        ));
+    };
     let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
-    let plan = input::any_plan(&task, &arguments.plan, output)?;
+    let plan = input::any_plan(&task, file, output)?;
     let mut vary = specifications(&arguments.vary)?;
     vary.extend(specifications(&args::controllable(
         &arguments.controllable,
@@ -36,10 +50,10 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         enforce: arguments.enforce,
         ..EnvelopeRequest::new(&task, plan)
     };
-    let plan = match export::opened(&request, &mut Repairs(&arguments.plan)) {
+    let plan = match export::opened(&request, &mut Repairs(file)) {
         Ok(plan) => plan,
         Err(FlowError::Invalid(violation)) => {
-            let file = arguments.plan.display();
+            let file = file.display();
             let mut text = format!("{}: {file} does not work\n", styled(BAD, "invalid"));
             push_wrapped(&mut text, &violation.to_string(), 2, Look::PLAIN.width);
             output::tell(text.trim_end());
@@ -62,10 +76,10 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
                 "give one with --contains BOX, or --envelope ANSWER.json",
             ));
         }
-        (ExportFormat::Smt2, Some((envelope, guarantee))) => {
+        (_, Some((envelope, guarantee))) => {
             export::box_check(&task, &plan, &envelope, guarantee)
         }
-        (ExportFormat::Smt2, None) => export::region(&task, &plan),
+        (_, None) => export::region(&task, &plan),
     };
     let text = match written {
         // That the box is not inside is an answer.
@@ -75,11 +89,31 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
         }
         written => written.map_err(failure)?,
     };
-    match &arguments.output {
-        Some(path) => output::write_file(path, &text)?,
-        None => output::print(&text)?,
-    }
+    write(arguments, &text)?;
     Ok(Exit::Yes)
+}
+
+fn write(arguments: &ExportArgs, text: &str) -> Result<(), Failure> {
+    match &arguments.output {
+        Some(path) => output::write_file(path, text),
+        None => output::print(text),
+    }
+}
+
+fn refuse_what_is_about_processes(arguments: &ExportArgs) -> Result<(), Failure> {
+    let process = &arguments.process;
+    prism::refuse(
+        &[
+            ("--likelihoods", process.likelihoods.is_some()),
+            ("--world", process.world.is_some()),
+            ("--dead-ends", process.dead_ends.is_some()),
+            ("--most-running", process.most_running.is_some()),
+            ("--keep-over-all", process.keep_over_all),
+            ("--cells", process.cells.is_some()),
+            ("--bound", process.bound.is_some()),
+        ],
+        "is about processes (export prism), and this is about a plan",
+    )
 }
 
 fn refuse_what_networks_do_not_have(arguments: &ExportArgs) -> Result<(), Failure> {

@@ -165,7 +165,7 @@ impl Cell<'_> {
                 let after = state.ended(world, place, is_well);
                 choices.push(vec![(1.0, vec![self.target((after, *pending))])]);
             }
-            if world.acts[usize::from(running.act)].may_be_cancelled {
+            if world.may_gain_by_cancelling(usize::from(running.act)) {
                 let mut after = state.clone();
                 after.running.remove(place);
                 choices.push(vec![(1.0, vec![self.target((after, *pending))])]);
@@ -173,7 +173,7 @@ impl Cell<'_> {
         }
         let events = (0..world.events.len()).filter(|event| pending & (1 << event) != 0);
         for event in events.clone() {
-            if !(world.is_monotone && world.events[event].is_harmful()) {
+            if !world.is_best_last(event) {
                 let after = state.changed(world, event);
                 choices.push(vec![(
                     1.0,
@@ -184,9 +184,9 @@ impl Cell<'_> {
         for act in startable {
             choices.push(self.start(state, *pending, act));
         }
-        // Where more facts are never worse, harm is best done last.
+        // Harm for good is best done last.
         let mut after = state.clone();
-        for event in events.filter(|event| world.is_monotone && world.events[*event].is_harmful()) {
+        for event in events.filter(|event| world.is_best_last(*event)) {
             after = after.changed(world, event);
         }
         let all_happened = after.happened & pending == *pending;
@@ -231,31 +231,24 @@ impl Cell<'_> {
     }
 }
 
-/// Where more facts are never worse, what only adds some is best done at once.
+/// What is best done at once.
 fn forced(world: &TimedWorld, mut moment: Moment) -> Moment {
-    if !world.is_monotone {
-        return moment;
-    }
     loop {
         let (state, pending) = &moment;
-        let gift = (0..world.events.len())
-            .find(|event| pending & (1 << event) != 0 && world.events[*event].deletes == 0);
+        let event = (0..world.events.len())
+            .find(|event| pending & (1 << event) != 0 && world.is_best_at_once(*event));
         let end = || {
-            state
-                .running
-                .iter()
-                .enumerate()
-                .find_map(|(place, running)| {
-                    let (Phase::Ready(is_well) | Phase::Due(is_well)) = running.phase else {
-                        return None;
-                    };
-                    let act = &world.acts[usize::from(running.act)];
-                    let (_, end) = act.rest.as_ref()?;
-                    let is_best = !is_well || (act.ends_kindly() && end.needs.hold(state.facts));
-                    is_best.then_some((place, is_well))
-                })
+            let mut running = state.running.iter().enumerate();
+            running.find_map(|(place, running)| {
+                let (Phase::Ready(is_well) | Phase::Due(is_well)) = running.phase else {
+                    return None;
+                };
+                let act = usize::from(running.act);
+                let is_best = world.ends_best_at_once(act, is_well, state.facts);
+                is_best.then_some((place, is_well))
+            })
         };
-        moment = if let Some(event) = gift {
+        moment = if let Some(event) = event {
             (state.changed(world, event), pending & !(1 << event))
         } else if let Some((place, is_well)) = end() {
             (state.ended(world, place, is_well), *pending)

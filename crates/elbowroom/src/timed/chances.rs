@@ -8,15 +8,15 @@ use super::{NotTabulated, Side};
 
 /// How likely it is that something happens in a cell, given that it has not before.
 #[derive(Debug)]
-pub(super) struct Chances {
+pub(crate) struct Chances {
     /// The number of cells.
-    pub(super) cells: usize,
+    pub(crate) cells: usize,
     /// By action and number of cells since it began: that it ends well, and that it fails.
-    pub(super) ends: Vec<Vec<(f64, f64)>>,
+    pub(crate) ends: Vec<Vec<(f64, f64)>>,
     /// By event and cell.
-    pub(super) events: Vec<Vec<f64>>,
+    pub(crate) events: Vec<Vec<f64>>,
     /// By event: that it has happened before anybody could do something.
-    pub(super) before: Vec<f64>,
+    pub(crate) before: Vec<f64>,
 }
 
 /// Into how many parts of a duration the moment of a failure is cut at most.

@@ -11,11 +11,11 @@ use super::compile::{Compiler, actions, relevant};
 use super::{NotTabulated, Settings};
 
 /// Which facts are true.
-pub(super) type Facts = u128;
+pub(crate) type Facts = u128;
 
 /// A condition on facts.
 #[derive(Clone, Debug)]
-pub(super) enum Needs {
+pub(crate) enum Needs {
     All(Vec<Needs>),
     Any(Vec<Needs>),
     Not(Box<Needs>),
@@ -24,58 +24,60 @@ pub(super) enum Needs {
 
 /// A start or an end.
 #[derive(Clone, Debug)]
-pub(super) struct Snap {
-    pub(super) needs: Needs,
-    pub(super) adds: Facts,
-    pub(super) deletes: Facts,
+pub(crate) struct Snap {
+    pub(crate) needs: Needs,
+    pub(crate) adds: Facts,
+    pub(crate) deletes: Facts,
 }
 
 /// An action.
 #[derive(Clone, Debug)]
-pub(super) struct Act {
-    pub(super) name: String,
-    pub(super) action: Arc<Action>,
-    pub(super) start: Snap,
+pub(crate) struct Act {
+    pub(crate) name: String,
+    pub(crate) action: Arc<Action>,
+    pub(crate) start: Snap,
     /// What is needed over all, and its end; `None` for instantaneous actions.
-    pub(super) rest: Option<(Needs, Snap)>,
-    pub(super) planned: Rational,
+    pub(crate) rest: Option<(Needs, Snap)>,
+    pub(crate) planned: Rational,
     /// P(it fails midway), given that it starts.
-    pub(super) midway: f64,
+    pub(crate) midway: f64,
     /// P(it fails at its end), given that it starts.
-    pub(super) at_end: f64,
+    pub(crate) at_end: f64,
     /// Whether what its start did is undone when it fails.
-    pub(super) is_undone: bool,
+    pub(crate) is_undone: bool,
     /// Whether it may do any good to cancel it.
-    pub(super) may_be_cancelled: bool,
+    pub(crate) may_be_cancelled: bool,
     /// Whether nothing is ever better than to start it as soon as one can.
-    pub(super) is_eager: bool,
+    pub(crate) is_eager: bool,
 }
 
 /// Something that happens by itself, at most once.
 #[derive(Clone, Debug)]
-pub(super) struct Event {
-    pub(super) adds: Facts,
-    pub(super) deletes: Facts,
-    pub(super) probability: f64,
-    pub(super) time: Rule,
+pub(crate) struct Event {
+    pub(crate) adds: Facts,
+    pub(crate) deletes: Facts,
+    pub(crate) probability: f64,
+    pub(crate) time: Rule,
 }
 
 /// See [`timed`](super).
 #[derive(Debug)]
-pub(super) struct TimedWorld {
-    pub(super) model: WorldModel,
+pub(crate) struct TimedWorld {
+    pub(crate) model: WorldModel,
     /// The facts that matter; the place of each is its bit.
-    pub(super) facts: Vec<FactId>,
-    pub(super) acts: Vec<Act>,
-    pub(super) events: Vec<Event>,
-    pub(super) initial: Facts,
-    pub(super) goal: Needs,
+    pub(crate) facts: Vec<FactId>,
+    pub(crate) acts: Vec<Act>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) initial: Facts,
+    pub(crate) goal: Needs,
     /// Whether more facts are never worse: no condition asks for something to be false.
-    pub(super) is_monotone: bool,
+    pub(crate) is_monotone: bool,
     /// The facts that something may make false.
     deletable: Facts,
+    /// The facts that something may make true.
+    addable: Facts,
     /// In seconds.
-    pub(super) horizon: f64,
+    pub(crate) horizon: f64,
 }
 
 /// The most actions and events: they are bits of numbers.
@@ -83,7 +85,7 @@ const MOST_ACTS: usize = 64;
 const MOST_EVENTS: usize = 32;
 
 impl TimedWorld {
-    pub(super) fn new(
+    pub(crate) fn new(
         task: &Task,
         model: &WorldModel,
         settings: &Settings,
@@ -134,6 +136,8 @@ impl TimedWorld {
             is_monotone: !goal.has_negation() && !acts.iter().any(Act::has_negation),
             deletable: acts.iter().fold(0, |all, act| all | act.deletes())
                 | events.iter().fold(0, |all, event| all | event.deletes),
+            addable: acts.iter().fold(0, |all, act| all | act.adds())
+                | events.iter().fold(0, |all, event| all | event.adds),
             model: model.clone(),
             acts,
             events,
@@ -197,6 +201,43 @@ impl TimedWorld {
     pub(super) fn is_useful(&self, act: usize, facts: Facts) -> bool {
         let adds = self.acts[act].adds();
         !self.is_monotone || adds & !facts != 0 || adds & self.deletable != 0
+    }
+
+    /// Whether an event is best over at once: more facts are never worse, and what it gives nothing
+    /// takes away. What can be taken away is better given after that.
+    pub(super) fn is_best_at_once(&self, event: usize) -> bool {
+        let event = &self.events[event];
+        self.is_monotone && event.deletes == 0 && event.adds & self.deletable == 0
+    }
+
+    /// Whether an event is best over last: more facts are never worse, and what it takes away
+    /// nothing gives back. What can be given back is better taken before that.
+    pub(super) fn is_best_last(&self, event: usize) -> bool {
+        let event = &self.events[event];
+        self.is_monotone && event.adds == 0 && event.deletes & self.addable == 0
+    }
+
+    /// Whether an action that is about to end, well or badly, had best do so at once.
+    pub(super) fn ends_best_at_once(&self, act: usize, is_well: bool, facts: Facts) -> bool {
+        let act = &self.acts[act];
+        let Some((_, end)) = &act.rest else {
+            return false;
+        };
+        let gives = match (is_well, act.is_undone) {
+            (true, _) => end.adds,
+            (false, true) => act.start.deletes,
+            (false, false) => 0,
+        };
+        let does_no_harm = !is_well || (act.ends_kindly() && end.needs.hold(facts));
+        self.is_monotone && does_no_harm && gives & self.deletable == 0
+    }
+
+    /// Whether there can be something in cancelling an action for who may do so at any moment:
+    /// besides what [`Act::may_be_cancelled`] says, what its end gives may be better given later.
+    pub(super) fn may_gain_by_cancelling(&self, act: usize) -> bool {
+        let act = &self.acts[act];
+        let gives = act.rest.as_ref().map_or(0, |(_, end)| end.adds);
+        act.may_be_cancelled || gives & self.deletable != 0
     }
 }
 

@@ -1,0 +1,112 @@
+//! `elbowroom export prism`: what the best of all executors can reach, for Storm and PRISM.
+
+use std::sync::Arc;
+
+use elbowroom::export::prism::{self, PrismError};
+use elbowroom::probability::{likelihoods, optimum};
+use elbowroom::sim::WorldModel;
+use elbowroom::timed;
+
+use crate::args::{Bound, ExportArgs};
+use crate::exit::Failure;
+use crate::input;
+use crate::output::Output;
+
+/// The cells of a process where nothing is said of them: those of the first grid of the optimum.
+const CELLS: usize = 32;
+
+/// The text of the process that is asked for.
+pub(super) fn text(arguments: &ExportArgs, output: &mut Output) -> Result<String, Failure> {
+    refuse_what_is_about_plans(arguments)?;
+    let process = &arguments.process;
+    match (&process.likelihoods, &process.world) {
+        (Some(_), _) => {
+            refuse(
+                &[
+                    ("--cells", process.cells.is_some()),
+                    ("--bound", process.bound.is_some()),
+                ],
+                "is about processes on a clock, and --likelihoods asks for one without time",
+            )?;
+        }
+        (None, Some(_)) => {
+            refuse(
+                &[
+                    ("--dead-ends", process.dead_ends.is_some()),
+                    ("--most-running", process.most_running.is_some()),
+                    ("--keep-over-all", process.keep_over_all),
+                ],
+                "is about processes without time, and --world asks for one on a clock",
+            )?;
+        }
+        (None, None) => {
+            return Err(Failure::new(
+                "a process needs to know how likely things are",
+                "give --likelihoods FILE for the one without time, or --world WORLD.toml for the one \
+                 on a clock",
+            ));
+        }
+    }
+    let task = Arc::new(input::task(&arguments.problem, &arguments.epsilon, output)?);
+    let written = if let Some(path) = &process.likelihoods {
+        let text = input::source(path, "likelihoods")?;
+        let likelihoods = likelihoods::read(text, &task).map_err(|wrong| {
+            Failure::from(wrong).advised("docs/formats/likelihoods.md describes likelihood files")
+        })?;
+        let lost = optimum::Settings::default();
+        let settings = optimum::Settings {
+            dead_ends: process.dead_ends.map_or(lost.dead_ends, |rule| rule.0),
+            most_running: process.most_running.unwrap_or(lost.most_running),
+            enforces_over_all: process.keep_over_all,
+            ..lost
+        };
+        prism::untimed(&task, &likelihoods, &settings)
+    } else if let Some(path) = &process.world {
+        let text = input::source(path, "world")?;
+        let world = WorldModel::read(&text, task.problem()).map_err(|wrong| {
+            Failure::from(wrong).advised("docs/formats/world.md describes world files")
+        })?;
+        let bound = match process.bound {
+            None | Some(Bound::Upper) => prism::Bound::Upper,
+            Some(Bound::Lower) => prism::Bound::Lower,
+        };
+        let grid = (process.cells.unwrap_or(CELLS), bound);
+        prism::timed(&task, &world, &timed::Settings::default(), grid)
+    } else {
+        unreachable!("one of the two was asked for above")
+    };
+    written.map_err(|error| {
+        let advice = match error {
+            PrismError::NotTabulated(_) | PrismError::Unsupported(_) | PrismError::NotSmall(_) => {
+                "docs/second-witness.md says of which problems there are processes"
+            }
+            _ => "",
+        };
+        Failure::new(error, advice)
+    })
+}
+
+fn refuse_what_is_about_plans(arguments: &ExportArgs) -> Result<(), Failure> {
+    let is_default = arguments.epsilon == elbowroom::num::Rational::new(1, 1000);
+    refuse(
+        &[
+            ("PLAN", arguments.plan.is_some()),
+            ("--contains", arguments.contains.is_some()),
+            ("--envelope", arguments.envelope.is_some()),
+            ("--vary", !arguments.vary.is_empty()),
+            ("--guarantee", arguments.guarantee.is_some()),
+            ("--enforce", arguments.enforce),
+            ("--controllable", !arguments.controllable.is_empty()),
+            ("--epsilon", !is_default),
+        ],
+        "is about plans, and a process is about all that can be done",
+    )
+}
+
+/// Refuses the first of these that is given.
+pub(super) fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((name, _)) => Err(Failure::new(format!("{name} {why}"), "leave it out")),
+        None => Ok(()),
+    }
+}

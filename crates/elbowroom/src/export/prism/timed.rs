@@ -1,0 +1,633 @@
+//! The process on a clock that is cut into cells: see [`timed`].
+
+use std::fmt::Write as _;
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_sim::WorldModel;
+
+use super::formula::{Formula, choice, exact};
+use super::{PrismError, bare, checked};
+use crate::export::names::distinct;
+use crate::timed::{Act, Chances, Facts, Needs, Settings, Side, TimedWorld, chances};
+
+/// From where the best value is bounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bound {
+    /// The agent decides at the boundaries of cells, and what happens between them happens in the
+    /// order that is worst for it: a game of two players.
+    Lower,
+    /// The agent knows at the beginning of a cell what it brings, and chooses the order.
+    Upper,
+}
+
+/// The process of the timed optimum ([`crate::timed`]) on a grid of so many cells, in the language
+/// of PRISM: its `Pmax=? [F "goal"]`, or, for the lower bound, `<<agent>> Pmax=? [F "goal"]`, is a
+/// bound on the best probability with which an executor without foresight reaches the goal.
+///
+/// It has none of the shortcuts of [`optimum`](crate::timed::optimum): any action may be started or
+/// cancelled whenever the state allows, in whatever order. So the upper bound is the same, and the
+/// lower one is at least as great: where [`optimum`](crate::timed::optimum) takes something worse
+/// than the worst order for it, the game does not.
+///
+/// # Errors
+/// When the world is not one for which there is a timed optimum, when there cannot be so many cells,
+/// and when there are more than [`MOST_COMMANDS`](super::MOST_COMMANDS) commands.
+pub fn timed(
+    task: &Task,
+    model: &WorldModel,
+    settings: &Settings,
+    (cells, bound): (usize, Bound),
+) -> Result<String, PrismError> {
+    if cells == 0 || cells >= usize::from(u16::MAX) - 1 {
+        return Err(PrismError::Cells { cells });
+    }
+    let world = TimedWorld::new(task, model, settings)?;
+    let side = match bound {
+        Bound::Lower => Side::Below,
+        Bound::Upper => Side::Above,
+    };
+    let chances = chances(&world, cells, side)?;
+    let names = world.facts.iter().map(|fact| {
+        let name = task.fact_name(*fact);
+        format!("f_{}", bare(&name))
+    });
+    let acts = world.acts.iter().map(|act| bare(&act.name).to_owned());
+    let process = Process {
+        facts: distinct(names),
+        acts: distinct(acts),
+        bound,
+        world: &world,
+        chances: &chances,
+    };
+    let problem = task.problem();
+    checked(process.text(&problem.name, &problem.domain))
+}
+
+/// A world on a grid, with names.
+struct Process<'p> {
+    world: &'p TimedWorld,
+    chances: &'p Chances,
+    bound: Bound,
+    facts: Vec<String>,
+    acts: Vec<String>,
+}
+
+/// Something that takes place at one moment.
+struct Happening {
+    label: String,
+    /// What it needs of facts.
+    needs: Formula,
+    adds: Facts,
+    deletes: Facts,
+    owner: Owner,
+    /// Whether the agent decides that it takes place, not the world.
+    is_agents: bool,
+}
+
+/// Whose state it changes, and how.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Owner {
+    Started(usize),
+    /// What the variable of its end says when it does: well, badly, or no matter.
+    Ended(usize, Option<bool>),
+    Event(usize),
+}
+
+impl Process<'_> {
+    fn text(&self, problem: &str, domain: &str) -> String {
+        let happenings = self.happenings();
+        let mut text = String::new();
+        self.heading(problem, domain, &happenings, &mut text);
+        self.clock(&happenings, &mut text);
+        self.fact_module(&happenings, &mut text);
+        for act in (0..self.acts.len()).filter(|act| self.world.acts[*act].rest.is_some()) {
+            self.act_module(act, &happenings, &mut text);
+        }
+        for event in 0..self.world.events.len() {
+            self.event_module(event, &happenings, &mut text);
+        }
+        let goal = match self.bound {
+            Bound::Lower => "phase=0 & goal",
+            Bound::Upper => "(phase!=2 & goal) | (phase=2 & goal_in_hope)",
+        };
+        let _ = writeln!(text, "label \"goal\" = {goal};");
+        text
+    }
+
+    fn heading(&self, problem: &str, domain: &str, happenings: &[Happening], text: &mut String) {
+        let cells = self.chances.cells;
+        let _ = writeln!(
+            text,
+            "// The problem {problem} of the domain {domain} in its world, with time in {cells} cells that end\n\
+             // at {} seconds.",
+            self.world.horizon
+        );
+        match self.bound {
+            Bound::Lower => {
+                text.push_str(
+                    "// <<agent>> Pmax=? [F \"goal\"] is a lower bound: the agent decides at the boundaries of cells,\n\
+                     // and what happens between them happens in the order that is worst for it.\n\nsmg\n\n",
+                );
+                let list = |is_agents: bool, others: &[&str]| {
+                    let own = happenings.iter().filter(|it| it.is_agents == is_agents);
+                    let own = own.map(|happening| happening.label.as_str());
+                    let all = own.chain(others.iter().copied());
+                    let all: Vec<String> = all.map(|label| format!("[{label}]")).collect();
+                    all.join(", ")
+                };
+                // A label that no command has is a mistake.
+                let worlds: &[&str] = if self.has_a_beginning() {
+                    &["tick", "begin", "begun"]
+                } else {
+                    &["tick"]
+                };
+                let _ = writeln!(
+                    text,
+                    "player agent\n  {}\nendplayer\nplayer world\n  {}\nendplayer\n",
+                    list(true, &["wait", "over"]),
+                    list(false, worlds)
+                );
+            }
+            Bound::Upper => text.push_str(
+                "// Pmax=? [F \"goal\"] is an upper bound: the agent is told at the beginning of a cell what it brings,\n\
+                 // and chooses the order of what happens in it.\n\nmdp\n\n",
+            ),
+        }
+        let goal = self.holds(&self.world.goal);
+        let _ = writeln!(text, "formula goal = {goal};");
+        if self.bound == Bound::Upper {
+            text.push_str("// After the last cell: whoever may still get there, does.\n");
+            let _ = writeln!(
+                text,
+                "formula goal_in_hope = {};",
+                self.may_hold(&self.world.goal)
+            );
+        }
+        text.push('\n');
+    }
+
+    /// All that can take place within a cell or at its boundary.
+    fn happenings(&self) -> Vec<Happening> {
+        let mut all = Vec::new();
+        for (index, (act, name)) in self.world.acts.iter().zip(&self.acts).enumerate() {
+            all.push(Happening {
+                label: format!("start_{name}"),
+                needs: self.holds(&act.start.needs),
+                adds: act.start.adds,
+                deletes: act.start.deletes,
+                owner: Owner::Started(index),
+                is_agents: true,
+            });
+            let Some((_, end)) = &act.rest else {
+                continue;
+            };
+            let ended = |label: &str, needs, (adds, deletes), is_well, is_agents| Happening {
+                label: format!("{label}_{name}"),
+                needs,
+                adds,
+                deletes,
+                owner: Owner::Ended(index, is_well),
+                is_agents,
+            };
+            let agents = self.bound == Bound::Upper;
+            let needs = self.holds(&end.needs);
+            // An end that lacks what it needs fails; then nobody undoes what the start did.
+            let lacks = needs.clone().negated();
+            let effects = (end.adds, end.deletes);
+            all.push(ended("end", needs, effects, Some(true), agents));
+            if lacks != Formula::FALSE {
+                all.push(ended("miss", lacks, (0, 0), Some(true), agents));
+            }
+            if act.midway > 0.0 || act.at_end > 0.0 {
+                let undone = if act.is_undone { act.start.deletes } else { 0 };
+                let effects = (undone, 0);
+                all.push(ended("fail", Formula::TRUE, effects, Some(false), agents));
+            }
+            all.push(ended("cancel", Formula::TRUE, (0, 0), None, true));
+        }
+        for (index, event) in self.world.events.iter().enumerate() {
+            all.push(Happening {
+                label: format!("event_{index}"),
+                needs: Formula::TRUE,
+                adds: event.adds,
+                deletes: event.deletes,
+                owner: Owner::Event(index),
+                is_agents: self.bound == Bound::Upper,
+            });
+        }
+        all
+    }
+
+    fn clock(&self, happenings: &[Happening], text: &mut String) {
+        let cells = self.chances.cells;
+        text.push_str("module clock\n");
+        let _ = writeln!(text, "  cell : [0..{cells}] init 0;");
+        match self.bound {
+            Bound::Lower => {
+                let begins = self.has_a_beginning();
+                let _ = writeln!(
+                    text,
+                    "  // 0: at the boundary before the cell; 1: in it; 2 and 3: what happens before all else.\n  \
+                     phase : [0..3] init {};",
+                    if begins { 2 } else { 0 }
+                );
+                for happening in happenings {
+                    let label = &happening.label;
+                    let guard = match (happening.is_agents, happening.owner) {
+                        (true, _) => format!("phase=0 & cell<{cells}"),
+                        (false, Owner::Event(event)) if begins => {
+                            let earlier = (0..event).map(|it| format!(" & e_{it}!=1"));
+                            let earlier: String = earlier.collect();
+                            format!("phase=1 | (phase=3{earlier})")
+                        }
+                        (false, _) => "phase=1".to_owned(),
+                    };
+                    let _ = writeln!(text, "  [{label}] {guard} -> true;");
+                }
+                let _ = writeln!(
+                    text,
+                    "  [wait] phase=0 & cell<{cells} -> (phase'=1);\n  \
+                     [tick] phase=1 -> (phase'=0)&(cell'=cell+1);\n  \
+                     [over] phase=0 & cell={cells} -> true;"
+                );
+                if begins {
+                    text.push_str("  [begin] phase=2 -> (phase'=3);\n  [begun] phase=3 -> (phase'=0);\n");
+                }
+            }
+            Bound::Upper => {
+                text.push_str(
+                    "  // 0: what the cell brings is drawn; 1: the agent chooses; 2: after the last cell.\n  \
+                     phase : [0..2] init 0;\n",
+                );
+                for happening in happenings {
+                    let _ = writeln!(text, "  [{}] phase=1 -> true;", happening.label);
+                }
+                let last = cells - 1;
+                let _ = writeln!(
+                    text,
+                    "  [reveal] phase=0 -> (phase'=1);\n  \
+                     [pass] phase=1 -> (cell'=cell+1)&(phase'=(cell={last} ? 2 : 0));\n  \
+                     [over] phase=2 -> true;"
+                );
+            }
+        }
+        text.push_str("endmodule\n\n");
+    }
+
+    fn fact_module(&self, happenings: &[Happening], text: &mut String) {
+        text.push_str("module facts\n");
+        for (place, name) in self.facts.iter().enumerate() {
+            let holds = self.world.initial & (1 << place) != 0;
+            let _ = writeln!(text, "  {name} : bool init {holds};");
+        }
+        for happening in happenings {
+            let changes = self.changes(happening.adds, happening.deletes);
+            let _ = writeln!(
+                text,
+                "  [{}] {} -> {changes};",
+                happening.label, happening.needs
+            );
+        }
+        if self.bound == Bound::Upper {
+            self.hopes(text);
+        }
+        text.push_str("endmodule\n\n");
+    }
+
+    /// After the last cell: what could come about if nothing were ever made false.
+    fn hopes(&self, text: &mut String) {
+        text.push_str("  // What could still come about if nothing were made false any more.\n");
+        let mut hope = |guard: Formula, adds: Facts| {
+            if adds != 0 && guard != Formula::FALSE {
+                let guard = Formula::all([Formula::atom("phase=2"), guard]);
+                let _ = writeln!(text, "  [] {guard} -> {};", self.changes(adds, 0));
+            }
+        };
+        for (index, event) in self.world.events.iter().enumerate() {
+            hope(Formula::atom(format!("e_{index}!=2")), event.adds);
+        }
+        for (act, name) in self.world.acts.iter().zip(&self.acts) {
+            let can_start = self.may_hold(&act.start.needs);
+            hope(can_start.clone(), act.start.adds);
+            if let Some((over_all, end)) = &act.rest {
+                let goes = Formula::atom(format!("a_{name}>0"));
+                if act.is_undone {
+                    hope(goes.clone(), act.start.deletes);
+                }
+                let begun = Formula::any([can_start, goes]);
+                let needs = [self.may_hold(over_all), self.may_hold(&end.needs)];
+                hope(Formula::all([begun].into_iter().chain(needs)), end.adds);
+            }
+        }
+    }
+
+    /// An action: since when it has been under way, and what is known of its end.
+    fn act_module(&self, act: usize, happenings: &[Happening], text: &mut String) {
+        let (name, world_act) = (&self.acts[act], &self.world.acts[act]);
+        let (since, ends) = (format!("a_{name}"), format!("o_{name}"));
+        let cells = self.chances.cells;
+        let most = match self.bound {
+            Bound::Lower => 2,
+            Bound::Upper => 4,
+        };
+        let _ = writeln!(
+            text,
+            "module act_{name} // {}\n  // 0: not under way; n: since n-1 cells.\n  {since} : [0..{}] init 0;",
+            bare(&world_act.name),
+            cells + 1
+        );
+        text.push_str(match self.bound {
+            Bound::Lower => "  // What it does in this cell: 1 ends well, 2 badly.\n",
+            Bound::Upper => {
+                "  // 1 ends well, 2 badly, in this cell or the next; 3 and 4 in this one.\n"
+            }
+        });
+        let _ = writeln!(text, "  {ends} : [0..{most}] init 0;");
+        for happening in happenings {
+            self.act_command(act, happening, text);
+        }
+        match self.bound {
+            Bound::Lower => {
+                let _ = writeln!(
+                    text,
+                    "  [tick] {ends}=0 -> ({since}'=({since}>0 ? {since}+1 : 0));"
+                );
+                let _ = writeln!(text, "  [wait] {since}=0 -> true;");
+                self.draws(act, "wait", "", text);
+            }
+            Bound::Upper => {
+                // How long it has been under way no longer matters when its end is known.
+                let _ = writeln!(
+                    text,
+                    "  [pass] {ends}<3 -> ({since}'=({ends}>0 ? 1 : ({since}>0 ? {since}+1 : 0)))\
+                     &({ends}'=({ends}>0 ? {ends}+2 : 0));"
+                );
+                let _ = writeln!(text, "  [reveal] {since}=0 | {ends}>0 -> true;");
+                self.draws(act, "reveal", &format!(" & {ends}=0"), text);
+            }
+        }
+        text.push_str("endmodule\n\n");
+    }
+
+    /// Whether it ends in the cell, by how long it has been under way.
+    fn draws(&self, act: usize, label: &str, guard: &str, text: &mut String) {
+        let since = format!("a_{}", self.acts[act]);
+        let ends = format!("o_{}", self.acts[act]);
+        let hazards: Vec<String> = self.chances.ends[act]
+            .iter()
+            .map(|hazard| choice(&self.ends(&ends, *hazard, "true")))
+            .collect();
+        for (from, to) in runs(&hazards) {
+            let _ = writeln!(
+                text,
+                "  [{label}] {}{guard} -> {};",
+                range(&since, from + 1, to + 1),
+                hazards[from]
+            );
+        }
+    }
+
+    /// The ways in which an action under way may end, with `otherwise` for that it does not.
+    fn ends(&self, name: &str, (well, badly): (f64, f64), otherwise: &str) -> [(Rational, String); 3] {
+        let (well, badly) = (exact(well), exact(badly));
+        let rest = &(&Rational::ONE - &well) - &badly;
+        // What rounding has left over goes to the likelier one.
+        let is_over = rest.to_f64() < 1e-12;
+        let one = Rational::ONE;
+        let (well, badly, rest) = match (is_over, well >= badly) {
+            (false, _) => (well, badly, rest),
+            (true, true) => (&one - &badly, badly, Rational::ZERO),
+            (true, false) => (well.clone(), &one - &well, Rational::ZERO),
+        };
+        [
+            (well, format!("({name}'=1)")),
+            (badly, format!("({name}'=2)")),
+            (rest, otherwise.to_owned()),
+        ]
+    }
+
+    /// What a happening changes about an action.
+    fn act_command(&self, act: usize, happening: &Happening, text: &mut String) {
+        let (since, ends) = (format!("a_{}", self.acts[act]), format!("o_{}", self.acts[act]));
+        let Happening {
+            label,
+            adds,
+            deletes,
+            ..
+        } = happening;
+        let goes_on = self.goes_on(&self.world.acts[act], *adds, *deletes);
+        match happening.owner {
+            Owner::Started(own) if own == act => {
+                let begun = match &goes_on {
+                    Some(Formula::All(parts)) if parts.is_empty() => "1".to_owned(),
+                    Some(goes_on) => format!("(({goes_on}) ? 1 : 0)"),
+                    None => {
+                        let over_all = self.world.acts[act].rest.as_ref();
+                        let over_all = over_all.map(|(over_all, _)| self.holds(over_all));
+                        match over_all.unwrap_or(Formula::TRUE) {
+                            holds if holds == Formula::TRUE => "1".to_owned(),
+                            holds => format!("(({holds}) ? 1 : 0)"),
+                        }
+                    }
+                };
+                let begins = format!("({since}'={begun})");
+                let ways = match self.bound {
+                    Bound::Lower => begins,
+                    // It may end in the very cell.
+                    Bound::Upper => {
+                        let ways = self.ends(&ends, self.chances.ends[act][0], "");
+                        let ways = ways.map(|(p, end)| match end.as_str() {
+                            "" => (p, begins.clone()),
+                            // Unless it breaks off at once.
+                            end => {
+                                let known = end.replace("'=1)", &format!("'={begun})"));
+                                let known = known.replace("'=2)", &format!("'=2*{begun})"));
+                                (p, format!("{begins}&{known}"))
+                            }
+                        });
+                        choice(&ways)
+                    }
+                };
+                let _ = writeln!(text, "  [{label}] {since}=0 -> {ways};");
+            }
+            Owner::Ended(own, is_well) if own == act => {
+                let guard = match (is_well, self.bound) {
+                    (None, _) => format!("{since}>0"),
+                    (Some(true), Bound::Lower) => format!("{ends}=1"),
+                    (Some(false), Bound::Lower) => format!("{ends}=2"),
+                    (Some(true), Bound::Upper) => format!("{ends}=1 | {ends}=3"),
+                    (Some(false), Bound::Upper) => format!("{ends}=2 | {ends}=4"),
+                };
+                let _ = writeln!(text, "  [{label}] {guard} -> ({since}'=0)&({ends}'=0);");
+            }
+            _ => {
+                if let Some(goes_on) = goes_on {
+                    let keep = |name: &str| format!("({name}'=(({goes_on}) ? {name} : 0))");
+                    let _ = writeln!(
+                        text,
+                        "  [{label}] true -> {}&{};",
+                        keep(&since),
+                        keep(&ends)
+                    );
+                }
+            }
+        }
+    }
+
+    /// Whether what an action needs over all holds after these effects; `None` if they do not
+    /// matter to it.
+    fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
+        let (over_all, _) = act.rest.as_ref()?;
+        (mentions(over_all) & (adds | deletes) != 0)
+            .then(|| self.after(over_all, adds, deletes))
+    }
+
+    /// An event: 0 still to come, 1 in this cell, 2 over.
+    fn event_module(&self, event: usize, happenings: &[Happening], text: &mut String) {
+        let name = format!("e_{event}");
+        let world_event = &self.world.events[event];
+        let words = |facts: Facts, truth: &str| -> Vec<String> {
+            let names = self.facts.iter().enumerate();
+            names
+                .filter(|(place, _)| facts & (1 << place) != 0)
+                .map(|(_, name)| format!("{name} {truth}"))
+                .collect()
+        };
+        let mut changes = words(world_event.adds, "true");
+        changes.extend(words(world_event.deletes & !world_event.adds, "false"));
+        let _ = writeln!(
+            text,
+            "module event_{event} // makes {}\n  // 0 to come, 1 in this cell, 2 over.\n  {name} : [0..2] init 0;",
+            changes.join(", ")
+        );
+        for happening in happenings {
+            if happening.owner == Owner::Event(event) {
+                let _ = writeln!(text, "  [{}] {name}=1 -> ({name}'=2);", happening.label);
+            }
+        }
+        let (label, done) = match self.bound {
+            Bound::Lower => ("wait", "tick"),
+            Bound::Upper => ("reveal", "pass"),
+        };
+        let _ = writeln!(text, "  [{done}] {name}!=1 -> true;");
+        let _ = writeln!(text, "  [{label}] {name}>0 -> true;");
+        let drawn = |p: f64| {
+            let p = exact(p);
+            let rest = &Rational::ONE - &p;
+            choice(&[(p, format!("({name}'=1)")), (rest, "true".to_owned())])
+        };
+        let hazards = self.chances.events[event].iter();
+        let hazards: Vec<String> = hazards.map(|p| drawn(*p)).collect();
+        for (from, to) in runs(&hazards) {
+            let _ = writeln!(
+                text,
+                "  [{label}] {name}=0 & {} -> {};",
+                range("cell", from, to),
+                hazards[from]
+            );
+        }
+        if self.bound == Bound::Lower && self.has_a_beginning() {
+            let _ = writeln!(text, "  [begin] true -> {};", drawn(self.chances.before[event]));
+            let _ = writeln!(text, "  [begun] {name}!=1 -> true;");
+        }
+        text.push_str("endmodule\n\n");
+    }
+
+    /// Whether something may happen before anybody can do something.
+    fn has_a_beginning(&self) -> bool {
+        self.chances.before.iter().any(|p| *p > 0.0)
+    }
+
+    /// The update that makes facts true and false; additions win.
+    fn changes(&self, adds: Facts, deletes: Facts) -> String {
+        let names = self.facts.iter().enumerate();
+        let changes = names.filter_map(|(place, name)| {
+            let bit = 1 << place;
+            let truth = if adds & bit != 0 {
+                true
+            } else if deletes & bit != 0 {
+                false
+            } else {
+                return None;
+            };
+            Some(format!("({name}'={truth})"))
+        });
+        let changes: Vec<String> = changes.collect();
+        if changes.is_empty() {
+            "true".to_owned()
+        } else {
+            changes.join("&")
+        }
+    }
+
+    /// A condition now.
+    fn holds(&self, needs: &Needs) -> Formula {
+        self.after(needs, 0, 0)
+    }
+
+    /// A condition after effects; additions win.
+    fn after(&self, needs: &Needs, adds: Facts, deletes: Facts) -> Formula {
+        let part = |part: &Needs| self.after(part, adds, deletes);
+        match needs {
+            Needs::All(parts) => Formula::all(parts.iter().map(part)),
+            Needs::Any(parts) => Formula::any(parts.iter().map(part)),
+            Needs::Not(inner) => part(inner).negated(),
+            Needs::Fact(fact) if fact & adds != 0 => Formula::TRUE,
+            Needs::Fact(fact) if fact & deletes != 0 => Formula::FALSE,
+            Needs::Fact(0) => Formula::FALSE,
+            Needs::Fact(fact) => Formula::atom(&self.facts[fact.trailing_zeros() as usize]),
+        }
+    }
+
+    /// Whether a condition may hold if more facts may be false than those that are.
+    fn may_hold(&self, needs: &Needs) -> Formula {
+        match needs {
+            Needs::All(parts) => Formula::all(parts.iter().map(|part| self.may_hold(part))),
+            Needs::Any(parts) => Formula::any(parts.iter().map(|part| self.may_hold(part))),
+            Needs::Not(part) => self.may_fail(part),
+            Needs::Fact(_) => self.holds(needs),
+        }
+    }
+
+    fn may_fail(&self, needs: &Needs) -> Formula {
+        match needs {
+            Needs::All(parts) => Formula::any(parts.iter().map(|part| self.may_fail(part))),
+            Needs::Any(parts) => Formula::all(parts.iter().map(|part| self.may_fail(part))),
+            Needs::Not(part) => self.may_hold(part),
+            Needs::Fact(_) => Formula::TRUE,
+        }
+    }
+}
+
+/// The facts that a condition reads.
+fn mentions(needs: &Needs) -> Facts {
+    match needs {
+        Needs::All(parts) | Needs::Any(parts) => {
+            parts.iter().fold(0, |all, part| all | mentions(part))
+        }
+        Needs::Not(part) => mentions(part),
+        Needs::Fact(fact) => *fact,
+    }
+}
+
+/// The first and the last place of each run of equal texts.
+fn runs(texts: &[String]) -> Vec<(usize, usize)> {
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for (place, text) in texts.iter().enumerate() {
+        match runs.last_mut() {
+            Some((first, last)) if texts[*first] == *text => *last = place,
+            _ => runs.push((place, place)),
+        }
+    }
+    runs
+}
+
+/// A number is one of these.
+fn range(name: &str, from: usize, to: usize) -> String {
+    if from == to {
+        format!("{name}={from}")
+    } else {
+        format!("{name}>={from} & {name}<={to}")
+    }
+}
