@@ -102,8 +102,14 @@ fn best(task: &Task, likelihoods: &Likelihoods, settings: &without_time::Setting
 
 #[track_caller]
 fn assert_the_same(name: &str, ours: f64, said: &Said) {
-    println!("{name}: {ours:.12}, Storm {} of {} states", said.value, said.states);
-    assert!((ours - said.value).abs() < 1e-9, "{name}: {ours} and {said:?}");
+    println!(
+        "{name}: {ours:.12}, Storm {} of {} states",
+        said.value, said.states
+    );
+    assert!(
+        (ours - said.value).abs() < 1e-9,
+        "{name}: {ours} and {said:?}"
+    );
 }
 
 #[test]
@@ -167,7 +173,8 @@ fn cases_with_beliefs_and_instantaneous_actions_are_those_of_storm() {
             :effect (and (at start (dark)) (at end (inside)) (at end (not (dark)))))
           (:action look :parameters () :precondition (or (inside) (not (dark)))
             :effect (and (seen) (not (inside)) (dark))))";
-    let problem = "(define (problem in) (:domain door) (:init (dark) (bell)) (:goal (and (inside) (seen))))";
+    let problem =
+        "(define (problem in) (:domain door) (:init (dark) (bell)) (:goal (and (inside) (seen))))";
     let task = task(domain, problem);
     let text = r#"
         format = "elbowroom-likelihoods"
@@ -225,7 +232,10 @@ fn assert_within(name: &str, ours: &TimedOptimum, (upper, lower): (&Said, &Said)
         ours.lower, ours.upper, lower.value, upper.value, lower.states, upper.states
     );
     // The bounds are widened by 1e-9.
-    assert!((upper.value - ours.upper).abs() < 3e-9, "{name}: {upper:?} and {ours:?}");
+    assert!(
+        (upper.value - ours.upper).abs() < 3e-9,
+        "{name}: {upper:?} and {ours:?}"
+    );
     assert!(
         ours.lower <= lower.value + 1e-9 && lower.value <= ours.upper + 1e-9,
         "{name}: {lower:?} and {ours:?}"

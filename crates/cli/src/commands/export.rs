@@ -76,9 +76,7 @@ pub(crate) fn run(arguments: &ExportArgs, output: &mut Output) -> Answer {
                 "give one with --contains BOX, or --envelope ANSWER.json",
             ));
         }
-        (_, Some((envelope, guarantee))) => {
-            export::box_check(&task, &plan, &envelope, guarantee)
-        }
+        (_, Some((envelope, guarantee))) => export::box_check(&task, &plan, &envelope, guarantee),
         (_, None) => export::region(&task, &plan),
     };
     let text = match written {

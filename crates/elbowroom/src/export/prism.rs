@@ -15,15 +15,14 @@ mod formula;
 mod timed;
 mod untimed;
 
+use elbowroom_probability::Unsupported;
 use elbowroom_probability::likelihoods::Missing;
 use elbowroom_probability::optimum::NotSmall;
-use elbowroom_probability::Unsupported;
 
 use crate::timed::NotTabulated;
 
 pub use timed::{Bound, timed};
 pub use untimed::untimed;
-
 
 /// More commands than this are not written: programs that read them look at each in each state.
 pub const MOST_COMMANDS: usize = 20_000;

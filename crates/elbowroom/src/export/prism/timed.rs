@@ -252,7 +252,9 @@ impl Process<'_> {
                      [over] phase=0 & cell={cells} -> true;"
                 );
                 if begins {
-                    text.push_str("  [begin] phase=2 -> (phase'=3);\n  [begun] phase=3 -> (phase'=0);\n");
+                    text.push_str(
+                        "  [begin] phase=2 -> (phase'=3);\n  [begun] phase=3 -> (phase'=0);\n",
+                    );
                 }
             }
             Bound::Upper => {
@@ -389,7 +391,12 @@ impl Process<'_> {
     }
 
     /// The ways in which an action under way may end, with `otherwise` for that it does not.
-    fn ends(&self, name: &str, (well, badly): (f64, f64), otherwise: &str) -> [(Rational, String); 3] {
+    fn ends(
+        &self,
+        name: &str,
+        (well, badly): (f64, f64),
+        otherwise: &str,
+    ) -> [(Rational, String); 3] {
         let (well, badly) = (exact(well), exact(badly));
         let rest = &(&Rational::ONE - &well) - &badly;
         // What rounding has left over goes to the likelier one.
@@ -409,7 +416,10 @@ impl Process<'_> {
 
     /// What a happening changes about an action.
     fn act_command(&self, act: usize, happening: &Happening, text: &mut String) {
-        let (since, ends) = (format!("a_{}", self.acts[act]), format!("o_{}", self.acts[act]));
+        let (since, ends) = (
+            format!("a_{}", self.acts[act]),
+            format!("o_{}", self.acts[act]),
+        );
         let Happening {
             label,
             adds,
@@ -479,8 +489,7 @@ impl Process<'_> {
     /// matter to it.
     fn goes_on(&self, act: &Act, adds: Facts, deletes: Facts) -> Option<Formula> {
         let (over_all, _) = act.rest.as_ref()?;
-        (mentions(over_all) & (adds | deletes) != 0)
-            .then(|| self.after(over_all, adds, deletes))
+        (mentions(over_all) & (adds | deletes) != 0).then(|| self.after(over_all, adds, deletes))
     }
 
     /// An event: 0 still to come, 1 in this cell, 2 over.
@@ -528,7 +537,11 @@ impl Process<'_> {
             );
         }
         if self.bound == Bound::Lower && self.has_a_beginning() {
-            let _ = writeln!(text, "  [begin] true -> {};", drawn(self.chances.before[event]));
+            let _ = writeln!(
+                text,
+                "  [begin] true -> {};",
+                drawn(self.chances.before[event])
+            );
             let _ = writeln!(text, "  [begun] {name}!=1 -> true;");
         }
         text.push_str("endmodule\n\n");

@@ -88,7 +88,9 @@ impl<'p> Process<'p> {
         let actions: Vec<(InstanceId, Action)> = instances
             .map(|(id, instance)| (id, instance.action.clone()))
             .collect();
-        let names = actions.iter().map(|(_, action)| bare(&action.name).to_owned());
+        let names = actions
+            .iter()
+            .map(|(_, action)| bare(&action.name).to_owned());
         let facts: Vec<FactId> = model.facts().collect();
         let fact_names = facts.iter().map(|fact| {
             let name = model.task().fact_name(*fact);
@@ -140,7 +142,8 @@ impl<'p> Process<'p> {
         let process = Perturbed::new(Arc::clone(&self.model), self.settings.clone())?;
         let mut tables = Vec::new();
         for set in sets {
-            let running: Vec<InstanceId> = set.iter().map(|action| self.actions[*action].0).collect();
+            let running: Vec<InstanceId> =
+                set.iter().map(|action| self.actions[*action].0).collect();
             let table = (0..1_usize << self.facts.len()).map(|bits| {
                 let facts = self.facts.iter().enumerate();
                 let facts = facts.filter(|(place, _)| bits & (1 << place) != 0);
@@ -225,7 +228,11 @@ impl<'p> Process<'p> {
         };
         let _ = writeln!(text, "// How many actions are under way.");
         let _ = writeln!(text, "formula under_way = {under_way};");
-        let _ = writeln!(text, "formula goal = {};", self.condition(self.task().goal()));
+        let _ = writeln!(
+            text,
+            "formula goal = {};",
+            self.condition(self.task().goal())
+        );
         if let Some(dead_end) = &self.dead_end {
             text.push_str("// There is no way to the goal even if nothing goes wrong any more.\n");
             let _ = writeln!(text, "formula dead_end = {dead_end};");
@@ -258,11 +265,17 @@ impl<'p> Process<'p> {
         let _ = writeln!(text, "  phase : [0..{}] init {begin};", phases.begin);
         for action in self.durative() {
             let name = bare(&self.actions[action].1.name);
-            let _ = writeln!(text, "  u_{} : bool init false; // {name}", self.names[action]);
+            let _ = writeln!(
+                text,
+                "  u_{} : bool init false; // {name}",
+                self.names[action]
+            );
         }
         if let DeadEnds::Patience(steps) = self.settings.dead_ends {
             let steps = steps.max(1);
-            text.push_str("  // How many more steps may end in a dead end; the last of them ends the run.\n");
+            text.push_str(
+                "  // How many more steps may end in a dead end; the last of them ends the run.\n",
+            );
             let _ = writeln!(text, "  rounds : [0..{steps}] init {steps};");
         }
         if begin > 0 {
@@ -274,7 +287,10 @@ impl<'p> Process<'p> {
         }
         for action in self.durative() {
             let name = &self.names[action];
-            let _ = writeln!(text, "  [abandon_{name}] ready & u_{name} -> (u_{name}'=false);");
+            let _ = writeln!(
+                text,
+                "  [abandon_{name}] ready & u_{name} -> (u_{name}'=false);"
+            );
         }
         let after = phases.settle.or(phases.count).unwrap_or(0);
         for step in 1..=phases.nothing {
@@ -393,7 +409,11 @@ impl<'p> Process<'p> {
                 continue;
             }
             for before in [false, true] {
-                let mut p = if before { Rational::ONE } else { Rational::ZERO };
+                let mut p = if before {
+                    Rational::ONE
+                } else {
+                    Rational::ZERO
+                };
                 for (makes_true, chance) in &effects {
                     // An effect that fails leaves the fact as it was.
                     let rest = &(&Rational::ONE - chance) * &p;
