@@ -14,6 +14,7 @@
 //! | which orderings and times does it need? | [`StnRequest`] | [`StnAnswer`] |
 //! | how far may each quantity deviate? | [`EnvelopeRequest`] | [`EnvelopeAnswer`] |
 //! | with which values does it work? | [`EnvelopeRequest`] | [`RegionAnswer`] |
+//! | what is the least that has to change for it to work? | [`RepairRequest`] | [`RepairAnswer`] |
 //! | what comes of executing a plan? | [`RunRequest`] | [`RunAnswer`] |
 //! | what do logs say about the world? | [`LearnRequest`] | [`LearnAnswer`] |
 //! | how likely is a plan to succeed? | [`OddsRequest`] | [`OddsAnswer`] |
@@ -25,6 +26,7 @@ pub mod learn;
 pub mod odds;
 pub mod plan;
 pub mod region;
+pub mod repair;
 pub mod run;
 pub mod stn;
 mod violation;
@@ -38,6 +40,7 @@ pub use learn::{LearnAnswer, LearnRequest};
 pub use odds::{OddsAnswer, OddsRequest};
 pub use plan::{PlanAnswer, PlanOutcome, PlanRequest};
 pub use region::{RegionAnswer, RegionOutcome};
+pub use repair::{RepairAnswer, RepairOutcome, RepairRequest};
 pub use run::{RunAnswer, RunOutcome, RunProgress, RunRequest};
 pub use stn::{StnAnswer, StnOutcome, StnRequest};
 pub use violation::ViolationAnswer;

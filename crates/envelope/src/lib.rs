@@ -10,6 +10,7 @@
 //! - [`irr`]: Incremental Rectangular Robustification (Algorithm 1), anytime.
 //! - [`best()`]: the largest box by some objective, from outside, with a proof.
 //! - [`exact()`]: all values for which a plan works, as a union of polyhedra.
+//! - [`repair()`]: the cheapest change of quantities with which a plan works.
 //! - [`balance()`]: by how much everything may deviate at once.
 //! - [`Objection`]: the reason why a box is not inside, with values and a schedule that show it.
 //!
@@ -75,6 +76,7 @@ pub mod obligations;
 mod oracle;
 mod ray;
 pub mod reduction;
+mod repair;
 mod row;
 mod sharpen;
 pub mod soundness;
@@ -94,5 +96,6 @@ pub use irr::{IrrRun, Limit, Settings, StopReason, Widening, irr, limits};
 pub use method::Method;
 pub use objection::Objection;
 pub use oracle::Oracle;
+pub use repair::{Changeable, Hindrance, Repair, RepairRun, repair};
 pub use row::Row;
 pub use sharpen::sharpen;

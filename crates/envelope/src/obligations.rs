@@ -25,6 +25,7 @@ use crate::linear::Linear;
 use elbowroom_plan::{InstanceId, NodeId, ParameterId, Schedule, StnPlan, Valuation};
 
 pub use over_all::OverAll;
+pub(crate) use separation::interfering_in_order;
 
 /// `to - from <= bound`, or `<` when strict.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! A problem with its table of ground facts and fluents.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use elbowroom_num::Rational;
@@ -7,7 +8,7 @@ use elbowroom_num::Rational;
 use crate::constraint::Constraints;
 use crate::derivation::{Derivation, Rules};
 use crate::domains::Domains;
-use crate::ground::{Condition, FactId, FluentId};
+use crate::ground::{Change, Condition, FactId, FluentId};
 use crate::grounder::Grounder;
 use crate::problem::{self, FunctionId, ObjectId, PredicateId, Problem, SchemaId};
 use crate::state::{State, TimedHappening};
@@ -129,6 +130,45 @@ impl Task {
         let mut problem = (*self.problem).clone();
         problem.goal = goal;
         task.problem = Arc::new(problem);
+        task
+    }
+
+    /// The same task with each timed initial in an entry of its own in [`timed`](Self::timed), so that
+    /// those of one time can be told apart.
+    #[must_use]
+    pub fn with_timed_apart(&self) -> Self {
+        let mut task = self.clone();
+        let apart = self.timed.iter().flat_map(|group| {
+            group.changes.iter().map(|change| TimedHappening {
+                time: group.time.clone(),
+                changes: vec![change.clone()],
+            })
+        });
+        task.timed = apart.collect();
+        task
+    }
+
+    /// The same task with its timed initials at other times, by their position in
+    /// [`timed`](Self::timed), and with other initial values of some fluents. The lifted
+    /// [`problem`](Self::problem) stays as it is.
+    #[must_use]
+    pub fn with_numbers(
+        &self,
+        times: &[Rational],
+        values: impl IntoIterator<Item = (FluentId, Rational)>,
+    ) -> Self {
+        let mut task = self.clone();
+        task.initial.values.extend(values);
+        let mut by_time: BTreeMap<&Rational, Vec<Change>> = BTreeMap::new();
+        for (timed, time) in self.timed.iter().zip(times) {
+            let changes = by_time.entry(time).or_default();
+            changes.extend(timed.changes.iter().cloned());
+        }
+        let groups = by_time.into_iter().map(|(time, changes)| TimedHappening {
+            time: time.clone(),
+            changes,
+        });
+        task.timed = groups.collect();
         task
     }
 

@@ -142,6 +142,38 @@ pub fn deorder(task: &Task, plan: &TimeTriggeredPlan) -> Result<Deordered, Deord
     })
 }
 
+/// A plan in which nothing is ordered yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unordered {
+    /// The plan; its instances are labelled `n0`, `n1`, … in order of their start. Its constraints
+    /// are the times of the timed initials, and the durations that the domain allows; where these
+    /// depend on what changes in the course of the plan, only that they are not negative.
+    pub plan: StnPlan,
+    /// For each step of the original plan, its instance.
+    pub instances: Vec<InstanceId>,
+    /// The times of the original plan, which need not satisfy any constraint.
+    pub times: Schedule,
+}
+
+/// The actions and the timed initials of a plan, valid or not, before any order is read off its
+/// times.
+pub fn unordered(task: &Task, plan: &TimeTriggeredPlan) -> Unordered {
+    let Labelled {
+        mut plan,
+        instances,
+        times,
+    } = labelled(task, plan);
+    let footprints = plan.nodes().map(|(node, _)| plan.footprint(task, node));
+    let footprints: Vec<Footprint> = footprints.collect();
+    let durations = durations::steady(task, &plan, &footprints);
+    plan.constraints.extend(durations);
+    Unordered {
+        plan,
+        instances,
+        times,
+    }
+}
+
 /// A plan without order.
 pub(crate) struct Labelled {
     /// The plan, without constraints.

@@ -95,12 +95,60 @@ pub(crate) struct EnvelopeArgs {
     /// Where to write the picture of --slice or --projection
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
+    /// For a plan that is invalid or has no room: the cheapest change of deadlines, durations and
+    /// bounds with which it works
+    #[arg(long)]
+    pub(crate) repair: bool,
+    /// With --repair: a quantity that may change, named as in --vary, but nothing else; `weight W`
+    /// is what a unit of it costs, `in [LB, UB]` is not left; may be repeated
+    #[arg(long, value_name = "SPEC", requires = "repair")]
+    pub(crate) change: Vec<String>,
+    /// With --repair: a quantity that may not change; may be repeated
+    #[arg(long, value_name = "SPEC", requires = "repair")]
+    pub(crate) keep: Vec<String>,
     /// Print the answer as one JSON document
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 impl EnvelopeArgs {
+    /// Refuses what has nothing to do with repairs.
+    ///
+    /// # Errors
+    /// When something of that kind is asked for.
+    pub(crate) fn check_repair(&self) -> Result<(), Failure> {
+        let others = [
+            ("--method", self.method.is_some()),
+            ("--objective", self.objective.is_some()),
+            ("--symmetric", self.symmetric),
+            ("--cap", self.cap.is_some()),
+            ("--precision", self.precision.is_some()),
+            ("--growth", self.growth.is_some()),
+            ("--sharpen", self.sharpen),
+            ("--contains", self.contains.is_some()),
+            ("--order", self.order.is_some()),
+            ("--enforce", self.enforce),
+            ("--volume", self.volume),
+            ("--slice", self.slice.is_some()),
+            ("--projection", self.projection.is_some()),
+            ("--picture", self.picture.is_some()),
+            ("--controllable", !self.controllable.is_empty()),
+        ];
+        if let Some((flag, _)) = others.iter().find(|(_, given)| *given) {
+            return Err(Failure::new(
+                format!("{flag} is about envelopes, and --repair is about what has to change"),
+                format!("leave out --repair, or {flag}"),
+            ));
+        }
+        if !self.vary.is_empty() {
+            return Err(Failure::new(
+                "--vary says what may deviate, not what may be changed",
+                "use --change, which is written in the same way",
+            ));
+        }
+        Ok(())
+    }
+
     /// Whether the whole region is asked for, and not a box.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! `elbowroom envelope`: how far may each quantity deviate?
 
 mod exact;
+mod repair;
 mod text;
 mod watch;
 
@@ -20,6 +21,9 @@ use watch::Watch;
 
 /// Computes an envelope, or says whether a box is inside.
 pub(crate) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
+    if arguments.repair {
+        return repair::run(arguments, output);
+    }
     if arguments.is_exact()? {
         return exact::run(arguments, output);
     }

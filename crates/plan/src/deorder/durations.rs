@@ -4,19 +4,19 @@
 //! the one that reads it, so its value is the same in all schedules unless it was changed
 //! continuously, or by an amount that itself depends on the schedule.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use elbowroom_model::ground::{
     Body, Change, ContinuousEffect, DurationConstraint, Effect, Expression, FluentId,
 };
 use elbowroom_model::problem::UpdateOperator;
-use elbowroom_model::{State, Task};
+use elbowroom_model::{Footprint, State, Task};
 use elbowroom_num::{End, Interval, Rational};
 
 use super::over_all;
 use crate::durations::allowed;
 use crate::network::Schedule;
-use crate::stn_plan::{Bound, Constraint, InstanceId, Node, NodeId, Reason, StnPlan};
+use crate::stn_plan::{Bound, Constraint, Instance, InstanceId, Node, NodeId, Reason, StnPlan};
 
 /// A constraint for the duration of each durative instance: the domain's bounds, or the original
 /// duration where these depend on the schedule.
@@ -55,6 +55,36 @@ pub(crate) fn constraints(task: &Task, plan: &StnPlan, times: &Schedule) -> Vec<
         .enumerate()
         .filter_map(constraint)
         .collect()
+}
+
+/// A constraint for the duration of each durative instance: the domain's bounds, where these read
+/// nothing that ever changes; else only that it is not negative.
+pub(crate) fn steady(task: &Task, plan: &StnPlan, footprints: &[Footprint]) -> Vec<Constraint> {
+    let mut changing: BTreeSet<FluentId> = BTreeSet::new();
+    for footprint in footprints {
+        changing.extend(footprint.shifts.iter().chain(&footprint.assigns));
+    }
+    let values = &task.initial().values;
+    let mut value = |leaf: &Expression| match leaf {
+        Expression::Fluent(fluent) if !changing.contains(fluent) => values.get(fluent).cloned(),
+        _ => None,
+    };
+    let instances = plan.instances.iter().enumerate();
+    let constraint = |(index, instance): (usize, &Instance)| {
+        let body = instance.action.durative()?;
+        let id = InstanceId::from(index);
+        let (lower, upper) = allowed(&body.duration, &mut value)
+            .and_then(bounds)
+            .unwrap_or((Bound::Finite(Rational::ZERO), Bound::Infinite));
+        Some(Constraint {
+            from: plan.start(id),
+            to: plan.end(id),
+            lower,
+            upper,
+            reason: Reason::Duration(id),
+        })
+    };
+    instances.filter_map(constraint).collect()
 }
 
 /// The interval as bounds, unless an end is open.

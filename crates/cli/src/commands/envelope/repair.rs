@@ -1,0 +1,212 @@
+//! `elbowroom envelope --repair`: what is the least that has to change for the plan to work?
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
+use elbowroom::answers::repair::{Change, RepairFinding, RepairOutcome, RepairRequest, repair};
+use elbowroom::answers::{Halt, RequestError, Watcher};
+use elbowroom::num::Rational;
+use elbowroom::pddl::write_plan;
+
+use super::failure;
+use crate::args::EnvelopeArgs;
+use crate::exit::{Answer, Exit, Failure};
+use crate::input;
+use crate::interrupt::Interrupt;
+use crate::limits::push_wrapped;
+use crate::look::{BAD, GOOD, HINT, Look, STRONG, styled};
+use crate::output::{self, Output};
+use crate::stopwatch::{Stopwatch, duration};
+
+/// So many digits of numbers are printed; `--json` has all.
+const DIGITS: u32 = 6;
+/// So many of the reasons are printed; `--json` has all.
+const REASONS_SHOWN: usize = 8;
+
+/// Prints the cheapest repair.
+pub(super) fn run(arguments: &EnvelopeArgs, output: &mut Output) -> Answer {
+    arguments.check_repair()?;
+    let limit = arguments.time_limit.as_ref().map(duration);
+    let stopwatch = Stopwatch::start(&Interrupt::listen()).until(limit);
+    let task = input::task(&arguments.problem, &arguments.epsilon, output)?;
+    let read = |option: &str, texts: &[String]| {
+        let specs = super::specifications(texts);
+        specs.map_err(|_| named(option, texts))
+    };
+    let request = RepairRequest {
+        name: arguments.plan.display().to_string(),
+        change: read("--change", &arguments.change)?,
+        keep: read("--keep", &arguments.keep)?,
+        guarantee: arguments
+            .guarantee
+            .map_or_else(Default::default, Into::into),
+        ..RepairRequest::new(
+            &Arc::new(task.clone()),
+            input::any_plan(&task, &arguments.plan, output)?,
+        )
+    };
+    let outcome = repair(&request, &mut Watch { stopwatch }).map_err(refused)?;
+    if arguments.json {
+        output.document(&outcome.answer)?;
+    } else {
+        output::print(&text(&outcome, Look::of_stdout()))?;
+    }
+    Ok(match &outcome.answer.finding {
+        RepairFinding::Repaired { .. } => Exit::Yes,
+        RepairFinding::Impossible { .. } => Exit::No,
+        RepairFinding::None { .. } => Exit::Limit,
+    })
+}
+
+/// The failure to read one of the specifications of an option.
+fn named(option: &str, texts: &[String]) -> Failure {
+    let mut failures = texts.iter().filter_map(|text| {
+        let error = text
+            .parse::<elbowroom::plan::parametrize::VarySpec>()
+            .err()?;
+        Some(error.to_string().replace("--vary", option))
+    });
+    Failure::new(failures.next().unwrap_or_default(), "")
+}
+
+/// What is said of quantities that are opened is said of these options here.
+fn refused(error: RequestError) -> Failure {
+    match error {
+        RequestError::Flow(error) => {
+            let message = error.to_string();
+            Failure::new(message.replace("`--vary ", "`--change/--keep "), "")
+        }
+        error => failure(error),
+    }
+}
+
+/// Obeys the clock and Ctrl-C.
+struct Watch {
+    stopwatch: Stopwatch,
+}
+
+impl Watcher for Watch {
+    fn elapsed(&mut self) -> Duration {
+        self.stopwatch.elapsed()
+    }
+
+    fn flow(&mut self) -> ControlFlow<Halt> {
+        self.stopwatch.flow()
+    }
+}
+
+fn text(outcome: &RepairOutcome, look: Look) -> String {
+    let file = &outcome.answer.plan;
+    let mut text = String::new();
+    let mut say = |words: &str, indent: usize| push_wrapped(&mut text, words, indent, look.width);
+    match &outcome.answer.finding {
+        RepairFinding::Impossible { because } => {
+            let no = styled(BAD, "no repair");
+            say(
+                &format!("{no}: nothing that may change makes {file} work"),
+                0,
+            );
+            for reason in because.iter().take(REASONS_SHOWN) {
+                say(reason, 2);
+            }
+        }
+        RepairFinding::None { reason, bound } => {
+            let unknown = styled(HINT, "not known");
+            say(&format!("{unknown}: {file}"), 0);
+            let bound = bound.to_decimal(DIGITS);
+            say(&format!("{reason}; no repair costs less than {bound}."), 2);
+        }
+        RepairFinding::Repaired {
+            changes,
+            cost,
+            bound,
+            because,
+            keeps,
+            not_guaranteed,
+            ..
+        } => {
+            let works = styled(GOOD, "repaired");
+            match (&changes[..], &keeps[..]) {
+                ([], []) => say(
+                    &format!("{works}: {file} works, and nothing has to change"),
+                    0,
+                ),
+                ([], _) => say(
+                    &format!(
+                        "{works}: {file} works within bounds of its own, and nothing else has to change"
+                    ),
+                    0,
+                ),
+                _ => say(&format!("{works}: {file} works with"), 0),
+            }
+            for change in changes {
+                say(&changed(change), 2);
+            }
+            if !changes.is_empty() {
+                say(&nothing_cheaper(cost, bound), 0);
+            }
+            section(
+                &mut text,
+                "What makes that necessary",
+                because,
+                changes,
+                look,
+            );
+            section(&mut text, "Bounds to keep to", keeps, &[()], look);
+            if let Some(why_not) = not_guaranteed {
+                let words =
+                    format!("The plan is valid at these times, but not guaranteed: {why_not}");
+                push_wrapped(&mut text, &words, 0, look.width);
+            }
+            if let Some((task, plan)) = &outcome.repaired {
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "\n{}",
+                    styled(STRONG, "The plan, as the judge accepted it")
+                );
+                for line in write_plan(task, plan).lines() {
+                    let _ = writeln!(text, "  {line}");
+                }
+            }
+        }
+    }
+    text
+}
+
+/// `deadline of (open shop): 120 instead of 100`.
+fn changed(change: &Change) -> String {
+    format!(
+        "{}: {} instead of {}",
+        change.quantity,
+        change.to.to_decimal(DIGITS),
+        change.from.to_decimal(DIGITS)
+    )
+}
+
+fn nothing_cheaper(cost: &Rational, bound: &Rational) -> String {
+    let costs = bound.to_decimal(DIGITS);
+    if cost == bound {
+        format!("Nothing cheaper makes it work (cost {costs}).")
+    } else {
+        format!("Whatever makes it work costs more than {costs}, by as little as one likes.")
+    }
+}
+
+/// A list with a headline, unless there is nothing to list, or nothing it is about.
+fn section<T>(text: &mut String, headline: &str, items: &[String], about: &[T], look: Look) {
+    if items.is_empty() || about.is_empty() {
+        return;
+    }
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "\n{}", styled(STRONG, headline));
+    for item in items.iter().take(REASONS_SHOWN) {
+        push_wrapped(text, item, 2, look.width);
+    }
+    if items.len() > REASONS_SHOWN {
+        let more = format!("and {} more (--json)", items.len() - REASONS_SHOWN);
+        push_wrapped(text, &more, 2, look.width);
+    }
+}

@@ -1,0 +1,353 @@
+//! What is the least that has to change for a plan to work?
+
+mod subject;
+mod words;
+
+use std::sync::Arc;
+
+use elbowroom_envelope::obligations::Refusal;
+use elbowroom_envelope::{Guarantee, Oracle, RepairRun, enforced, repair as cheapest};
+use elbowroom_model::{Task, TimeTriggeredPlan};
+use elbowroom_num::{Interval, Rational};
+use elbowroom_plan::parametrize::VarySpec;
+use elbowroom_plan::{Constraint, DecoupledEnvelope, ParametrizedPlan, Schedule, Valuation};
+use serde::{Deserialize, Serialize};
+
+use super::plan::PlanStep;
+use super::{Exact, Halt, RequestError, Version, Watcher, exact};
+use crate::flow::{self, FlowError};
+use crate::{AnyPlan, room};
+use subject::Subject;
+
+/// Asks for the cheapest change with which a plan works.
+#[derive(Clone, Debug)]
+pub struct RepairRequest {
+    /// The problem.
+    pub task: Arc<Task>,
+    /// The plan, valid or not.
+    pub plan: AnyPlan,
+    /// The name of the plan in the answer, such as its file.
+    pub name: String,
+    /// What may change; its weight is what a unit of it costs, its range is not left. If empty:
+    /// fixed durations, durations beyond what the domain allows (weight 2), times of timed initials,
+    /// and the parameters and bounds of an STN plan file (weight 1, bounds from below 10).
+    pub change: Vec<VarySpec>,
+    /// What may not change, of that.
+    pub keep: Vec<VarySpec>,
+    /// The guarantee that the repaired plan is to have at its nominal values.
+    pub guarantee: Guarantee,
+}
+
+impl RepairRequest {
+    /// The cheapest repair of a plan, where everything may change that may by default.
+    pub fn new(task: &Arc<Task>, plan: impl Into<AnyPlan>) -> Self {
+        Self {
+            task: Arc::clone(task),
+            plan: plan.into(),
+            name: String::new(),
+            change: Vec::new(),
+            keep: Vec::new(),
+            guarantee: Guarantee::default(),
+        }
+    }
+}
+
+/// The answer, and what it is about.
+#[derive(Clone, Debug)]
+pub struct RepairOutcome {
+    /// The answer as a document (`docs/formats/repair-json.md`).
+    pub answer: RepairAnswer,
+    /// The changed problem and the plan with times for it, which the judge accepts; `None` without
+    /// a repair.
+    pub repaired: Option<(Task, TimeTriggeredPlan)>,
+}
+
+/// The cheapest change with which a plan works: `docs/formats/repair-json.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RepairAnswer {
+    /// Always the same.
+    pub format: RepairFormat,
+    /// Always the same.
+    pub version: Version,
+    /// The domain's name.
+    pub domain: String,
+    /// The problem's name.
+    pub problem: String,
+    /// The name of the plan, as the request gives it.
+    pub plan: String,
+    /// The least separation of interfering happenings (ε).
+    #[serde(with = "exact")]
+    pub epsilon: Rational,
+    /// The guarantee that was asked for.
+    pub guarantee: Guarantee,
+    /// The answer itself.
+    #[serde(flatten)]
+    pub finding: RepairFinding,
+}
+
+/// The name of the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RepairFormat {
+    /// The only one.
+    #[default]
+    #[serde(rename = "elbowroom-repair")]
+    Repair,
+}
+
+/// The result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "answer", rename_all = "lowercase")]
+pub enum RepairFinding {
+    /// The plan works after these changes, and after none that cost less.
+    Repaired {
+        /// What changes; empty if it is enough to take other times for the actions.
+        changes: Vec<Change>,
+        /// What the changes cost: the sum of weight times deviation.
+        #[serde(with = "exact")]
+        cost: Rational,
+        /// No repair costs less than this: the cost, or what it comes arbitrarily near to.
+        #[serde(with = "exact")]
+        bound: Rational,
+        /// What makes the repair cost so much, in words.
+        because: Vec<String>,
+        /// Bounds that an STN plan has to be given as well, because some of its schedules are not
+        /// valid; they cost nothing.
+        keeps: Vec<String>,
+        /// Why the repaired plan, which is valid, does not have the guarantee that was asked for;
+        /// `None` if it has.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        not_guaranteed: Option<String>,
+        /// The plan with its times, as the judge accepted it.
+        steps: Vec<PlanStep>,
+        /// How many linear programs were solved; none if nothing had to change.
+        cases: usize,
+    },
+    /// Nothing that may change makes the plan work.
+    Impossible {
+        /// What stands in the way, in words.
+        because: Vec<String>,
+    },
+    /// Not known.
+    None {
+        /// What stood against it.
+        reason: String,
+        /// No repair costs less than this.
+        #[serde(with = "exact")]
+        bound: Rational,
+    },
+}
+
+/// A quantity that changes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    /// The quantity, in words.
+    pub quantity: String,
+    /// Its value, or of those that it may have, the nearest.
+    #[serde(with = "exact")]
+    pub from: Rational,
+    /// Its new value.
+    #[serde(with = "exact")]
+    pub to: Rational,
+    /// What each unit of the change costs.
+    #[serde(with = "exact")]
+    pub weight: Rational,
+}
+
+/// Finds the cheapest change with which a plan works.
+///
+/// The answer says in which order happenings stay: that of the plan, where its actions interfere;
+/// timed initials may come before or after them, as it fits. The repair is checked: the judge accepts
+/// the plan for the changed problem, and the box check its values.
+///
+/// # Errors
+/// When the request names what the plan does not have, or the plan is beyond exact analysis.
+pub fn repair(
+    request: &RepairRequest,
+    watcher: &mut dyn Watcher,
+) -> Result<RepairOutcome, RequestError> {
+    if let AnyPlan::TimeTriggered(plan) = &request.plan
+        && flow::judge(&request.task, plan).is_valid()
+    {
+        return Ok(as_it_stands(request, plan));
+    }
+    let subject = Subject::new(request)?;
+    let mut halt = None;
+    let mut judged = |values: &Valuation, schedule: &Schedule| {
+        let (task, plan) = subject.repaired(values, schedule);
+        flow::judge(&task, &plan).is_valid()
+    };
+    let mut go_on = || watcher.flow().map_break(|why| halt = Some(why));
+    let run = cheapest(
+        &subject.task,
+        &subject.plan,
+        subject.times.as_ref(),
+        &subject.changeable,
+        &mut judged,
+        &mut go_on,
+    );
+    let run = run.map_err(FlowError::Refused)?;
+    let mut repaired = None;
+    let finding = match run {
+        RepairRun::Repaired { repair, cases } => {
+            let (task, plan) = subject.repaired(&repair.values, &repair.schedule);
+            let promise = match &subject.times {
+                Some(_) => promised(request, &task, &plan),
+                None => subject.kept(request, &repair.values, &repair.schedule),
+            };
+            let finding = RepairFinding::Repaired {
+                changes: subject.changes(&repair.values),
+                because: subject.because(&repair),
+                cost: repair.cost,
+                bound: repair.bound,
+                keeps: promise.keeps,
+                not_guaranteed: promise.why_not,
+                steps: steps(&plan),
+                cases,
+            };
+            repaired = Some((task, plan));
+            finding
+        }
+        RepairRun::Impossible { because } => RepairFinding::Impossible {
+            because: subject.hindrances(&because),
+        },
+        RepairRun::Unexplained { values, schedule } => {
+            let (task, plan) = subject.repaired(&values, &schedule);
+            let why = match flow::judge(&task, &plan) {
+                elbowroom_model::Verdict::Invalid(violation) => violation.to_string(),
+                _ => "the judge does not accept the plan".to_owned(),
+            };
+            RepairFinding::Impossible {
+                because: vec![format!("{why}; repairs do not heed this")],
+            }
+        }
+        RepairRun::Stopped { bound, .. } => RepairFinding::None {
+            reason: match halt {
+                Some(Halt::TimeLimit) => "the time limit was reached".to_owned(),
+                Some(Halt::Cancelled) => "it was cancelled".to_owned(),
+                None => "there are too many cases to tell apart".to_owned(),
+            },
+            bound,
+        },
+    };
+    Ok(outcome(request, finding, repaired))
+}
+
+/// A valid plan needs no other times.
+fn as_it_stands(request: &RepairRequest, plan: &TimeTriggeredPlan) -> RepairOutcome {
+    let promise = promised(request, &request.task, plan);
+    let finding = RepairFinding::Repaired {
+        changes: Vec::new(),
+        cost: Rational::ZERO,
+        bound: Rational::ZERO,
+        because: Vec::new(),
+        keeps: Vec::new(),
+        not_guaranteed: promise.why_not,
+        steps: steps(plan),
+        cases: 0,
+    };
+    let repaired = ((*request.task).clone(), plan.clone());
+    outcome(request, finding, Some(repaired))
+}
+
+fn outcome(
+    request: &RepairRequest,
+    finding: RepairFinding,
+    repaired: Option<(Task, TimeTriggeredPlan)>,
+) -> RepairOutcome {
+    RepairOutcome {
+        answer: RepairAnswer {
+            format: RepairFormat::Repair,
+            version: Version,
+            domain: request.task.problem().domain.clone(),
+            problem: request.task.problem().name.clone(),
+            plan: request.name.clone(),
+            epsilon: request.task.epsilon().clone(),
+            guarantee: request.guarantee,
+            finding,
+        },
+        repaired,
+    }
+}
+
+/// What a repaired plan is guaranteed to do, and by which bounds.
+#[derive(Default)]
+struct Promise {
+    keeps: Vec<String>,
+    why_not: Option<String>,
+}
+
+/// Whether the plan, freed of its times, works at the nominal values.
+fn promised(request: &RepairRequest, task: &Task, plan: &TimeTriggeredPlan) -> Promise {
+    let task = Arc::new(task.clone());
+    let opened = flow::free(&task, plan).and_then(|freed| flow::open(&task, freed, &[]));
+    let why_not = match opened {
+        Ok(opened) => objected(&task, &Arc::new(opened), request.guarantee),
+        Err(error) => Some(error.to_string()),
+    };
+    Promise {
+        why_not,
+        ..Promise::default()
+    }
+}
+
+/// What stands against the plan's nominal values.
+fn objected(
+    task: &Arc<Task>,
+    plan: &Arc<ParametrizedPlan>,
+    guarantee: Guarantee,
+) -> Option<String> {
+    let point = DecoupledEnvelope::point(&plan.nominal());
+    let oracle = Oracle::new(task, plan, guarantee);
+    let objection = oracle.and_then(|mut oracle| oracle.objection(&point));
+    match objection {
+        Ok(None) => None,
+        Ok(Some(objection)) => Some(objection.to_string()),
+        Err(refusal) => Some(refusal.to_string()),
+    }
+}
+
+impl Subject {
+    /// Whether an STN plan works with these values, and which bounds it needs for that.
+    fn kept(&self, request: &RepairRequest, values: &Valuation, schedule: &Schedule) -> Promise {
+        let mut plan = self.plan.clone();
+        let own = plan.parameters.iter_mut().zip(values).enumerate();
+        for (index, (parameter, value)) in own {
+            parameter.nominal = value.clone();
+            if index >= self.given {
+                // What the repair opened does not vary any more.
+                parameter.range = Interval::point(value.clone());
+            }
+        }
+        let task = Arc::new(self.task.clone());
+        let objected =
+            |plan: &ParametrizedPlan| objected(&task, &Arc::new(plan.clone()), request.guarantee);
+        let Some(why_not) = objected(&plan) else {
+            return Promise::default();
+        };
+        let bounded = enforced(&task, &plan).map(|(plan, _)| plan);
+        let pinned = || Ok::<_, Refusal>(room::sound(&task, &plan, schedule));
+        let bounded = bounded.into_iter().chain(pinned());
+        let mut works = bounded.filter(|bounded| objected(bounded).is_none());
+        let Some(bounded) = works.next() else {
+            return Promise {
+                why_not: Some(why_not),
+                ..Promise::default()
+            };
+        };
+        let is_new = |own: &&Constraint| !plan.plan.constraints.contains(own);
+        let new = bounded.plan.constraints.iter().filter(is_new);
+        Promise {
+            keeps: new.filter_map(|own| self.bound(own)).collect(),
+            why_not: None,
+        }
+    }
+}
+
+fn steps(plan: &TimeTriggeredPlan) -> Vec<PlanStep> {
+    let steps = plan.steps.iter().map(|step| PlanStep {
+        start: Exact(step.start.clone()),
+        action: step.action.name.clone(),
+        duration: step.duration.clone().map(Exact),
+    });
+    steps.collect()
+}

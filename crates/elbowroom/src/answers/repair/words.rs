@@ -1,0 +1,158 @@
+//! A repair in words.
+
+use elbowroom_envelope::obligations::Requirement;
+use elbowroom_envelope::{Hindrance, Repair};
+use elbowroom_model::ground::{Change as Effect, Condition};
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Constraint, Node, NodeId, ParameterId, Side, Valuation};
+
+use super::Change;
+use super::subject::Subject;
+use crate::explain::Explainer;
+
+/// So many digits of numbers in words.
+const DIGITS: u32 = 6;
+
+impl Subject {
+    fn explainer(&self) -> Explainer<'_> {
+        Explainer::new(&self.task, &self.plan)
+    }
+
+    /// The quantities that cost something at these values.
+    pub(super) fn changes(&self, values: &Valuation) -> Vec<Change> {
+        let changes = self.changeable.iter().filter_map(|own| {
+            let to = &values[own.parameter];
+            let below = own.free.lower.value().filter(|least| to < *least);
+            let above = own.free.upper.value().filter(|most| to > *most);
+            let from = below.or(above)?;
+            Some(Change {
+                quantity: self.quantity(own.parameter),
+                from: from.clone(),
+                to: to.clone(),
+                weight: own.weight.clone(),
+            })
+        });
+        changes.collect()
+    }
+
+    fn quantity(&self, id: ParameterId) -> String {
+        let bound = self.bounds.iter().find(|(own, _)| *own == id);
+        bound.map_or_else(|| self.explainer().quantity(id), |(_, words)| words.clone())
+    }
+
+    /// What makes the repair cost so much.
+    pub(super) fn because(&self, repair: &Repair) -> Vec<String> {
+        let hindrances = repair.because.iter().map(|(hindrance, _)| hindrance);
+        let mut words: Vec<String> = Vec::new();
+        for hindrance in hindrances.filter(|own| !matches!(own, Hindrance::Range(_))) {
+            if let Some(own) = self.hindrance(hindrance)
+                && !words.contains(&own)
+            {
+                words.push(own);
+            }
+        }
+        words
+    }
+
+    /// What stands in the way of any repair.
+    pub(super) fn hindrances(&self, hindrances: &[Hindrance]) -> Vec<String> {
+        let mut words: Vec<String> = Vec::new();
+        for hindrance in hindrances {
+            let own = match hindrance {
+                Hindrance::Requirement(requirement) => Some(self.missing(requirement)),
+                other => self.hindrance(other),
+            };
+            if let Some(own) = own.filter(|own| !words.contains(own)) {
+                words.push(own);
+            }
+        }
+        words
+    }
+
+    /// A requirement that cannot be met; of a fact, whether anything makes it so.
+    fn missing(&self, requirement: &Requirement) -> String {
+        let words = self.explainer().requirement(requirement);
+        let (Requirement::Condition { condition, .. }
+        | Requirement::OverAll { condition, .. }
+        | Requirement::Goal { condition }) = requirement
+        else {
+            return words;
+        };
+        let Condition::Fact(fact) = condition else {
+            return words;
+        };
+        let nodes = self.plan.plan.nodes();
+        let mut added = nodes.map(|(node, _)| self.plan.plan.footprint(&self.task, node).adds);
+        let is_made = added.any(|adds| adds.contains(fact));
+        let is_so = self.task.initial().facts.contains(fact);
+        if is_made || is_so || self.task.is_derived(*fact) {
+            format!("{words}, which is not so there in the order of the plan")
+        } else {
+            format!("{words}, which nothing in the plan makes true")
+        }
+    }
+
+    fn hindrance(&self, hindrance: &Hindrance) -> Option<String> {
+        let explainer = self.explainer();
+        match hindrance {
+            Hindrance::Beginning => None,
+            Hindrance::Range(id) => Some(format!("range of the {}", self.quantity(*id))),
+            Hindrance::Requirement(requirement) => Some(explainer.requirement(requirement)),
+            Hindrance::Order(first, second) => {
+                let requirement = Requirement::Separation {
+                    first: *first,
+                    second: *second,
+                };
+                Some(explainer.requirement(&requirement))
+            }
+            Hindrance::Bound(index, side) => {
+                let constraint = &self.plan.plan.constraints[*index];
+                match self.plan.plan.nodes[constraint.to.index()] {
+                    Node::Timed(timed) => {
+                        let time = self.task.timed()[timed].time.to_decimal(DIGITS);
+                        Some(match self.task.timed()[timed].changes.as_slice() {
+                            [Effect::Delete(fact)] => {
+                                format!("deadline of {} at {time}", self.task.fact_name(*fact))
+                            }
+                            _ => format!("timed initials at {time}"),
+                        })
+                    }
+                    _ => explainer.bound_words(constraint, *side),
+                }
+            }
+        }
+    }
+
+    /// A bound that an STN plan did not have, in words.
+    pub(super) fn bound(&self, constraint: &Constraint) -> Option<String> {
+        let values = self.plan.nominal();
+        let side = |bound: &Bound, side: Side| {
+            let value: Rational = bound.at(&values)?;
+            let words = self.bound_words(constraint.from, constraint.to, side);
+            Some(format!("{words}: {}", value.to_decimal(DIGITS)))
+        };
+        let sides = [
+            side(&constraint.lower, Side::Lower),
+            side(&constraint.upper, Side::Upper),
+        ];
+        let sides: Vec<String> = sides.into_iter().flatten().collect();
+        (!sides.is_empty()).then(|| sides.join(", "))
+    }
+
+    /// A bound of a constraint, in words.
+    pub(super) fn bound_words(&self, from: NodeId, to: NodeId, side: Side) -> String {
+        let words = |node: NodeId| self.plan.plan.node_words(&self.task, node);
+        let extreme = match side {
+            Side::Lower => "least",
+            Side::Upper => "most",
+        };
+        if from == NodeId::ZERO {
+            let extreme = match side {
+                Side::Lower => "earliest",
+                Side::Upper => "latest",
+            };
+            return format!("{extreme} {}", words(to));
+        }
+        format!("{extreme} time from {} to {}", words(from), words(to))
+    }
+}

@@ -1,0 +1,201 @@
+//! What is wrong with a schedule, and what could be otherwise.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::Task;
+use elbowroom_model::ground::{Condition, FactId};
+use elbowroom_num::Rational;
+use elbowroom_plan::{NodeId, ParametrizedPlan, Schedule, Valuation};
+
+use super::Hindrance;
+use super::moment;
+use super::orders::{Orders, read_by};
+use crate::linear::Linear;
+use crate::obligations::{
+    BadCase, Difference, Obligation, Obligations, OverAll, Refusal, Requirement, Substitution,
+};
+
+/// `expression <= 0`, or `< 0` when strict, and what asks for it.
+pub(super) type Alternative = (Linear, bool, Hindrance);
+
+/// What is wrong with a schedule.
+pub(super) enum Flaw {
+    /// Nothing that an obligation stands for.
+    None,
+    /// This cannot be met while happenings keep their order.
+    Hopeless(Requirement),
+    /// One of these holds in every valid schedule of the case.
+    Cases {
+        alternatives: Vec<Alternative>,
+        /// The pair whose order is the question, if it is one.
+        decides: Option<(NodeId, NodeId)>,
+    },
+}
+
+/// Finds flaws of one plan's schedules.
+pub(super) struct Finder<'a> {
+    pub(super) task: &'a Task,
+    pub(super) plan: &'a ParametrizedPlan,
+    pub(super) orders: &'a Orders,
+    pub(super) substitution: &'a Substitution,
+}
+
+impl Finder<'_> {
+    /// A flaw of the schedule, in a case that decides the order of some happenings.
+    ///
+    /// # Errors
+    /// When something is beyond linear reasoning in the order of this schedule.
+    pub(super) fn find(
+        &self,
+        values: &Valuation,
+        schedule: &Schedule,
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Result<Flaw, Refusal> {
+        let compiled = Obligations::compile(self.task, self.plan, schedule, self.substitution)?;
+        // As long as separations are broken, the others go by an order that there may not be.
+        for obligation in &compiled.direct {
+            if let Some(case) = broken(obligation, values, schedule) {
+                return Ok(self.flaw(obligation, case, decided));
+            }
+        }
+        for over_all in &compiled.over_all {
+            if let Some(flaw) = self.broken_throughout(over_all, values, schedule, decided)? {
+                return Ok(flaw);
+            }
+        }
+        Ok(Flaw::None)
+    }
+
+    fn flaw(
+        &self,
+        obligation: &Obligation,
+        case: &BadCase,
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Flaw {
+        let requirement = &obligation.requirement;
+        if let Some(flaw) = self.order_of(requirement, decided) {
+            return flaw;
+        }
+        let hindrance = || Hindrance::Requirement(requirement.clone());
+        let differences = case.differences.iter().map(|difference| {
+            let Difference {
+                from,
+                to,
+                bound,
+                is_strict,
+            } = difference;
+            // `to - from` is not below the bound.
+            let mut expression = Linear::difference(*to, *from);
+            expression.constant = bound.clone();
+            (expression, !is_strict, hindrance())
+        });
+        let inequalities = case.inequalities.iter().map(|inequality| {
+            let negated = inequality.expression.scaled(&Rational::from(-1));
+            (negated, !inequality.is_strict, hindrance())
+        });
+        let alternatives: Vec<Alternative> = differences.chain(inequalities).collect();
+        if alternatives.is_empty() {
+            return Flaw::Hopeless(requirement.clone());
+        }
+        Flaw::Cases {
+            alternatives,
+            decides: None,
+        }
+    }
+
+    /// The next question about the order of happenings that a requirement depends on.
+    fn order_of(
+        &self,
+        requirement: &Requirement,
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Option<Flaw> {
+        let epsilon = self.task.epsilon();
+        let pair = if let Requirement::Separation { first, second } = requirement {
+            self.orders.pair(*first, *second, decided)?
+        } else {
+            let (facts, numbers, anchors) = self.reads(requirement);
+            self.orders.undecided(&facts, numbers, &anchors, decided)?
+        };
+        let alternative = |first: NodeId, second: NodeId| {
+            let mut expression = Linear::difference(second, first);
+            expression.constant = epsilon.clone();
+            (expression, false, Hindrance::Order(first, second))
+        };
+        Some(Flaw::Cases {
+            alternatives: vec![alternative(pair.0, pair.1), alternative(pair.1, pair.0)],
+            decides: Some(pair),
+        })
+    }
+
+    /// The facts that a requirement depends on, whether it depends on numbers, and the happenings
+    /// at which it reads them.
+    fn reads(&self, requirement: &Requirement) -> (BTreeSet<FactId>, bool, Vec<NodeId>) {
+        let of = |condition: &Condition, anchors: Vec<NodeId>| {
+            let (facts, numbers) = read_by(self.task, condition);
+            (facts, numbers, anchors)
+        };
+        let plan = &self.plan.plan;
+        match requirement {
+            Requirement::Condition { node, condition } => of(condition, vec![*node]),
+            Requirement::OverAll {
+                instance,
+                condition,
+            } => of(condition, vec![plan.start(*instance), plan.end(*instance)]),
+            Requirement::Goal { condition } => of(condition, Vec::new()),
+            Requirement::Duration { instance, .. } => {
+                let anchors = vec![plan.start(*instance), plan.end(*instance)];
+                (BTreeSet::new(), true, anchors)
+            }
+            Requirement::Defined { node } | Requirement::OneUpdate { node, .. } => {
+                (BTreeSet::new(), true, vec![*node])
+            }
+            Requirement::Separation { first, second } => {
+                (BTreeSet::new(), false, vec![*first, *second])
+            }
+        }
+    }
+
+    fn broken_throughout(
+        &self,
+        over_all: &OverAll,
+        values: &Valuation,
+        schedule: &Schedule,
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Result<Option<Flaw>, Refusal> {
+        let Some(found) = moment::broken(self.task, &self.plan.plan, over_all, values, schedule)?
+        else {
+            return Ok(None);
+        };
+        let requirement = Requirement::OverAll {
+            instance: over_all.instance,
+            condition: over_all.condition.clone(),
+        };
+        if let Some(flaw) = self.order_of(&requirement, decided) {
+            return Ok(Some(flaw));
+        }
+        let hindrance = || Hindrance::Requirement(requirement.clone());
+        let alternatives = found.into_iter();
+        Ok(Some(Flaw::Cases {
+            alternatives: alternatives
+                .map(|(expression, is_strict)| (expression, is_strict, hindrance()))
+                .collect(),
+            decides: None,
+        }))
+    }
+}
+
+/// The bad case that holds in the schedule, if one does.
+fn broken<'a>(
+    obligation: &'a Obligation,
+    values: &Valuation,
+    schedule: &Schedule,
+) -> Option<&'a BadCase> {
+    obligation.bad_cases.iter().find(|case| {
+        let differences = case.differences.iter().all(|own| {
+            let difference = &schedule[own.to] - &schedule[own.from];
+            difference < own.bound || (difference == own.bound && !own.is_strict)
+        });
+        let mut inequalities = case.inequalities.iter();
+        differences && inequalities.all(|own| own.holds(schedule, values))
+    })
+}

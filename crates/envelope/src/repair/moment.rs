@@ -1,0 +1,165 @@
+//! Conditions that have to hold at every moment inside an action.
+
+use elbowroom_model::Task;
+use elbowroom_num::Rational;
+use elbowroom_plan::{NodeId, Schedule, StnPlan, Valuation};
+
+use crate::linear::{Factor, Linear};
+use crate::obligations::{Inequality, OverAll, Refusal};
+
+/// What could be otherwise so that the condition is not broken where it is in this schedule: of
+/// these (`<= 0`, or `< 0` when strict), one holds in every valid schedule. `None` if it is not
+/// broken.
+///
+/// Between two of the events that the condition depends on, what breaks it is linear in the moment.
+/// So it holds between them exactly if it does on the way to both. Where it fails at one of them, either that changes,
+/// or this is not the last event before the moment, or the first one after it, any longer.
+///
+/// # Errors
+/// When a value is not linear, or what breaks the condition has several parts.
+pub(super) fn broken(
+    task: &Task,
+    plan: &StnPlan,
+    over_all: &OverAll,
+    values: &Valuation,
+    schedule: &Schedule,
+) -> Result<Option<Vec<(Linear, bool)>>, Refusal> {
+    let (start, end) = (over_all.start, over_all.end);
+    let is_inside =
+        |node: &NodeId| schedule[start] < schedule[*node] && schedule[*node] < schedule[end];
+    let inside = over_all.events.iter().copied().filter(is_inside);
+    let mut turns: Vec<NodeId> = inside.collect();
+    turns.extend([start, end]);
+    turns.sort_by(|a, b| schedule[*a].cmp(&schedule[*b]));
+    turns.dedup_by(|a, b| schedule[*a] == schedule[*b]);
+    if !over_all
+        .assumptions
+        .iter()
+        .all(|own| own.holds(schedule, values))
+    {
+        return Ok(None);
+    }
+    for pair in turns.windows(2) {
+        let (since, until) = (pair[0], pair[1]);
+        let has_happened = |node: NodeId| schedule[node] <= schedule[since];
+        for case in over_all.cases(task, plan, &has_happened)? {
+            if !holds_between(&case, over_all.moment, [since, until], values, schedule) {
+                continue;
+            }
+            if !over_all.assumptions.is_empty() {
+                return Err(several_parts(plan, over_all));
+            }
+            let is_before = |node: NodeId| schedule[node] <= schedule[since];
+            let Some(inequality) = case.first() else {
+                return Ok(Some(others(over_all, is_before, since, true)));
+            };
+            let ends = [(since, true), (until, false)]
+                .into_iter()
+                .map(|(at, is_first)| {
+                    let expression = read_at(&inequality.expression, over_all.moment, at);
+                    (at, is_first, expression)
+                });
+            let mut failing =
+                ends.filter(|(_, _, expression)| expression.value(schedule, values).is_negative());
+            // Where it is not below zero at either end, it is zero throughout, and must not be.
+            let (Some((at, is_first, expression)), [_]) = (failing.next(), case.as_slice()) else {
+                return Err(several_parts(plan, over_all));
+            };
+            let mut alternatives = vec![(expression.scaled(&Rational::from(-1)), false)];
+            alternatives.extend(others(over_all, is_before, at, is_first));
+            return Ok(Some(alternatives));
+        }
+    }
+    Ok(None)
+}
+
+fn several_parts(plan: &StnPlan, over_all: &OverAll) -> Refusal {
+    Refusal::TooManyCases {
+        place: format!(
+            "a condition throughout {} that can fail in several ways at once",
+            plan.instance(over_all.instance).action.name
+        ),
+        limit: 1,
+    }
+}
+
+/// That something else than `at` is the last event before the moment (`is_first`), or the first one
+/// after it, or that there is no moment between these events at all.
+fn others(
+    over_all: &OverAll,
+    is_before: impl Fn(NodeId) -> bool,
+    at: NodeId,
+    is_first: bool,
+) -> Vec<(Linear, bool)> {
+    let nodes = over_all.events.iter().copied();
+    let nodes = nodes.chain([over_all.start, over_all.end]);
+    let others = nodes.filter(|&node| node != at).map(|node| {
+        // What falls together with `at` changes nothing.
+        if is_before(node) {
+            (Linear::difference(node, at), is_first)
+        } else {
+            (Linear::difference(at, node), !is_first)
+        }
+    });
+    others.collect()
+}
+
+/// The expression at a moment that falls together with a node.
+fn read_at(expression: &Linear, moment: NodeId, at: NodeId) -> Linear {
+    let mut read = expression.clone();
+    if let Some(factor) = read.times.remove(&moment) {
+        read.add_time(at, &factor);
+    }
+    let products: Vec<_> = read.products.keys().copied().collect();
+    for (parameter, factor) in products {
+        if factor == Factor::Time(moment)
+            && let Some(amount) = read.products.remove(&(parameter, factor))
+        {
+            let mut moved = Linear::default();
+            if at != NodeId::ZERO {
+                moved.products.insert((parameter, Factor::Time(at)), amount);
+            }
+            read.add_scaled(&moved, &Rational::ONE);
+        }
+    }
+    read
+}
+
+/// Whether all inequalities hold at one moment strictly between two times.
+fn holds_between(
+    case: &[Inequality],
+    moment: NodeId,
+    between: [NodeId; 2],
+    values: &Valuation,
+    schedule: &Schedule,
+) -> bool {
+    let [since, until] = between.map(|node| &schedule[node]);
+    // The moments at which all of them hold, and whether the ends of that interval are left out.
+    let (mut least, mut most) = ((since.clone(), true), (until.clone(), true));
+    for inequality in case {
+        let at =
+            |node: NodeId| read_at(&inequality.expression, moment, node).value(schedule, values);
+        let (first, last) = (at(between[0]), at(between[1]));
+        let slope = (&last - &first) / (until - since);
+        let is_strict = inequality.is_strict;
+        if slope.is_zero() {
+            if first.is_positive() || (first.is_zero() && is_strict) {
+                return false;
+            }
+            continue;
+        }
+        let root = since - &(&first / &slope);
+        if slope.is_positive() {
+            if root < most.0 {
+                most = (root, is_strict);
+            } else if root == most.0 {
+                most.1 |= is_strict;
+            }
+        } else if root > least.0 {
+            least = (root, is_strict);
+        } else if root == least.0 {
+            least.1 |= is_strict;
+        }
+    }
+    least.0 < most.0 || (least.0 == most.0 && !least.1 && !most.1)
+}

@@ -1,0 +1,203 @@
+//! Which happenings keep their order, and which may change it.
+
+use std::collections::BTreeSet;
+
+use elbowroom_model::ground::{Body, Effect, FactId, FluentId};
+use elbowroom_model::{Footprint, Task};
+use elbowroom_num::Rational;
+use elbowroom_plan::{Bound, Node, NodeId, ParametrizedPlan, Schedule, StnPlan};
+
+use crate::obligations::interfering_in_order;
+
+/// What a plan says of the order of its happenings.
+pub(super) struct Orders {
+    /// Interfering actions, the earlier first, that keep their order.
+    pub(super) kept: Vec<(NodeId, NodeId)>,
+    /// By node.
+    pub(super) footprints: Vec<Footprint>,
+    /// For each node those that come before it, or with it, whatever changes.
+    before: Vec<BTreeSet<NodeId>>,
+    /// Whether effects have conditions, so that what one happening changes can depend on all others.
+    pub(super) is_conditional: bool,
+}
+
+impl Orders {
+    pub(super) fn new(task: &Task, plan: &ParametrizedPlan, order: Option<&Schedule>) -> Self {
+        let nodes = || plan.plan.nodes().map(|(node, _)| node);
+        let kept = order.map(|times| {
+            let in_order = actions_in_order(&plan.plan, times);
+            interfering_in_order(task, &plan.plan, &in_order)
+        });
+        let kept = kept.unwrap_or_default();
+        let mut later: Vec<Vec<NodeId>> = vec![Vec::new(); plan.plan.nodes.len()];
+        for &(first, second) in &kept {
+            later[first.index()].push(second);
+        }
+        for constraint in &plan.plan.constraints {
+            let is_least = |bound: &Bound| match bound {
+                Bound::Infinite => false,
+                Bound::Finite(value) => !value.is_negative(),
+                Bound::Parameter(id) => {
+                    let least = plan.parameter(*id).range.lower.value();
+                    least.is_some_and(|least| !least.is_negative())
+                }
+            };
+            if is_least(&constraint.lower) {
+                later[constraint.from.index()].push(constraint.to);
+            }
+        }
+        let mut fixed: Vec<(&Rational, NodeId)> = nodes()
+            .filter_map(|node| Some((fixed_time(plan, node)?, node)))
+            .collect();
+        fixed.sort_unstable();
+        for (at, (time, first)) in fixed.iter().enumerate() {
+            let after = fixed[at + 1..].iter().filter(|(other, _)| other > time);
+            later[first.index()].extend(after.map(|(_, second)| *second));
+        }
+        let mut before = vec![BTreeSet::new(); plan.plan.nodes.len()];
+        for first in nodes() {
+            let mut stack = later[first.index()].clone();
+            while let Some(node) = stack.pop() {
+                if before[node.index()].insert(first) {
+                    stack.extend(&later[node.index()]);
+                }
+            }
+        }
+        Self {
+            kept,
+            footprints: nodes()
+                .map(|node| plan.plan.footprint(task, node))
+                .collect(),
+            before,
+            is_conditional: plan.plan.instances.iter().any(|instance| {
+                let guarded =
+                    |effects: &[Effect]| effects.iter().any(|effect| !effect.guard.is_trivial());
+                match &instance.action.body {
+                    Body::Instantaneous(snap) => guarded(&snap.effects),
+                    Body::Durative(body) => {
+                        guarded(&body.start.effects)
+                            || guarded(&body.end.effects)
+                            || body.continuous.iter().any(|own| !own.guard.is_trivial())
+                    }
+                }
+            }),
+        }
+    }
+
+    /// Whether nothing says yet which of the two comes first.
+    fn is_open(&self, one: NodeId, other: NodeId) -> bool {
+        one != other
+            && !self.before[one.index()].contains(&other)
+            && !self.before[other.index()].contains(&one)
+    }
+
+    /// Two interfering happenings without a fixed order, which makes a difference to what holds of
+    /// these facts, and of all numbers (`numbers`), where `anchors` read them; none of those that
+    /// are `decided`.
+    pub(super) fn undecided(
+        &self,
+        facts: &BTreeSet<FactId>,
+        numbers: bool,
+        anchors: &[NodeId],
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Option<(NodeId, NodeId)> {
+        let nodes: Vec<NodeId> = (0..self.footprints.len()).map(NodeId::from).collect();
+        let writes = |node: NodeId| {
+            let footprint = &self.footprints[node.index()];
+            let mut written = footprint.adds.iter().chain(&footprint.deletes);
+            let shifts = !footprint.shifts.is_empty() || !footprint.assigns.is_empty();
+            self.is_conditional || written.any(|fact| facts.contains(fact)) || (numbers && shifts)
+        };
+        let writers: Vec<NodeId> = nodes.iter().copied().filter(|&node| writes(node)).collect();
+        // What a writer does may depend on numbers that it reads.
+        let readers = if self.is_conditional || numbers {
+            &nodes[..]
+        } else {
+            &[]
+        };
+        // What is read where the flaw shows comes first: that decides most.
+        let of = |own: &[NodeId]| -> Vec<(NodeId, NodeId)> {
+            own.iter()
+                .flat_map(|&node| pairs_with(node, &writers))
+                .collect()
+        };
+        let pairs = of(anchors)
+            .into_iter()
+            .chain(of(&writers))
+            .chain(of(readers));
+        let mut pairs = pairs.filter(|&(one, other)| {
+            let footprint = |node: NodeId| &self.footprints[node.index()];
+            self.is_open(one, other) && footprint(one).interferes_with(footprint(other))
+        });
+        pairs.find(|pair| !decided.contains(pair))
+    }
+
+    /// The two as a pair whose order may still be decided.
+    pub(super) fn pair(
+        &self,
+        one: NodeId,
+        other: NodeId,
+        decided: &BTreeSet<(NodeId, NodeId)>,
+    ) -> Option<(NodeId, NodeId)> {
+        let pair = (one.min(other), one.max(other));
+        (self.is_open(one, other) && !decided.contains(&pair)).then_some(pair)
+    }
+}
+
+/// The node with each other, the one of the smaller number first.
+fn pairs_with(node: NodeId, others: &[NodeId]) -> impl Iterator<Item = (NodeId, NodeId)> + '_ {
+    others
+        .iter()
+        .filter(move |&&other| other != node)
+        .map(move |&other| (node.min(other), node.max(other)))
+}
+
+/// The time of timed initials that no parameter moves.
+fn fixed_time(plan: &ParametrizedPlan, node: NodeId) -> Option<&Rational> {
+    if !matches!(plan.plan.nodes[node.index()], Node::Timed(_)) {
+        return None;
+    }
+    plan.plan.constraints.iter().find_map(|constraint| {
+        match (&constraint.lower, &constraint.upper) {
+            (Bound::Finite(lower), Bound::Finite(upper))
+                if constraint.from == NodeId::ZERO && constraint.to == node && lower == upper =>
+            {
+                Some(lower)
+            }
+            _ => None,
+        }
+    })
+}
+
+/// The starts and ends of actions in order of time. Where they fall together, what takes time ends
+/// before anything starts, and the rest comes as the plan lists it.
+fn actions_in_order(plan: &StnPlan, times: &Schedule) -> Vec<NodeId> {
+    let rank = |node: NodeId| match plan.nodes[node.index()] {
+        Node::End(id) if times[plan.start(id)] < times[node] => 0,
+        _ => 1,
+    };
+    let is_action = |what: Node| matches!(what, Node::Start(_) | Node::End(_) | Node::Instant(_));
+    let nodes = plan.nodes().filter(|&(_, what)| is_action(what));
+    let mut nodes: Vec<NodeId> = nodes.map(|(node, _)| node).collect();
+    nodes.sort_by(|&a, &b| {
+        let by_time = times[a].cmp(&times[b]);
+        by_time.then(rank(a).cmp(&rank(b))).then(a.cmp(&b))
+    });
+    nodes
+}
+
+/// The facts that a condition depends on, and whether it depends on numbers.
+pub(super) fn read_by(
+    task: &Task,
+    condition: &elbowroom_model::ground::Condition,
+) -> (BTreeSet<FactId>, bool) {
+    let mut facts = BTreeSet::new();
+    task.visit_facts_of(condition, &mut |fact| {
+        facts.insert(fact);
+    });
+    let mut fluents: BTreeSet<FluentId> = BTreeSet::new();
+    task.visit_fluents_of(condition, &mut |fluent| {
+        fluents.insert(fluent);
+    });
+    (facts, !fluents.is_empty())
+}
